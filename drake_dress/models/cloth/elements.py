@@ -1,0 +1,137 @@
+"""The garment as elements: triangles that stretch and hinges that bend.
+
+Everything here depends on the rest shape alone. A triangle maps its nodes to the 3×2 deformation
+gradient F = Σ x_i ⊗ g_i, a hinge (two triangles that share an edge) maps its four nodes to one
+vector Σ c_i x_i that is parallel to the mean curvature normal; both are the operators A_i of the
+paper's energy (Eq. Wx).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Rest-shape data of a triangle mesh.
+
+    Attributes:
+        node_count: n.
+        triangle: (F,3) node indices.
+        triangle_gradient: (F,3,2) g_i of each corner, 1/m, in an orthonormal frame of the triangle.
+        triangle_area: (F,) rest area, m².
+        hinge: (H,4) node indices: the shared edge first, then the two opposite corners.
+        hinge_coefficient: (H,4) c_i, dimensionless.
+        hinge_weight: (H,) 3 / (area of the two triangles), 1/m²; the hinge's energy is
+            ½ B weight (‖Σ c x‖ − rest)², B the bending stiffness (Bergou et al. 2006).
+        hinge_rest: (H,) ‖Σ c x‖ at rest, m.
+        node_area: (n,) a third of the area of the triangles around a node, m².
+        edge: (E,2) unique edges; edge_rest_length: (E,) m.
+    """
+
+    node_count: int
+    triangle: IntArray
+    triangle_gradient: FloatArray
+    triangle_area: FloatArray
+    hinge: IntArray
+    hinge_coefficient: FloatArray
+    hinge_weight: FloatArray
+    hinge_rest: FloatArray
+    node_area: FloatArray
+    edge: IntArray
+    edge_rest_length: FloatArray
+
+
+def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> Elements:
+    """Returns the elements of a mesh whose rest shape is `rest_position` (n,3), m.
+
+    Args:
+        rest_position: (n,3) rest shape, m.
+        faces: (F,3) node indices, consistently oriented, manifold.
+
+    Raises:
+        ValueError: a triangle has no area.
+    """
+    x = np.ascontiguousarray(rest_position, dtype=np.float64)
+    triangle = np.ascontiguousarray(faces, dtype=np.int32)
+    n = len(x)
+    e1 = x[triangle[:, 1]] - x[triangle[:, 0]]
+    e2 = x[triangle[:, 2]] - x[triangle[:, 0]]
+    normal = np.cross(e1, e2)
+    double_area = np.linalg.norm(normal, axis=1)
+    if np.any(double_area <= 1e-14):
+        raise ValueError(f"triangle {int(np.argmin(double_area))} has no area")
+    u = e1 / np.linalg.norm(e1, axis=1)[:, None]
+    w = np.cross(normal / double_area[:, None], u)
+    edge_matrix = np.empty((len(triangle), 2, 2))
+    edge_matrix[:, 0, 0] = np.einsum("ij,ij->i", e1, u)
+    edge_matrix[:, 1, 0] = 0.0
+    edge_matrix[:, 0, 1] = np.einsum("ij,ij->i", e2, u)
+    edge_matrix[:, 1, 1] = np.einsum("ij,ij->i", e2, w)
+    inverse = np.linalg.inv(edge_matrix)
+    gradient = np.empty((len(triangle), 3, 2))
+    gradient[:, 1] = inverse[:, 0]
+    gradient[:, 2] = inverse[:, 1]
+    gradient[:, 0] = -inverse[:, 0] - inverse[:, 1]
+    area = 0.5 * double_area
+    node_area = np.zeros(n)
+    for corner in range(3):
+        np.add.at(node_area, triangle[:, corner], area / 3.0)
+
+    hinge, hinge_faces = _hinges(triangle)
+    coefficient = _hinge_coefficients(x, hinge)
+    weight = 3.0 / (area[hinge_faces[:, 0]] + area[hinge_faces[:, 1]])
+    rest = np.linalg.norm(np.einsum("hi,hij->hj", coefficient, x[hinge]), axis=1)
+
+    half_edges = np.sort(triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edge = np.unique(half_edges, axis=0).astype(np.int32)
+    edge_length = np.linalg.norm(x[edge[:, 1]] - x[edge[:, 0]], axis=1)
+    return Elements(
+        node_count=n,
+        triangle=triangle,
+        triangle_gradient=np.ascontiguousarray(gradient),
+        triangle_area=area,
+        hinge=hinge,
+        hinge_coefficient=coefficient,
+        hinge_weight=weight,
+        hinge_rest=rest,
+        node_area=node_area,
+        edge=edge,
+        edge_rest_length=edge_length,
+    )
+
+
+def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:
+    """Returns (H,4) nodes and (H,2) faces of all interior edges."""
+    directed = triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    opposite = triangle[:, [2, 0, 1]].reshape(-1)
+    face = np.repeat(np.arange(len(triangle), dtype=np.int32), 3)
+    key = np.sort(directed, axis=1)
+    order = np.lexsort((key[:, 1], key[:, 0]))
+    key, opposite, face = key[order], opposite[order], face[order]
+    pair = np.flatnonzero(np.all(key[1:] == key[:-1], axis=1))
+    nodes = np.column_stack([key[pair], opposite[pair], opposite[pair + 1]]).astype(np.int32)
+    return np.ascontiguousarray(nodes), np.column_stack([face[pair], face[pair + 1]])
+
+
+def _hinge_coefficients(x: FloatArray, hinge: IntArray) -> FloatArray:
+    """Returns (H,4) the row of cotangents of Bergou et al. 2006, "A quadratic bending model"."""
+    x0, x1, x2, x3 = (x[hinge[:, i]] for i in range(4))
+
+    def cotangent(apex: FloatArray, p: FloatArray, q: FloatArray) -> FloatArray:
+        a, b = p - apex, q - apex
+        cosine_part: FloatArray = np.einsum("ij,ij->i", a, b)
+        return cosine_part / np.linalg.norm(np.cross(a, b), axis=1)
+
+    c01 = cotangent(x0, x1, x2)
+    c02 = cotangent(x0, x1, x3)
+    c03 = cotangent(x1, x0, x2)
+    c04 = cotangent(x1, x0, x3)
+    return np.column_stack([c03 + c04, c01 + c02, -c01 - c03, -c02 - c04])

@@ -1,0 +1,140 @@
+"""Laws and derivatives of the controller's garment."""
+
+import numpy as np
+import pytest
+
+from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.obstacles import Obstacles
+from tests.models.cloth.sheets import NO_NODES, sheet_elements
+
+NOTHING = np.zeros((0, 3))
+
+
+@pytest.mark.parametrize("h", [0.001, 0.01, 0.1, 1.0])
+def test_free_fall_is_exact_at_every_step_size(h: float) -> None:
+    x, e = sheet_elements(8, 8, 0.03)
+    cloth = ExplicitBiasCloth(e, Material(), h, NO_NODES)
+    v, start = np.zeros_like(x), x
+    for _ in range(5):
+        x, v, _, _ = cloth.step(x, v, NOTHING, Obstacles.none())
+    np.testing.assert_allclose(x - start, np.tile([0, 0, -0.5 * 9.81 * (5 * h) ** 2], (64, 1)),
+                               rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(v[:, 2], -9.81 * 5 * h, rtol=1e-9)
+
+
+@pytest.mark.parametrize("h", [0.002, 0.02, 0.1])
+def test_gripper_that_moves_steadily_feels_the_weight(h: float) -> None:
+    """Prescribed nodes report no force that is not there, whatever the step (paper-notes)."""
+    x, e = sheet_elements(12, 9, 0.03)
+    start = np.column_stack([x[:, 1], np.zeros(len(x)), -x[:, 0]])
+    held = np.arange(9, dtype=np.int32)
+    cloth = ExplicitBiasCloth(e, Material(), h, held)
+    x, v = start, np.tile([0.15, 0.0, 0.0], (len(x), 1))
+    forces = []
+    for _ in range(max(200, int(3.0 / h))):
+        x, v, r, _ = cloth.step(x, v, np.tile([0.15 * h, 0.0, 0.0], (9, 1)), Obstacles.none())
+        forces.append(r[held].sum(axis=0)[2])
+    assert np.mean(forces[-50:]) == pytest.approx(cloth.mass.sum() * 9.81, rel=0.05)
+
+
+def _in_contact(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray, Obstacles]:
+    x, e = sheet_elements(16, 18, 0.03)
+    held = np.array([0, 1, 17, 16], dtype=np.int32)
+    cloth = ExplicitBiasCloth(e, Material(friction=0.3), h, held, tolerance=1e-10)
+    limb = Obstacles(
+        np.array([[0.1, 0.2, -0.06], [0.3, 0.1, -0.07]]),
+        np.array([[0.4, 0.3, -0.06], [0.3, 0.1, -0.07]]),
+        np.array([0.05, 0.05]),
+        np.array([[0.0, 0.0, 0.05], [0.02, 0.0, 0.0]]),
+        np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]]),
+    )
+    v = np.zeros_like(x)
+    motion = np.tile([0.05 * h, 0.02 * h, -0.1 * h], (4, 1))
+    for _ in range(int(0.5 / h)):
+        x, v, _, _ = cloth.step(x, v, motion, limb)
+    return cloth, x, v, motion, limb
+
+
+@pytest.mark.parametrize("h", [0.005, 0.02, 0.1])
+def test_derivative_of_a_contact_step_matches_finite_differences(h: float) -> None:
+    rng = np.random.default_rng(7)
+    cloth, x, v, motion, limb = _in_contact(h)
+    weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
+    weight_r = 1e-3 * rng.normal(size=motion.shape)
+
+    def loss(x: FloatArray, v: FloatArray, motion: FloatArray) -> tuple[float, Tape]:
+        x1, v1, r, tape = cloth.step(x, v, motion, limb, modes)
+        value = np.sum(weight_x * x1) + np.sum(weight_v * v1) + np.sum(weight_r * r[cloth.held])
+        return float(value), tape
+
+    modes = None
+    _, tape = loss(x, v, motion)
+    modes = np.where(tape.mode <= SLIP, tape.mode, FREE).astype(np.int32)
+    assert np.any(modes == SLIP)
+    assert np.any(modes != FREE)
+    _, tape = loss(x, v, motion)
+    gradient = cloth.vector_jacobian_product(tape, weight_x, weight_v, weight_r)
+    for name, point, slope in (
+        ("x", x, gradient.x), ("v", v, gradient.v), ("motion", motion, gradient.held_motion)
+    ):
+        numeric, exact = [], []
+        for _ in range(10):
+            d = rng.normal(size=point.shape)
+            step = 1e-7
+            at = {"x": x, "v": v, "motion": motion}
+            high = loss(**{**at, name: point + step * d})[0]
+            low = loss(**{**at, name: point - step * d})[0]
+            numeric.append((high - low) / (2 * step))
+            exact.append(float(np.sum(slope * d)))
+        a, b = np.array(numeric), np.array(exact)
+        assert a @ b / np.linalg.norm(a) / np.linalg.norm(b) > 0.9999, name
+        assert np.linalg.norm(a - b) < 1e-3 * np.linalg.norm(a), name
+
+
+def test_slipping_nodes_feel_friction_of_their_sticking_force() -> None:
+    """One pass, as in the paper: the cone is held against the force of sticking."""
+    cloth, x, v, motion, limb = _in_contact(0.01)
+    _, _, reaction, tape = cloth.step(x, v, motion, limb)
+    slip = tape.mode == SLIP
+    n = tape.near.normal[slip]
+    r = reaction[slip]
+    tangential = r - np.einsum("ij,ij->i", r, n)[:, None] * n
+    pressure = np.einsum("ij,ij->i", tape.stick_reaction[slip], n)
+    assert np.all(pressure > 0.0)
+    np.testing.assert_allclose(np.linalg.norm(tangential, axis=1), 0.3 * pressure, rtol=1e-4)
+    assert np.all(reaction[tape.mode == FREE] == 0.0)
+
+
+def test_tight_sleeve_stays_bounded_at_large_steps() -> None:
+    x, e = _tube(radius=0.045)
+    cloth = ExplicitBiasCloth(e, Material(stretch_stiffness=100.0), 0.1, NO_NODES)
+    arm = Obstacles.resting(
+        np.array([[0.0, 0.0, -0.5]]), np.array([[0.0, 0.0, 0.5]]), np.array([0.05])
+    )
+    v = np.zeros_like(x)
+    for _ in range(30):
+        x, v, _, _ = cloth.step(x, v, NOTHING, arm)
+    assert np.abs(v).max() < 3.0
+    assert np.linalg.norm(x[:, :2], axis=1).max() < 0.1
+
+
+def _tube(radius: float) -> tuple[FloatArray, Elements]:
+    from drake_dress.models.cloth.elements import make_elements
+
+    around, rows = 14, 8
+    angle = np.arange(around) * 2 * np.pi / around
+    x = np.concatenate(
+        [
+            np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(around, z)])
+            for z in 0.02 * np.arange(rows)
+        ]
+    )
+    faces = []
+    for i in range(rows - 1):
+        for j in range(around):
+            a, b = i * around + j, i * around + (j + 1) % around
+            faces += [[a, b, a + around], [b, b + around, a + around]]
+    return x, make_elements(x, np.array(faces, dtype=np.int32))

@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from drake_dress.models.cloth.factor import SymbolicFactor
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.matrices import (
+    bending_bound,
+    bending_matrix,
+    lumped_mass,
+    stretch_matrix,
+)
+from tests.models.cloth.sheets import sheet_elements
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.7])
+def test_masked_factor_solves_the_free_block(share: float) -> None:
+    rng = np.random.default_rng(5)
+    _, e = sheet_elements(12, 15, 0.03)
+    material = Material()
+    p = sp.csc_matrix(sp.diags(lumped_mass(e, material)) + 1e-3 * stretch_matrix(e, material))
+    masked = rng.random(e.node_count) < share
+    rhs = rng.normal(size=(e.node_count, 3))
+    solution = SymbolicFactor(p).factorize(masked).solve(rhs)
+    free = ~masked
+    expected = spla.spsolve(sp.csc_matrix(p[free][:, free]), rhs[free])
+    np.testing.assert_allclose(solution[free], expected, rtol=1e-9, atol=1e-9)
+    assert np.all(solution[masked] == 0.0)
+
+
+def test_indefinite_matrix_is_refused() -> None:
+    with pytest.raises(ValueError, match="not positive"):
+        SymbolicFactor(sp.csc_matrix(np.diag([1.0, -1.0, 2.0]))).factorize(np.zeros(3, dtype=bool))
+
+
+def test_bending_bound_is_above_bending() -> None:
+    _, e = sheet_elements(6, 7, 0.03)
+    difference = (bending_bound(e, Material()) - bending_matrix(e, Material())).toarray()
+    assert np.linalg.eigvalsh(difference).min() > -1e-12
+    np.testing.assert_allclose(difference.sum(axis=0), 0.0, atol=1e-12)
