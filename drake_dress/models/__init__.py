@@ -1,0 +1,1 @@
+"""Plain numerics: arrays in, arrays out, without Drake."""

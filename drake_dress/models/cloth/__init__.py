@@ -1,0 +1,1 @@
+"""The garment as a mechanical system: forces, contact, steps and their derivatives."""

@@ -53,8 +53,14 @@ def find_proximity(
     normal = np.empty((n, 3))
     velocity = np.empty((n, 3))
     surface_frame(
-        x, obstacles.a, obstacles.b, obstacles.velocity, obstacles.angular_velocity, owner,
-        normal, velocity,
+        x,
+        obstacles.a,
+        obstacles.b,
+        obstacles.velocity,
+        obstacles.angular_velocity,
+        owner,
+        normal,
+        velocity,
     )
     return Proximity(gap - margin, owner, normal, velocity)
 

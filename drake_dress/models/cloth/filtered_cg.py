@@ -115,13 +115,35 @@ def filtered_cg(
     preconditioned = np.empty((n, 3))
 
     _precondition(
-        column_start, column_end, row, value, inverse_diagonal, permutation, masked,
-        masked_scale, mode, normal, reference, preconditioned, work,
+        column_start,
+        column_end,
+        row,
+        value,
+        inverse_diagonal,
+        permutation,
+        masked,
+        masked_scale,
+        mode,
+        normal,
+        reference,
+        preconditioned,
+        work,
     )
     floor = _dot(reference, preconditioned)
     _precondition(
-        column_start, column_end, row, value, inverse_diagonal, permutation, masked,
-        masked_scale, mode, normal, residual, preconditioned, work,
+        column_start,
+        column_end,
+        row,
+        value,
+        inverse_diagonal,
+        permutation,
+        masked,
+        masked_scale,
+        mode,
+        normal,
+        residual,
+        preconditioned,
+        work,
     )
     rho = _dot(residual, preconditioned)
     floor = max(floor, 1e-300)
@@ -141,8 +163,19 @@ def filtered_cg(
                 z[i, c] += alpha * direction[i, c]
                 residual[i, c] -= alpha * product[i, c]
         _precondition(
-            column_start, column_end, row, value, inverse_diagonal, permutation, masked,
-            masked_scale, mode, normal, residual, preconditioned, work,
+            column_start,
+            column_end,
+            row,
+            value,
+            inverse_diagonal,
+            permutation,
+            masked,
+            masked_scale,
+            mode,
+            normal,
+            residual,
+            preconditioned,
+            work,
         )
         new = _dot(residual, preconditioned)
         beta = new / rho
@@ -156,12 +189,31 @@ def filtered_cg(
 
 @nb.njit(cache=True, nogil=True)
 def _precondition(  # type: ignore[no-untyped-def]
-    column_start, column_end, row, value, inverse_diagonal, permutation, masked,
-    masked_scale, mode, normal, residual, out, work,
+    column_start,
+    column_end,
+    row,
+    value,
+    inverse_diagonal,
+    permutation,
+    masked,
+    masked_scale,
+    mode,
+    normal,
+    residual,
+    out,
+    work,
 ):
     solve_into(
-        column_start, column_end, row, value, inverse_diagonal, permutation, masked,
-        residual, out, work,
+        column_start,
+        column_end,
+        row,
+        value,
+        inverse_diagonal,
+        permutation,
+        masked,
+        residual,
+        out,
+        work,
     )
     for i in range(residual.shape[0]):
         if masked[i]:

@@ -150,9 +150,7 @@ def stiffness_product(
         d00, d01 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1
         d10, d11 = u1 * a0 + v1 * b0, u1 * a1 + v1 * b1
         d20, d21 = u2 * a0 + v2 * b0, u2 * a1 + v2 * b1
-        spin = (
-            (r01 * d00 + r11 * d10 + r21 * d20) - (r00 * d01 + r10 * d11 + r20 * d21)
-        ) / trace
+        spin = ((r01 * d00 + r11 * d10 + r21 * d20) - (r00 * d01 + r10 * d11 + r20 * d21)) / trace
         m0 = n0 * d00 + n1 * d10 + n2 * d20
         m1 = n0 * d01 + n1 * d11 + n2 * d21
         o0 = m0 * i00 + m1 * i01

@@ -29,7 +29,13 @@ from drake_dress.models.cloth.filtered_cg import (
 )
 from drake_dress.models.cloth.forces import filtered_product, internal_force, prepare_filtered
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.matrices import Csr, bending_matrix, lumped_mass, stretch_matrix
+from drake_dress.models.cloth.matrices import (
+    Csr,
+    bending_bound,
+    bending_matrix,
+    lumped_mass,
+    stretch_matrix,
+)
 from drake_dress.models.cloth.obstacles import Obstacles
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -127,7 +133,7 @@ class ImplicitCloth:
         self._linear = Csr.of(mass + self._scale * bending)
         p = sp.csc_matrix(
             mass
-            + self._scale * (stretch_matrix(elements, material) + sp.diags(bending.diagonal()))
+            + self._scale * (stretch_matrix(elements, material) + bending_bound(elements, material))
         )
         self._symbolic = SymbolicFactor(p)
         self._inverse_diagonal = 1.0 / p.diagonal()
@@ -149,8 +155,17 @@ class ImplicitCloth:
         x, v = state.x, state.v
         force = np.empty_like(x)
         internal_force(
-            x, e.triangle, e.triangle_gradient, e.triangle_area, m.stretch_stiffness,
-            e.hinge, e.hinge_coefficient, e.hinge_weight, e.hinge_rest, m.bending_stiffness, force,
+            x,
+            e.triangle,
+            e.triangle_gradient,
+            e.triangle_area,
+            m.stretch_stiffness,
+            e.hinge,
+            e.hinge_coefficient,
+            e.hinge_weight,
+            e.hinge_rest,
+            m.bending_stiffness,
+            force,
         )
         prepare_filtered(
             x, e.triangle, e.triangle_gradient, e.triangle_area, m.stretch_stiffness, self._block
@@ -161,12 +176,22 @@ class ImplicitCloth:
         near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)
         mode = np.empty(len(x), dtype=np.int32)
         _initial_modes(
-            near.gap, near.normal, near.surface_velocity, v, h * self.gravity, h,
-            state.mode, state.owner, near.owner, mode,
+            near.gap,
+            near.normal,
+            near.surface_velocity,
+            v,
+            h * self.gravity,
+            h,
+            state.mode,
+            state.owner,
+            near.owner,
+            mode,
         )
         mode[self.held] = HELD
         # Normal velocity, relative to the surface, that brings a node onto its margin.
-        push = np.where(near.gap > 0.0, -near.gap / h, np.minimum(-0.5 * near.gap / h, _LARGEST_PUSH))
+        push = np.where(
+            near.gap > 0.0, -near.gap / h, np.minimum(-0.5 * near.gap / h, _LARGEST_PUSH)
+        )
         friction = np.zeros_like(x)
         _initial_friction(state.reaction, near.normal, m.friction * h, mode, friction)
 
@@ -190,8 +215,15 @@ class ImplicitCloth:
             if passes >= self._max_passes:
                 break
             changed = _update_modes(
-                near.gap, near.normal, near.surface_velocity, push, velocity, impulse,
-                m.friction, mode, friction,
+                near.gap,
+                near.normal,
+                near.surface_velocity,
+                push,
+                velocity,
+                impulse,
+                m.friction,
+                mode,
+                friction,
             )
             if changed <= _TOLERATED_CHANGES * np.count_nonzero(mode):
                 break
@@ -234,11 +266,27 @@ class ImplicitCloth:
         f, e = self._factor, self.elements
         assert f is not None
         return filtered_cg(
-            self._linear.indptr, self._linear.indices, self._linear.data,
-            e.triangle, e.triangle_gradient, self._block, self._scale,
-            f.column_start, f.column_end, f.row, f.value, f.inverse_diagonal, f.permutation,
-            f.masked, self._inverse_diagonal, mode, normal, rhs, velocity,
-            self._tolerance, self._max_iterations,
+            self._linear.indptr,
+            self._linear.indices,
+            self._linear.data,
+            e.triangle,
+            e.triangle_gradient,
+            self._block,
+            self._scale,
+            f.column_start,
+            f.column_end,
+            f.row,
+            f.value,
+            f.inverse_diagonal,
+            f.permutation,
+            f.masked,
+            self._inverse_diagonal,
+            mode,
+            normal,
+            rhs,
+            velocity,
+            self._tolerance,
+            self._max_iterations,
         )
 
 

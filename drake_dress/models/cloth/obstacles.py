@@ -48,9 +48,10 @@ class Obstacles:
         """Returns the capsules `duration` seconds later, at constant rigid velocity."""
         axis = self.b - self.a
         angle = np.linalg.norm(self.angular_velocity, axis=1) * duration
-        unit = self.angular_velocity / np.maximum(
-            np.linalg.norm(self.angular_velocity, axis=1), 1e-12
-        )[:, None]
+        unit = (
+            self.angular_velocity
+            / np.maximum(np.linalg.norm(self.angular_velocity, axis=1), 1e-12)[:, None]
+        )
         sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
         along = np.einsum("ij,ij->i", unit, axis)[:, None]
         turned = axis * cosine + np.cross(unit, axis) * sine + unit * along * (1.0 - cosine)

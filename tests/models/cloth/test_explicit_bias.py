@@ -5,7 +5,7 @@ import pytest
 
 from drake_dress.models.cloth.elements import Elements, FloatArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
-from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.filtered_cg import FREE, SLIP
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.obstacles import Obstacles
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
@@ -20,8 +20,9 @@ def test_free_fall_is_exact_at_every_step_size(h: float) -> None:
     v, start = np.zeros_like(x), x
     for _ in range(5):
         x, v, _, _ = cloth.step(x, v, NOTHING, Obstacles.none())
-    np.testing.assert_allclose(x - start, np.tile([0, 0, -0.5 * 9.81 * (5 * h) ** 2], (64, 1)),
-                               rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(
+        x - start, np.tile([0, 0, -0.5 * 9.81 * (5 * h) ** 2], (64, 1)), rtol=1e-8, atol=1e-12
+    )
     np.testing.assert_allclose(v[:, 2], -9.81 * 5 * h, rtol=1e-9)
 
 
@@ -40,7 +41,9 @@ def test_gripper_that_moves_steadily_feels_the_weight(h: float) -> None:
     assert np.mean(forces[-50:]) == pytest.approx(cloth.mass.sum() * 9.81, rel=0.05)
 
 
-def _in_contact(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray, Obstacles]:
+def _in_contact(
+    h: float,
+) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray, Obstacles]:
     x, e = sheet_elements(16, 18, 0.03)
     held = np.array([0, 1, 17, 16], dtype=np.int32)
     cloth = ExplicitBiasCloth(e, Material(friction=0.3), h, held, tolerance=1e-10)
@@ -78,7 +81,9 @@ def test_derivative_of_a_contact_step_matches_finite_differences(h: float) -> No
     _, tape = loss(x, v, motion)
     gradient = cloth.vector_jacobian_product(tape, weight_x, weight_v, weight_r)
     for name, point, slope in (
-        ("x", x, gradient.x), ("v", v, gradient.v), ("motion", motion, gradient.held_motion)
+        ("x", x, gradient.x),
+        ("v", v, gradient.v),
+        ("motion", motion, gradient.held_motion),
     ):
         numeric, exact = [], []
         for _ in range(10):

@@ -19,8 +19,17 @@ STRETCH, BENDING = 120.0, 2e-3
 def force(e: Elements, x: FloatArray) -> FloatArray:
     out = np.empty_like(x)
     internal_force(
-        x, e.triangle, e.triangle_gradient, e.triangle_area, STRETCH, e.hinge,
-        e.hinge_coefficient, e.hinge_weight, e.hinge_rest, BENDING, out,
+        x,
+        e.triangle,
+        e.triangle_gradient,
+        e.triangle_area,
+        STRETCH,
+        e.hinge,
+        e.hinge_coefficient,
+        e.hinge_weight,
+        e.hinge_rest,
+        BENDING,
+        out,
     )
     return out
 
@@ -28,8 +37,18 @@ def force(e: Elements, x: FloatArray) -> FloatArray:
 def stiffness(e: Elements, x: FloatArray, z: FloatArray) -> FloatArray:
     out = np.empty_like(x)
     stiffness_product(
-        x, z, e.triangle, e.triangle_gradient, e.triangle_area, STRETCH, e.hinge,
-        e.hinge_coefficient, e.hinge_weight, e.hinge_rest, BENDING, out,
+        x,
+        z,
+        e.triangle,
+        e.triangle_gradient,
+        e.triangle_area,
+        STRETCH,
+        e.hinge,
+        e.hinge_coefficient,
+        e.hinge_weight,
+        e.hinge_rest,
+        BENDING,
+        out,
     )
     return out
 
@@ -113,7 +132,17 @@ def test_filtered_stiffness_is_exact_under_tension() -> None:
     filtered_product(z, e.triangle, e.triangle_gradient, block, 1.0, product)
     exact, no_bending = np.empty_like(x), 0.0
     stiffness_product(
-        pulled, z, e.triangle, e.triangle_gradient, e.triangle_area, STRETCH, e.hinge,
-        e.hinge_coefficient, e.hinge_weight, e.hinge_rest, no_bending, exact,
+        pulled,
+        z,
+        e.triangle,
+        e.triangle_gradient,
+        e.triangle_area,
+        STRETCH,
+        e.hinge,
+        e.hinge_coefficient,
+        e.hinge_weight,
+        e.hinge_rest,
+        no_bending,
+        exact,
     )
     np.testing.assert_allclose(product, exact, atol=1e-9 * np.abs(exact).max())

@@ -116,7 +116,10 @@ def test_sticking_node_follows_a_moving_limb() -> None:
     a, b = np.array([[-0.2, 0.0, 0.0]]), np.array([[0.2, 0.0, 0.0]])
     for k in range(200):
         limb = Obstacles(
-            a + k * H * velocity, b + k * H * velocity, np.array([0.05]), velocity,
+            a + k * H * velocity,
+            b + k * H * velocity,
+            np.array([0.05]),
+            velocity,
             np.zeros((1, 3)),
         )
         state, _ = cloth.step(state, limb, NOTHING)
@@ -131,8 +134,11 @@ def test_landing_does_not_bounce() -> None:
     start[:, 2] = 0.01
     cloth = ImplicitCloth(e, Material(), H, NO_NODES)
     state = ClothState(
-        start, np.tile([0.0, 0.0, -1.0], (64, 1)), np.zeros(64, dtype=np.int32),
-        np.zeros((64, 3)), np.full(64, -1, dtype=np.int32),
+        start,
+        np.tile([0.0, 0.0, -1.0], (64, 1)),
+        np.zeros(64, dtype=np.int32),
+        np.zeros((64, 3)),
+        np.full(64, -1, dtype=np.int32),
     )
     for _ in range(20):
         state, _ = cloth.step(state, incline(0.0), NOTHING)
@@ -151,8 +157,11 @@ def test_thin_finger_does_not_slip_between_nodes() -> None:
     for k in range(200):
         p = (tip + np.array([0.0, 0.0, speed * k * H]))[None]
         finger = Obstacles(
-            p, p - np.array([[0.0, 0.0, 0.2]]), np.array([0.006]),
-            np.array([[0.0, 0.0, speed]]), np.zeros((1, 3)),
+            p,
+            p - np.array([[0.0, 0.0, 0.2]]),
+            np.array([0.006]),
+            np.array([[0.0, 0.0, speed]]),
+            np.zeros((1, 3)),
         )
         state, _ = cloth.step(state, finger, np.zeros((len(held), 3)))
     near = np.linalg.norm(state.x[:, :2] - tip[:2], axis=1) < 0.02

@@ -1,0 +1,1 @@
+"""Scenarios, stations and the dressing diagram."""

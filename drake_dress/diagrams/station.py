@@ -1,0 +1,151 @@
+"""The station: where robots, person and garment are. Simulated here; hardware has the same ports.
+
+    inputs   {left,right}_gripper.position_command   (3,) p_WG, m
+    outputs  {left,right}_gripper.position_measured  (3,) m
+             {left,right}_gripper.velocity_measured  (3,) m/s
+             {left,right}_gripper.force_measured     (3,) of the garment on the gripper, N
+             cheat_garment_position, cheat_garment_velocity   (3n,)
+             cheat_contact (n,), cheat_contact_force (3n,)
+             cheat_body_poses                        of the person's bodies
+
+What only simulation can know has the prefix `cheat_`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.obstacles import Obstacles
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, Side, shoulder_height
+from drake_dress.systems.cloth_plant import ClothPlant
+from drake_dress.systems.floating_gripper import FloatingGripper
+
+FloatArray = np.ndarray
+SIDES = ("left", "right")
+# Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
+_SETTLING_TIME = 1.6
+_SETTLING_DAMPING = 0.03
+
+
+@dataclass(frozen=True)
+class StationParameters:
+    """What the simulated station is made of; SI units."""
+
+    mesh: GarmentMesh
+    material: Material
+    time_step: float
+    measures: BodyMeasures
+    posture: Posture
+    arms: dict[Side, ArmPose]
+    joints: JointParameters
+    gripper_max_speed: float = 0.25
+    gripper_max_acceleration: float = 2.0
+    distance_behind: float = 0.45
+    height_offset: float = 0.0
+    lateral_offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Station:
+    """A station's diagram, and what its users need of what is inside."""
+
+    diagram: Diagram
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    person: Person
+    cloth: ClothPlant
+    start_grippers: FloatArray
+
+
+def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None) -> Station:
+    """Returns a station with two floating grippers that hold a coat behind a person."""
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.time_step)
+    person = add_person(plant, p.measures, p.posture, p.arms, p.joints)
+    plant.Finalize()
+    tone = builder.AddSystem(ConstantVectorSource(person.tone_torque(plant)))
+    builder.Connect(tone.get_output_port(), plant.get_applied_generalized_force_input_port())
+
+    elements = make_elements(p.mesh.rest_position, p.mesh.faces)
+    held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
+    top = shoulder_height(p.measures, p.posture) + p.height_offset
+    hung = p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
+    grippers = np.stack([hung[p.mesh.grasp[side]].mean(axis=0) for side in SIDES])
+    start = settled(p, hung, held)
+
+    cloth = builder.AddNamedSystem(
+        "cloth",
+        ClothPlant(
+            ImplicitCloth(elements, p.material, p.time_step, held),
+            (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
+            start,
+            grippers,
+            person.capsules,
+            person.body_indices,
+        ),
+    )
+    builder.Connect(plant.get_body_poses_output_port(), cloth.GetInputPort("body_poses"))
+    builder.Connect(
+        plant.get_body_spatial_velocities_output_port(),
+        cloth.GetInputPort("body_spatial_velocities"),
+    )
+    builder.Connect(
+        cloth.GetOutputPort("person_forces"), plant.get_applied_spatial_force_input_port()
+    )
+    for i, side in enumerate(SIDES):
+        gripper = builder.AddNamedSystem(
+            f"{side}_gripper",
+            FloatingGripper(
+                grippers[i], p.time_step, p.gripper_max_speed, p.gripper_max_acceleration
+            ),
+        )
+        for quantity in ("position", "velocity"):
+            port = gripper.GetOutputPort(f"{quantity}_measured")
+            builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
+            builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
+        builder.ExportInput(
+            gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
+        )
+        builder.ExportOutput(
+            cloth.GetOutputPort(f"{side}_gripper_force"), f"{side}_gripper.force_measured"
+        )
+    for name in ("garment_position", "garment_velocity", "contact", "contact_force"):
+        builder.ExportOutput(cloth.GetOutputPort(name), f"cheat_{name}")
+    builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    diagram.set_name("station")
+    return Station(diagram, plant, scene_graph, person, cloth, grippers)
+
+
+def settled(p: StationParameters, hung: FloatArray, held: np.ndarray) -> FloatArray:
+    """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
+    m = p.material
+    damped = Material(
+        m.surface_density,
+        m.stretch_stiffness,
+        m.bending_stiffness,
+        _SETTLING_DAMPING,
+        m.friction,
+        m.margin,
+    )
+    cloth = ImplicitCloth(
+        make_elements(p.mesh.rest_position, p.mesh.faces), damped, p.time_step, held
+    )
+    state = ClothState.at_rest(hung)
+    still = np.zeros((len(held), 3))
+    for _ in range(int(_SETTLING_TIME / p.time_step)):
+        state, _ = cloth.step(state, Obstacles.none(), still)
+    return state.x

@@ -1,0 +1,1 @@
+"""Planning of the grippers through the garment model."""

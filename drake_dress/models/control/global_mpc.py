@@ -1,0 +1,302 @@
+"""The global controller: gradient descent through the garment (Eq. global_mpc).
+
+A plan is a velocity of each gripper for each of N steps. The garment model rolls it out against
+the predicted person; sleeve states, stage costs and gripper forces of every step give the cost;
+the adjoint of the rollout gives its gradient. The descent is projected on the speed limit, each
+velocity is scaled by the time it has to act, and a step is accepted only if it lowers the cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.obstacles import Obstacles
+from drake_dress.models.dressing.sleeve import (
+    Entry,
+    SleeveState,
+    entry_direction,
+    entry_direction_vjp,
+    sleeve_state,
+    sleeve_state_vjp,
+)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Diagonal weights of the stage costs.
+
+    Attributes:
+        position: W, 1/m².
+        direction: Q, dimensionless.
+        speed: R on the gripper displacement of a step, 1/m².
+        safety: w_s on the gripper force beyond `free_force`, 1/N².
+        free_force: gripper force that costs nothing, N.
+        separation: on the distance of the grippers beyond what the garment between them spans at
+            rest, 1/m²; it is what the force would say too late for a descent to hear.
+    """
+
+    position: float = 1.0
+    direction: float = 0.05
+    speed: float = 0.5
+    safety: float = 1e-4
+    free_force: float = 5.0
+    separation: float = 10.0
+
+
+@dataclass(frozen=True)
+class SleeveTarget:
+    """Where one sleeve shall be at each of the N steps.
+
+    Attributes:
+        position: (N,3) m; direction: (N,3) unit vectors.
+        position_weight, direction_weight: factors on W and Q; 0 leaves the sleeve alone.
+        entering: the direction asked for is that from the armhole to the garment's entry, not the
+            armhole's own.
+    """
+
+    position: FloatArray
+    direction: FloatArray
+    position_weight: float = 1.0
+    direction_weight: float = 1.0
+    entering: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Result of a solve.
+
+    Attributes:
+        velocity: (N,2,3) of left and right gripper, m/s, world.
+        cost: reached; initial_cost: of the start.
+        iterations: accepted gradient steps; evaluations: rollouts.
+        reason: why the descent stopped: "small_step", "no_descent" or "iterations".
+        armhole: (N,2,3) predicted armhole centres, m.
+        force: (N,2) predicted gripper force, N.
+    """
+
+    velocity: FloatArray
+    cost: float
+    initial_cost: float
+    iterations: int
+    evaluations: int
+    reason: str
+    armhole: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True)
+class _Rollout:
+    cost: float
+    tapes: list[Tape]
+    states: list[FloatArray]
+    armhole: FloatArray
+    reaction: list[FloatArray]
+    sleeves: list[tuple[SleeveState, SleeveState]]
+    force: FloatArray
+
+
+class GlobalController:
+    """Plans gripper velocities over a horizon.
+
+    Args:
+        cloth: the controller's garment; its held nodes are those of left, then right gripper.
+        held_count: number of nodes held by left and by right gripper.
+        armholes: loop nodes of left and right armhole.
+        signs: orientation signs of the loops (see `loop_orientation`).
+        horizon: N.
+        weights: of the costs.
+        max_speed: of a gripper, m/s.
+        max_iterations: gradient steps per solve.
+        span: distance of the grippers at rest, m.
+        entry: where arms come into the garment.
+    """
+
+    def __init__(
+        self,
+        cloth: ExplicitBiasCloth,
+        held_count: tuple[int, int],
+        armholes: tuple[IntArray, IntArray],
+        signs: tuple[float, float],
+        horizon: int,
+        weights: Weights,
+        max_speed: float,
+        max_iterations: int,
+        span: float,
+        entry: Entry,
+    ) -> None:
+        self.cloth = cloth
+        self.horizon = horizon
+        self.weights = weights
+        self.max_speed = max_speed
+        self.max_iterations = max_iterations
+        self._span = span
+        self._entry = entry
+        self._armholes = armholes
+        self._signs = signs
+        self._side = np.repeat([0, 1], held_count)
+        self._split = [np.flatnonzero(self._side == i) for i in (0, 1)]
+
+    def solve(
+        self,
+        x: FloatArray,
+        v: FloatArray,
+        targets: tuple[SleeveTarget, SleeveTarget],
+        obstacles: Sequence[Obstacles],
+        guess: FloatArray,
+    ) -> Plan:
+        """Returns the plan that gradient descent reaches from `guess`.
+
+        Args:
+            x: (n,3) garment now, m.
+            v: (n,3) its velocity, m/s.
+            targets: of left and right sleeve.
+            obstacles: the predicted person at the start of each of the N steps.
+            guess: (N,2,3) velocities to start from, m/s.
+        """
+        h, n = self.cloth.time_step, self.horizon
+        velocity = _limited(guess, self.max_speed)
+        now = self._rollout(x, v, velocity, targets, obstacles)
+        initial, evaluations, iterations, reason = now.cost, 1, 0, "iterations"
+        # A velocity at step j moves every later state: curvature of the position cost.
+        remaining = np.arange(n, 0, -1.0)
+        scale = 1.0 / (2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed))
+        length = 1.0
+        while iterations < self.max_iterations:
+            gradient = self._gradient(now, velocity, targets)
+            descent = scale[:, None, None] * gradient
+            accepted = False
+            for _ in range(5):
+                trial_velocity = _limited(velocity - length * descent, self.max_speed)
+                moved = trial_velocity - velocity
+                if np.abs(moved).max() < 1e-3 * self.max_speed:
+                    break
+                trial = self._rollout(x, v, trial_velocity, targets, obstacles)
+                evaluations += 1
+                if trial.cost < now.cost + 1e-4 * float(np.sum(gradient * moved)):
+                    accepted = True
+                    break
+                length *= 0.4
+            if not accepted:
+                reason = (
+                    "small_step" if np.abs(moved).max() < 1e-3 * self.max_speed else "no_descent"
+                )
+                break
+            gained = now.cost - trial.cost
+            velocity, now = trial_velocity, trial
+            iterations += 1
+            length = min(2.0 * length, 8.0)
+            if gained < 1e-4 * initial:
+                reason = "small_step"
+                break
+        return Plan(
+            velocity, now.cost, initial, iterations, evaluations, reason, now.armhole, now.force
+        )
+
+    def _rollout(
+        self,
+        x: FloatArray,
+        v: FloatArray,
+        velocity: FloatArray,
+        targets: tuple[SleeveTarget, SleeveTarget],
+        obstacles: Sequence[Obstacles],
+    ) -> _Rollout:
+        h, n, w = self.cloth.time_step, self.horizon, self.weights
+        cost = float(w.speed * h * h * np.sum(velocity**2))
+        tapes, states, reactions, sleeves = [], [], [], []
+        armhole, force = np.empty((n, 2, 3)), np.empty((n, 2))
+        for j in range(n):
+            motion = h * velocity[j][self._side]
+            x, v, reaction, tape = self.cloth.step(x, v, motion, obstacles[j])
+            tapes.append(tape)
+            states.append(x)
+            held = reaction[self.cloth.held]
+            reactions.append(held)
+            pair = []
+            for i in (0, 1):
+                sleeve = sleeve_state(x, self._armholes[i], self._signs[i])
+                pair.append(sleeve)
+                armhole[j, i] = sleeve.p_c
+                t = targets[i]
+                cost += (
+                    w.position
+                    * t.position_weight
+                    * float(np.sum((sleeve.p_c - t.position[j]) ** 2))
+                )
+                d = entry_direction(x, sleeve.p_c, self._entry) if t.entering else sleeve.v_c
+                cost += w.direction * t.direction_weight * float(np.sum((d - t.direction[j]) ** 2))
+                force[j, i] = np.linalg.norm(held[self._split[i]].sum(axis=0))
+                cost += w.safety * max(0.0, force[j, i] - w.free_force) ** 2
+            sleeves.append((pair[0], pair[1]))
+            apart = self._apart(x)
+            cost += w.separation * max(0.0, float(np.linalg.norm(apart)) - self._span) ** 2
+        return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
+
+    def _apart(self, x: FloatArray) -> FloatArray:
+        """Returns the vector (3,) from the right to the left grasp, m."""
+        left, right = (x[self.cloth.held[self._split[i]]].mean(axis=0) for i in (0, 1))
+        apart: FloatArray = left - right
+        return apart
+
+    def _gradient(
+        self,
+        rollout: _Rollout,
+        velocity: FloatArray,
+        targets: tuple[SleeveTarget, SleeveTarget],
+    ) -> FloatArray:
+        h, n, w = self.cloth.time_step, self.horizon, self.weights
+        gradient = 2.0 * w.speed * h * h * velocity
+        x_bar = np.zeros_like(rollout.states[0])
+        v_bar = np.zeros_like(x_bar)
+        for j in range(n - 1, -1, -1):
+            held_bar = np.zeros((len(self.cloth.held), 3))
+            for i in (0, 1):
+                t, sleeve = targets[i], rollout.sleeves[j][i]
+                p_bar = 2.0 * w.position * t.position_weight * (sleeve.p_c - t.position[j])
+                scale = 2.0 * w.direction * t.direction_weight
+                if t.entering:
+                    state = rollout.states[j]
+                    d = entry_direction(state, sleeve.p_c, self._entry)
+                    e_bar, c_bar = entry_direction_vjp(
+                        state, sleeve.p_c, self._entry, scale * (d - t.direction[j])
+                    )
+                    x_bar[self._entry.nodes] += e_bar
+                    p_bar = p_bar + c_bar
+                    d_bar = np.zeros(3)
+                else:
+                    d_bar = scale * (sleeve.v_c - t.direction[j])
+                loop = self._armholes[i]
+                np.add.at(
+                    x_bar,
+                    loop,
+                    sleeve_state_vjp(rollout.states[j], loop, self._signs[i], p_bar, d_bar),
+                )
+                excess = rollout.force[j, i] - w.free_force
+                if excess > 0.0:
+                    total = rollout.reaction[j][self._split[i]].sum(axis=0)
+                    held_bar[self._split[i]] += (
+                        2.0 * w.safety * excess * total / rollout.force[j, i]
+                    )
+            apart = self._apart(rollout.states[j])
+            distance = float(np.linalg.norm(apart))
+            if distance > self._span:
+                pull = 2.0 * w.separation * (distance - self._span) * apart / distance
+                for i, sign in ((0, 1.0), (1, -1.0)):
+                    nodes = self.cloth.held[self._split[i]]
+                    x_bar[nodes] += sign * pull / len(nodes)
+            back = self.cloth.vector_jacobian_product(rollout.tapes[j], x_bar, v_bar, held_bar)
+            x_bar, v_bar = back.x, back.v
+            for i in (0, 1):
+                gradient[j, i] += h * back.held_motion[self._split[i]].sum(axis=0)
+        return gradient
+
+
+def _limited(velocity: FloatArray, max_speed: float) -> FloatArray:
+    """Returns velocities (N,2,3) with none faster than `max_speed`, directions kept."""
+    speed = np.linalg.norm(velocity, axis=2, keepdims=True)
+    limited: FloatArray = velocity * np.minimum(1.0, max_speed / np.maximum(speed, 1e-12))
+    return limited

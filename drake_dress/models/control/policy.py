@@ -1,0 +1,301 @@
+"""From what is seen to a plan: sleeve states, stages, targets and the global controller in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray, make_elements
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.obstacles import Obstacles
+from drake_dress.models.control.global_mpc import GlobalController, Plan, SleeveTarget, Weights
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.sleeve import (
+    SleeveState,
+    find_entry,
+    loop_orientation,
+    sleeve_state,
+)
+from drake_dress.models.dressing.stages import (
+    SleeveFacts,
+    StageParameters,
+    StageState,
+    Task,
+    advance_stages,
+)
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import Capsule
+
+LEFTWARD = np.array([0.0, 1.0, 0.0])
+FRONT = np.array([1.0, 0.0, 0.0])
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class PolicyParameters:
+    """Settings of the global controller and its targets.
+
+    Attributes:
+        time_step: of the prediction, s. horizon: N. max_iterations: gradient steps per solve.
+        inner_iterations: of the garment's linear solve; 1 is the paper's one-step scheme.
+        max_speed: of a gripper, m/s.
+        weights: of the costs.
+        progress_step: advance of s asked for in one step of the prediction (k).
+        approach_distance: cap of l_h, m.
+        behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
+        approach_slope: l_h per distance beside the line of approach; 1 as printed.
+        aside_free: distance beside that does not count, m.
+        overshoot: how far past the hand an armhole in line is asked to go, m.
+        forearm_share: direction of approach, between inward across the body (0) and the
+            forearm (1).
+        stages: thresholds of the switching.
+    """
+
+    time_step: float = 0.1
+    horizon: int = 8
+    max_iterations: int = 4
+    inner_iterations: int = 10
+    max_speed: float = 0.12
+    weights: Weights = field(default_factory=Weights)
+    progress_step: float = 0.04
+    approach_distance: float = 0.18
+    behind_distance: float = 0.30
+    approach_slope: float = 3.0
+    aside_free: float = 0.02
+    overshoot: float = 0.06
+    forearm_share: float = 0.2
+    stages: StageParameters = field(default_factory=StageParameters)
+
+
+@dataclass(frozen=True)
+class PersonModel:
+    """What the controller knows of the person's shape.
+
+    Attributes:
+        capsules: in body frames; those of the torso are used as they are.
+        shoulders: (2,3) of the shoulder joints in the torso's frame, left and right, m.
+        radius: upper arm, forearm, hand, m.
+    """
+
+    capsules: tuple[Capsule, ...]
+    shoulders: FloatArray
+    radius: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PolicyState:
+    """What is carried from one decision to the next."""
+
+    stages: StageState
+    velocity: FloatArray
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A plan and what led to it; `target` (2,3) is where the armholes shall be next, m."""
+
+    plan: Plan
+    tasks: tuple[Task, Task]
+    facts: tuple[SleeveFacts, SleeveFacts]
+    target: FloatArray
+
+
+class DressingPolicy:
+    """Decides how both grippers move, from garment and person as they are believed to be.
+
+    Args:
+        mesh: the controller's garment; it need not be the true one.
+        material: what the controller believes of the fabric.
+        person: what it knows of the person's shape.
+        parameters: settings.
+    """
+
+    def __init__(
+        self,
+        mesh: GarmentMesh,
+        material: Material,
+        person: PersonModel,
+        parameters: PolicyParameters,
+    ) -> None:
+        self.mesh = mesh
+        self.parameters = parameters
+        self._person = person
+        elements = make_elements(mesh.rest_position, mesh.faces)
+        held = np.concatenate([mesh.grasp[side] for side in SIDES])
+        cloth = ExplicitBiasCloth(
+            elements,
+            material,
+            parameters.time_step,
+            held,
+            tolerance=1e-2,
+            iterations=parameters.inner_iterations,
+        )
+        self._loops = tuple(np.asarray(mesh.loops[f"{side}_armhole"]) for side in SIDES)
+        self._signs = tuple(float(loop_orientation(mesh, side)) for side in SIDES)
+        left, right = (mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES)
+        span = float(np.linalg.norm(left - right))
+        self._entry = find_entry(mesh)
+        self.controller = GlobalController(
+            cloth,
+            (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
+            (self._loops[0], self._loops[1]),
+            (self._signs[0], self._signs[1]),
+            parameters.horizon,
+            parameters.weights,
+            parameters.max_speed,
+            parameters.max_iterations,
+            span,
+            self._entry,
+        )
+
+    def initial_state(self) -> PolicyState:
+        """Returns the state before the first decision: nothing is on, nothing moves."""
+        return PolicyState(StageState(), np.zeros((self.parameters.horizon, 2, 3)))
+
+    def decide(
+        self,
+        state: PolicyState,
+        x: FloatArray,
+        v: FloatArray,
+        joints: FloatArray,
+        time: float,
+        elapsed_steps: int = 5,
+    ) -> tuple[PolicyState, Decision]:
+        """Returns the next state and the decision.
+
+        Args:
+            state: of the decision before.
+            x: (n,3) the controller's garment, m.
+            v: (n,3) its velocity, m/s.
+            joints: (N+1,6,3) predicted shoulder, elbow, hand of left, then right arm, m; row 0
+                is now.
+            time: now, s.
+            elapsed_steps: how many prediction steps passed since the last decision, for the start
+                of the descent.
+        """
+        p = self.parameters
+        axes = [
+            [ArmAxis(hand=q[3 * i + 2], elbow=q[3 * i + 1], shoulder=q[3 * i]) for q in joints]
+            for i in (0, 1)
+        ]
+        sleeves = [sleeve_state(x, self._loops[i], self._signs[i]) for i in (0, 1)]
+        facts = (
+            self._facts(x, joints[0], axes[0][0], sleeves[0], 0),
+            self._facts(x, joints[0], axes[1][0], sleeves[1], 1),
+        )
+        goals = [self._prepared(axes[i][0], sleeves[i], i)[0] for i in (0, 1)]
+        for i in (0, 1):
+            if facts[i].linked:
+                goals[i] = axes[i][0].G(min(2.0, facts[i].s + p.progress_step))
+        distance = float(np.linalg.norm(goals[0] - goals[1]))
+        stages, tasks = advance_stages(state.stages, facts, p.stages, distance, time)
+        targets = [self._target(x, tasks, i, axes, facts, sleeves) for i in (0, 1)]
+        obstacles = self._obstacles(joints)
+        guess = np.concatenate(
+            [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
+        )[: p.horizon]
+        plan = self.controller.solve(x, v, (targets[0], targets[1]), obstacles, guess)
+        decision = Decision(plan, tasks, facts, np.stack([targets[i].position[-1] for i in (0, 1)]))
+        return replace(state, stages=stages, velocity=plan.velocity), decision
+
+    def _facts(
+        self, x: FloatArray, joints: FloatArray, axis: ArmAxis, sleeve: SleeveState, side: int
+    ) -> SleeveFacts:
+        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
+        interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
+        linked = abs(arm_linking_number(x[self._loops[side]], shoulder, elbow, hand, interior)) == 1
+        s, _, _ = axis.coordinates(sleeve.p_c)
+        _, direction = self._prepared(axis, sleeve, side)
+        offset = hand - sleeve.p_c
+        aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
+        return SleeveFacts(
+            linked=linked,
+            s=float(s) if linked else 0.0,
+            hand_distance=float(np.linalg.norm(hand - sleeve.p_c)),
+            prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
+            passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
+        )
+
+    def _prepared(
+        self, axis: ArmAxis, sleeve: SleeveState, side: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Returns position and direction of a prepared sleeve (Eq. Jpi).
+
+        The opening is drawn over the hand along its own normal d, from outside inward. Before, it
+        waits a cap of l_h outside the hand, and further back (against v_f) until it is in line: so
+        the hand comes in by the open front. An arm that comes from anywhere else meets the outside
+        of the front panel, with the armhole's centre at the hand and the hand not in it.
+        """
+        p = self.parameters
+        hand = axis.G(0.0)
+        inward = LEFTWARD * (-1.0 if side == 0 else 1.0)
+        direction = (1.0 - p.forearm_share) * inward + p.forearm_share * axis.D(0.0)
+        direction = direction / np.linalg.norm(direction)
+        offset = hand - sleeve.p_c
+        aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
+        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), p.approach_distance)
+        goal = hand - (distance - p.overshoot) * direction
+        error = sleeve.p_c - (hand - p.approach_distance * direction)
+        error = error - FRONT * (FRONT @ error)
+        if distance == p.approach_distance:
+            wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
+            goal = hand - p.approach_distance * direction - min(wait, p.behind_distance) * FRONT
+        return goal, direction
+
+    def _target(
+        self,
+        x: FloatArray,
+        tasks: tuple[Task, Task],
+        side: int,
+        axes: Sequence[Sequence[ArmAxis]],
+        facts: Sequence[SleeveFacts],
+        sleeves: Sequence[SleeveState],
+    ) -> SleeveTarget:
+        p, n = self.parameters, self.parameters.horizon
+        task = tasks[side]
+        position, direction = np.empty((n, 3)), np.empty((n, 3))
+        for j in range(n):
+            axis = axes[side][j + 1]
+            if task in (Task.PREPARE, Task.REST) or not facts[side].linked:
+                position[j], direction[j] = self._prepared(axis, sleeves[side], side)
+                continue
+            if task == Task.DRESS:
+                s = facts[side].s + (j + 1) * p.progress_step
+            else:
+                other_hand = axes[1 - side][j + 1].G(0.0)
+                s, _, _ = axis.coordinates(other_hand)
+                s = max(float(s), p.stages.waiting_progress)
+            s = min(2.0, max(0.0, s))
+            position[j], direction[j] = axis.G(s), axis.D(s)
+        if task == Task.REST:
+            return SleeveTarget(position, direction, 0.0, 0.0)
+        return SleeveTarget(position, direction)
+
+    def _obstacles(self, joints: FloatArray) -> list[Obstacles]:
+        """Returns the predicted person at the start of each step."""
+        person, h = self._person, self.parameters.time_step
+        torso = [c for c in person.capsules if c.body == "torso"]
+        upper, fore, hand = person.radius
+        radius = np.array([c.radius for c in torso] + [upper, fore, hand] * 2)
+        rows_a, rows_b = [], []
+        for q in joints:
+            shift = 0.5 * (q[0] + q[3]) - person.shoulders.mean(axis=0)
+            a = [c.a_B + shift for c in torso]
+            b = [c.b_B + shift for c in torso]
+            for i in (0, 3):
+                a += [q[i], q[i + 1], q[i + 2]]
+                b += [q[i + 1], q[i + 2], q[i + 2]]
+            rows_a.append(np.array(a))
+            rows_b.append(np.array(b))
+        predicted = []
+        for j in range(len(joints) - 1):
+            va, vb = (rows_a[j + 1] - rows_a[j]) / h, (rows_b[j + 1] - rows_b[j]) / h
+            axis = rows_b[j] - rows_a[j]
+            length2 = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-12)[:, None]
+            omega = np.cross(axis, vb - va) / length2
+            predicted.append(Obstacles(rows_a[j], rows_b[j], radius, va, omega))
+        return predicted

@@ -1,0 +1,1 @@
+"""Dressing coordinates, sleeve states and stages."""

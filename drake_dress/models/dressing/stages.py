@@ -1,0 +1,155 @@
+"""Which sleeve is at which stage, and what each sleeve is therefore asked to do.
+
+A sleeve is prepared (brought behind the hand), dressed (drawn up the arm), and done. With two
+sleeves of one coat the paper prepares the nearer one alone while the garment cannot reach both
+hands, then lets it wait on its arm while the other is prepared, and draws both up together.
+
+Two things differ from the print, both measured: the garment's reach is judged by the distance of
+the two targets, not only of the two armholes (which else rises to the limit first and makes the
+task flicker); and a sleeve counts as on its arm by the linking number of its armhole, since the
+progress s alone rises as well when the armhole slides up beside the arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+
+class Stage(IntEnum):
+    """Stage of one sleeve, as written in the log."""
+
+    PREPARE = 0
+    DRESS = 1
+    DONE = 2
+
+
+class Task(IntEnum):
+    """What the cost of one sleeve is made of."""
+
+    REST = 0  # no cost: the gripper serves the other sleeve
+    PREPARE = 1  # J_p
+    DRESS = 2  # J_d
+    WAIT = 3  # J_w
+
+
+@dataclass(frozen=True)
+class SleeveFacts:
+    """What the stages depend on, for one sleeve.
+
+    Attributes:
+        linked: the arm passes through the armhole.
+        s: progress of the armhole along its arm; 0 where not linked.
+        hand_distance: armhole centre to hand, m.
+        prepared_error: distance of the armhole centre to where preparing ends, m.
+        passed: how far the armhole centre has gone past the hand toward the shoulder beside
+            the arm, along the arm, m; 0 or less before the hand.
+    """
+
+    linked: bool
+    s: float
+    hand_distance: float
+    prepared_error: float
+    passed: float
+
+
+@dataclass(frozen=True)
+class StageParameters:
+    """Thresholds of the switching.
+
+    Attributes:
+        prepared_distance: a sleeve this close to its prepared position may be dressed, m (φ_p).
+        missed_distance: an armhole that has gone this far past the hand without the arm in it
+            is taken back, m.
+        waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
+        done_progress: s from which a sleeve is done.
+        reach: distance two armholes can be apart, m (φ_c).
+        insertion_timeout: time after which a dressing without insertion is taken back, s.
+    """
+
+    prepared_distance: float = 0.03
+    missed_distance: float = 0.08
+    waiting_progress: float = 0.5
+    done_progress: float = 1.95
+    reach: float = 0.45
+    insertion_timeout: float = 8.0
+
+
+@dataclass(frozen=True)
+class StageState:
+    """Stages of left and right sleeve, who goes first, and since when each stage lasts, s."""
+
+    stage: tuple[Stage, Stage] = (Stage.PREPARE, Stage.PREPARE)
+    first: int = -1
+    since: tuple[float, float] = (0.0, 0.0)
+    attempts: tuple[int, int] = (0, 0)
+
+
+def advance_stages(
+    state: StageState,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    parameters: StageParameters,
+    target_distance: float,
+    time: float,
+) -> tuple[StageState, tuple[Task, Task]]:
+    """Returns the stages after what was seen, and the task of left and right sleeve.
+
+    Args:
+        state: stages so far.
+        facts: of left and right sleeve.
+        parameters: thresholds.
+        target_distance: between where both sleeves would be if they were treated apart, m.
+        time: now, s.
+    """
+    for side in (0, 1):
+        state = _advance(state, side, facts[side], parameters, time)
+    on_arm = [facts[i].linked and state.stage[i] != Stage.PREPARE for i in (0, 1)]
+    if state.first < 0:
+        nearer = 0 if facts[0].hand_distance <= facts[1].hand_distance else 1
+        state = replace(state, first=nearer)
+    if on_arm[1 - state.first] and not on_arm[state.first]:
+        state = replace(state, first=1 - state.first)
+    n = state.first
+    f = 1 - n
+    tasks = [Task.REST, Task.REST]
+    if all(on_arm) or target_distance < parameters.reach:
+        for side in (0, 1):
+            tasks[side] = Task.PREPARE if state.stage[side] == Stage.PREPARE else Task.DRESS
+    elif state.stage[n] == Stage.PREPARE:
+        tasks[n] = Task.PREPARE
+    elif not on_arm[n]:
+        tasks[n] = Task.DRESS
+    else:
+        tasks[n] = Task.WAIT
+        if facts[n].s >= 0.8 * parameters.waiting_progress:
+            tasks[f] = Task.PREPARE if state.stage[f] == Stage.PREPARE else Task.DRESS
+    return state, (tasks[0], tasks[1])
+
+
+def _advance(
+    state: StageState, side: int, fact: SleeveFacts, p: StageParameters, time: float
+) -> StageState:
+    stage = state.stage[side]
+    new = stage
+    if fact.linked:
+        new = Stage.DONE if fact.s >= p.done_progress else Stage.DRESS
+        if stage == Stage.DONE and fact.s >= p.done_progress - 0.1:
+            new = Stage.DONE
+    elif stage == Stage.PREPARE:
+        if fact.prepared_error < p.prepared_distance:
+            new = Stage.DRESS
+    elif (
+        fact.passed > p.missed_distance
+        or time - state.since[side] > p.insertion_timeout
+        or stage == Stage.DONE
+    ):
+        new = Stage.PREPARE
+    if new == stage:
+        return state
+    stages, since, attempts = list(state.stage), list(state.since), list(state.attempts)
+    stages[side], since[side] = new, time
+    if new == Stage.PREPARE:
+        attempts[side] += 1
+    return StageState(
+        (stages[0], stages[1]), state.first, (since[0], since[1]), (attempts[0], attempts[1])
+    )

@@ -1,0 +1,1 @@
+"""The body as capsules on articulated arms."""

@@ -1,0 +1,507 @@
+"""The log of a run, `run.h5`: written while it runs, read lazily afterwards.
+
+The file must be of use however the run ends. A run that is interrupted closes it with all samples
+whole. A process that is killed leaves what was flushed last: rows are flushed together about once
+a second, rows of bulky datasets are never rewritten, and HDF5 is told to keep its own bookkeeping
+in memory between flushes, so that the file on disk is consistent at all times but during a flush.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.errors import UserError
+from drake_dress.models.garment.mesh import GarmentMesh
+
+FloatArray = npt.NDArray[np.float64]
+
+SCHEMA = "drake_dress.log/1"
+SIDES = ("left", "right")
+LOOPS = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
+JOINT_NAMES = (
+    "left_shoulder",
+    "left_elbow",
+    "left_hand",
+    "right_shoulder",
+    "right_elbow",
+    "right_hand",
+)
+STAGE_NAMES = ("prepare", "dress", "done")
+
+_FLUSH_PERIOD = 1.0  # s of wall time
+_SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What is logged of one instant. Positions in the world frame, SI units.
+
+    Attributes:
+        time: s, greater than that of the sample before.
+        garment_position: (n,3) the plant's garment, m.
+        contact: (n,) 0 none, 1 stick, 2 slip.
+        contact_force: (n,3) of the person on the garment, N.
+        joint_position: (6,3) shoulder, elbow, hand of left, then of right, m.
+        gripper_position: side to (3,), m.
+        gripper_force: side to (3,) of the garment on the gripper, N.
+        dressing: side to (s, l in m, theta in rad).
+        stage: (2,) 0 prepare, 1 dress, 2 done; left, right.
+        global_solve_time, local_solve_time: s; NaN where no solve ended.
+        estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
+        estimate_joint_position: (6,3), m; None where it has none.
+        capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
+    """
+
+    time: float
+    garment_position: npt.ArrayLike
+    contact: npt.ArrayLike
+    contact_force: npt.ArrayLike
+    joint_position: npt.ArrayLike
+    gripper_position: dict[str, npt.ArrayLike]
+    gripper_force: dict[str, npt.ArrayLike]
+    dressing: dict[str, tuple[float, float, float]]
+    stage: npt.ArrayLike
+    global_solve_time: float = np.nan
+    local_solve_time: float = np.nan
+    estimate_garment_position: npt.ArrayLike | None = None
+    estimate_joint_position: npt.ArrayLike | None = None
+    capsule_a: npt.ArrayLike | None = None
+    capsule_b: npt.ArrayLike | None = None
+
+
+class RunLogWriter:
+    """Writes a run's log sample by sample; a context manager.
+
+    Args:
+        path: of the HDF5 file; what was there is replaced.
+        garment: the plant's.
+        scenario_text: the resolved scenario, YAML.
+        version: of drake_dress.
+        seed: of the run.
+        radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
+        joint_names: names of these six.
+        capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
+        estimate_garment: the controller's garment; None: its positions are not logged.
+        flush_period: wall time between flushes, s.
+
+    Raises:
+        UserError: the file cannot be written.
+        ValueError: a sample has another shape, or is not later than the one before.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        garment: GarmentMesh,
+        scenario_text: str,
+        version: str,
+        seed: int,
+        radius: npt.ArrayLike,
+        joint_names: Sequence[str] = JOINT_NAMES,
+        capsule_radius: npt.ArrayLike | None = None,
+        estimate_garment: GarmentMesh | None = None,
+        flush_period: float = _FLUSH_PERIOD,
+    ) -> None:
+        self.path = Path(path)
+        try:
+            self._file = h5py.File(self.path, "w")
+        except OSError as error:
+            raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
+        _keep_metadata_until_flush(self._file)
+        self._flush_period = flush_period
+        self._count = 0
+        self._last_time = -np.inf
+        self._series: dict[str, h5py.Dataset] = {}
+
+        attributes = self._file.attrs
+        attributes["schema"] = SCHEMA
+        attributes["scenario"] = scenario_text
+        attributes["version"] = version
+        attributes["seed"] = seed
+
+        self._write_garment("/garment", garment)
+        self._fixed("/human/radius", np.asarray(radius, dtype=np.float64).reshape(6), "m")
+        n = len(garment.rest_position)
+        self._add("/time", (), "s", dtype="f8")
+        self._add("/garment/position", (n, 3), "m", "world")
+        self._add("/garment/contact", (n,), "1", dtype="i1")
+        self._add("/garment/contact_force", (n, 3), "N", "world")
+        self._add("/human/joint_position", (6, 3), "m", "world", dtype="f8")
+        self._series["/human/joint_position"].attrs["names"] = list(joint_names)
+        for side in SIDES:
+            self._add(f"/gripper/{side}/position", (3,), "m", "world", dtype="f8")
+            self._add(f"/gripper/{side}/force", (3,), "N", "world", dtype="f8")
+            for name, unit in (("s", "1"), ("l", "m"), ("theta", "rad")):
+                self._add(f"/dressing/{side}/{name}", (), unit, dtype="f8")
+        self._add("/control/stage", (2,), "1", dtype="i1")
+        self._series["/control/stage"].attrs["names"] = list(SIDES)
+        self._series["/control/stage"].attrs["values"] = list(STAGE_NAMES)
+        for name in ("global", "local"):
+            self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
+        self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
+        self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
+        if estimate_garment is not None:
+            self._write_garment("/estimate/garment", estimate_garment)
+            m = len(estimate_garment.rest_position)
+            self._add("/estimate/garment/position", (m, 3), "m", "world")
+        if capsule_radius is not None:
+            capsules = np.asarray(capsule_radius, dtype=np.float64).ravel()
+            self._fixed("/human/capsule_radius", capsules, "m")
+            for end in "ab":
+                shape = (len(capsules), 3)
+                self._add(f"/human/capsule_{end}", shape, "m", "world", dtype="f8")
+        self._flush()
+
+    def append(self, sample: Sample) -> None:
+        """Appends one sample, and flushes if the last flush was a while ago."""
+        if not sample.time > self._last_time:
+            raise ValueError(f"sample at {sample.time} s is not later than {self._last_time} s")
+        for name, value in self._rows(sample).items():
+            dataset = self._series[name]
+            row = np.asarray(value)
+            if row.shape != dataset.shape[1:]:
+                raise ValueError(f"{name}: shape {row.shape} given, {dataset.shape[1:]} expected")
+            dataset.resize(self._count + 1, axis=0)
+            dataset[self._count] = row
+        self._count += 1
+        self._last_time = sample.time
+        if clock.monotonic() - self._flushed_at >= self._flush_period:
+            self._flush()
+
+    def close(self) -> None:
+        """Closes the file with as many whole samples as were appended; may be called twice."""
+        if not self._file:
+            return
+        # An interrupt may have come in the middle of a sample.
+        for dataset in self._series.values():
+            if dataset.shape[0] != self._count:
+                dataset.resize(self._count, axis=0)
+        self._file.close()
+
+    def __enter__(self) -> RunLogWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _rows(self, sample: Sample) -> dict[str, Any]:
+        rows: dict[str, Any] = {
+            "/time": sample.time,
+            "/garment/position": sample.garment_position,
+            "/garment/contact": sample.contact,
+            "/garment/contact_force": sample.contact_force,
+            "/human/joint_position": sample.joint_position,
+            "/control/stage": sample.stage,
+            "/control/global/solve_time": sample.global_solve_time,
+            "/control/local/solve_time": sample.local_solve_time,
+        }
+        for side in SIDES:
+            rows[f"/gripper/{side}/position"] = sample.gripper_position[side]
+            rows[f"/gripper/{side}/force"] = sample.gripper_force[side]
+            for coordinate, value in zip(("s", "l", "theta"), sample.dressing[side], strict=True):
+                rows[f"/dressing/{side}/{coordinate}"] = value
+        optional = {
+            "/estimate/human/joint_position": sample.estimate_joint_position,
+            "/estimate/garment/position": sample.estimate_garment_position,
+            "/human/capsule_a": sample.capsule_a,
+            "/human/capsule_b": sample.capsule_b,
+        }
+        for name, array in optional.items():
+            if name in self._series:
+                shape = self._series[name].shape[1:]
+                rows[name] = np.full(shape, np.nan) if array is None else array
+        return rows
+
+    def _write_garment(self, group: str, garment: GarmentMesh) -> None:
+        self._fixed(f"{group}/faces", np.asarray(garment.faces, dtype=np.int32))
+        rest = np.asarray(garment.rest_position, dtype=np.float64)
+        self._fixed(f"{group}/rest_position", rest, "m", "garment")
+        for name in LOOPS:
+            self._fixed(f"{group}/loops/{name}", np.asarray(garment.loops[name], dtype=np.int32))
+
+    def _fixed(
+        self, name: str, value: npt.NDArray[Any], unit: str | None = None, frame: str | None = None
+    ) -> None:
+        _label(self._file.create_dataset(name, data=value), unit, frame)
+
+    def _add(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        unit: str,
+        frame: str | None = None,
+        dtype: str = "f4",
+    ) -> None:
+        bulky = int(np.prod(shape, dtype=int)) > 100
+        # Compressed rows are a chunk each: a chunk that grew would move, and a killed process
+        # could leave the file pointing at its old place.
+        options: dict[str, Any] = (
+            {"compression": "gzip", "compression_opts": 1, "shuffle": True} if bulky else {}
+        )
+        dataset = self._file.create_dataset(
+            name,
+            shape=(0, *shape),
+            maxshape=(None, *shape),
+            chunks=(1 if bulky else _SMALL_CHUNK, *shape),
+            dtype=dtype,
+            **options,
+        )
+        _label(dataset, unit, frame)
+        self._series[name] = dataset
+
+    def _flush(self) -> None:
+        self._file.flush()
+        self._flushed_at = clock.monotonic()
+
+
+@dataclass(frozen=True)
+class RunLog:
+    """A run's log, opened for reading; large datasets are read a sample at a time.
+
+    Open with `RunLog.open`, which checks schema, presence and shapes. A context manager.
+
+    Attributes:
+        path: of the file.
+        file: the open HDF5 file, for what has no name here.
+    """
+
+    path: Path
+    file: h5py.File
+
+    @staticmethod
+    def open(path: str | Path) -> RunLog:
+        """Opens a log.
+
+        Raises:
+            UserError: missing, not HDF5, another schema, or a dataset missing or misshapen.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise UserError(str(path), "", "no such file; expected a run.h5")
+        try:
+            file = h5py.File(path, "r")
+        except OSError as error:
+            if "lock" in str(error):
+                message = "is still being written by a run; wait until it has ended"
+            else:
+                message = "is not a readable HDF5 file; expected a run.h5"
+            raise UserError(str(path), "", message) from error
+        try:
+            _check(str(path), file)
+        except BaseException:
+            file.close()
+            raise
+        return RunLog(path, file)
+
+    def close(self) -> None:
+        """Closes the file."""
+        self.file.close()
+
+    def __enter__(self) -> RunLog:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """(T,) s, strictly increasing."""
+        return self._read("/time")
+
+    @property
+    def scenario_text(self) -> str:
+        """The resolved scenario, YAML."""
+        return str(self.file.attrs.get("scenario", ""))
+
+    @property
+    def version(self) -> str:
+        """Version of drake_dress that wrote it."""
+        return str(self.file.attrs.get("version", ""))
+
+    @property
+    def seed(self) -> int:
+        """Seed of the run."""
+        return int(self.file.attrs.get("seed", 0))
+
+    @cached_property
+    def faces(self) -> npt.NDArray[np.int32]:
+        """(F,3) node indices."""
+        return np.asarray(self.file["/garment/faces"], dtype=np.int32)
+
+    @cached_property
+    def rest_position(self) -> FloatArray:
+        """(n,3) rest shape, garment frame, m."""
+        return self._read("/garment/rest_position")
+
+    @cached_property
+    def loops(self) -> dict[str, npt.NDArray[np.int64]]:
+        """Name of an opening to the node indices around it."""
+        return {n: np.asarray(self.file[f"/garment/loops/{n}"], dtype=np.int64) for n in LOOPS}
+
+    def garment_position(self, sample: int) -> FloatArray:
+        """Returns (n,3) the plant's garment at a sample, m."""
+        return np.asarray(self.file["/garment/position"][sample], dtype=np.float64)
+
+    def contact(self, sample: int) -> npt.NDArray[np.int8] | None:
+        """Returns (n,) 0 none, 1 stick, 2 slip at a sample; None where not logged."""
+        if "/garment/contact" not in self.file:
+            return None
+        return np.asarray(self.file["/garment/contact"][sample], dtype=np.int8)
+
+    def contact_force(self, sample: int) -> FloatArray | None:
+        """Returns (n,3) of the person on the garment at a sample, N; None where not logged."""
+        if "/garment/contact_force" not in self.file:
+            return None
+        return np.asarray(self.file["/garment/contact_force"][sample], dtype=np.float64)
+
+    @cached_property
+    def joint_position(self) -> FloatArray:
+        """(T,6,3) shoulder, elbow, hand of left, then of right, m."""
+        return self._read("/human/joint_position")
+
+    @cached_property
+    def joint_radius(self) -> FloatArray:
+        """(6,) limb radius at these joints, m."""
+        return self._read("/human/radius")
+
+    @cached_property
+    def capsules(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Ends (T,c,3), (T,c,3) and radius (c,) of the person's capsules, m.
+
+        Where the log has none: the four limbs between the joints, with the mean of their radii.
+        """
+        if "/human/capsule_radius" in self.file:
+            return (
+                self._read("/human/capsule_a"),
+                self._read("/human/capsule_b"),
+                self._read("/human/capsule_radius"),
+            )
+        first, second = [0, 1, 3, 4], [1, 2, 4, 5]
+        radius = 0.5 * (self.joint_radius[first] + self.joint_radius[second])
+        return self.joint_position[:, first], self.joint_position[:, second], radius
+
+    @cached_property
+    def gripper_position(self) -> dict[str, FloatArray]:
+        """Side to (T,3), m."""
+        return {side: self._read(f"/gripper/{side}/position") for side in SIDES}
+
+    @cached_property
+    def gripper_force(self) -> dict[str, FloatArray]:
+        """Side to (T,3), of the garment on the gripper, N."""
+        return {side: self._read(f"/gripper/{side}/force") for side in SIDES}
+
+    @cached_property
+    def dressing(self) -> dict[str, FloatArray]:
+        """Side to (T,3): s, l in m, theta in rad."""
+        return {
+            side: np.stack([self._read(f"/dressing/{side}/{n}") for n in ("s", "l", "theta")], 1)
+            for side in SIDES
+        }
+
+    @cached_property
+    def stage(self) -> npt.NDArray[np.int64]:
+        """(T,2) 0 prepare, 1 dress, 2 done; left, right."""
+        return np.asarray(self.file["/control/stage"], dtype=np.int64)
+
+    def solve_time(self, controller: str) -> FloatArray:
+        """Returns (T,) s of the `global` or `local` controller, NaN where no solve ended."""
+        name = f"/control/{controller}/solve_time"
+        return self._read(name) if name in self.file else np.full(len(self), np.nan)
+
+    def _read(self, name: str) -> FloatArray:
+        return np.asarray(self.file[name], dtype=np.float64)
+
+
+def _keep_metadata_until_flush(file: h5py.File) -> None:
+    configuration = file.id.get_mdc_config()
+    configuration.evictions_enabled = False
+    configuration.incr_mode = 0
+    configuration.flash_incr_mode = 0
+    configuration.decr_mode = 0
+    file.id.set_mdc_config(configuration)
+
+
+def _label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:
+    if unit is not None:
+        dataset.attrs["unit"] = unit
+    if frame is not None:
+        dataset.attrs["frame"] = frame
+
+
+# Name to shape after the first axis (None: any length); a first axis "T" has a row a sample.
+_REQUIRED: dict[str, tuple[Any, ...]] = {
+    "/time": ("T",),
+    "/garment/faces": (None, 3),
+    "/garment/rest_position": ("n", 3),
+    "/garment/position": ("T", "n", 3),
+    **{f"/garment/loops/{name}": (None,) for name in LOOPS},
+    "/human/joint_position": ("T", 6, 3),
+    "/human/radius": (6,),
+    **{f"/gripper/{side}/{name}": ("T", 3) for side in SIDES for name in ("position", "force")},
+    **{f"/dressing/{side}/{name}": ("T",) for side in SIDES for name in ("s", "l", "theta")},
+    "/control/stage": ("T", 2),
+}
+_OPTIONAL: dict[str, tuple[Any, ...]] = {
+    "/garment/contact": ("T", "n"),
+    "/garment/contact_force": ("T", "n", 3),
+    "/human/capsule_a": ("T", "c", 3),
+    "/human/capsule_b": ("T", "c", 3),
+    "/human/capsule_radius": ("c",),
+    "/control/global/solve_time": ("T",),
+    "/control/local/solve_time": ("T",),
+}
+
+
+def _check(source: str, file: h5py.File) -> None:
+    schema = file.attrs.get("schema")
+    if schema != SCHEMA:
+        raise UserError(source, "schema", f"is {schema!r}; expected {SCHEMA!r}")
+    sizes: dict[str, int] = {}
+    for name, expected in (_REQUIRED | _OPTIONAL).items():
+        if not isinstance(file.get(name), h5py.Dataset):
+            if name in _REQUIRED:
+                raise UserError(source, name, "dataset is missing")
+            continue
+        shape = file[name].shape
+        wanted = tuple(
+            sizes.setdefault(e, shape[i]) if isinstance(e, str) and i < len(shape) else e
+            for i, e in enumerate(expected)
+        )
+        fits = len(shape) == len(wanted) and all(
+            w is None or w == s for w, s in zip(wanted, shape, strict=True)
+        )
+        if not fits:
+            text = ", ".join("any" if w is None else str(w) for w in wanted)
+            raise UserError(source, name, f"has shape {shape}; expected ({text})")
+    n = sizes["n"]
+    for name in ("/garment/faces", *(f"/garment/loops/{loop}" for loop in LOOPS)):
+        index = np.asarray(file[name])
+        if index.dtype.kind not in "iu" or (index.size and not 0 <= index.min() <= index.max() < n):
+            raise UserError(source, name, f"must hold node indices from 0 to {n - 1}")
+    time = np.asarray(file["/time"])
+    if not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0.0):
+        raise UserError(source, "/time", "must be finite and strictly increasing")

@@ -1,0 +1,123 @@
+"""A log in Drake's Meshcat, with a slider."""
+
+from __future__ import annotations
+
+import time as clock
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Capsule, Meshcat, MeshcatParams, Rgba, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+
+from drake_dress.report.log import SIDES, RunLog
+from drake_dress.systems.garment_visualizer import DressingScene
+
+_SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
+_POLL_PERIOD = 0.03  # s
+_TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
+
+
+def show_replay(path: str | Path, port: int | None = None) -> int:
+    """Shows a log in Meshcat on localhost until its Stop button or Ctrl-C; returns 0.
+
+    Args:
+        path: of the run.h5.
+        port: of the page; None: the first free one from 7000.
+
+    Raises:
+        UserError: the log cannot be used.
+    """
+    with RunLog.open(path) as log:
+        if not len(log):
+            print(f"{path}: nothing was logged", flush=True)
+            return 0
+        try:
+            meshcat = Meshcat(MeshcatParams(host="localhost", port=port))
+            url = meshcat.web_url()
+            print(f"{path}: {log.time[-1]:.1f} s at {url} (Stop or Ctrl-C ends)", flush=True)
+            replay = MeshcatReplay(meshcat, log)
+            while not replay.stopped:
+                replay.update()
+                clock.sleep(_POLL_PERIOD)
+        except KeyboardInterrupt:
+            pass
+    return 0
+
+
+class MeshcatReplay:
+    """Draws the sample of a log that the page's slider asks for.
+
+    Args:
+        meshcat: to draw in; gets a slider and two buttons.
+        log: with at least one sample.
+
+    Attributes:
+        sample: index of the one shown.
+        scene: what it is drawn with.
+    """
+
+    def __init__(self, meshcat: Meshcat, log: RunLog) -> None:
+        self._meshcat = meshcat
+        self._log = log
+        self.scene = DressingScene(meshcat, np.asfortranarray(log.faces.T), "dressing")
+        self.sample = -1
+        self._playing = False
+        self._clicks = 0
+        self._last_update = clock.monotonic()
+        start, end = float(log.time[0]), float(log.time[-1])
+        step = max(1e-3, (end - start) / 1000.0)
+        self._end = end
+        # A slider needs some range even where the log has a single sample.
+        meshcat.AddSlider(
+            _TIME_SLIDER, start, max(end, start + step), step, start, "ArrowLeft", "ArrowRight"
+        )
+        meshcat.AddButton(_PLAY_BUTTON, "Space")
+        meshcat.AddButton(_STOP_BUTTON, "Escape")
+        meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.97])
+        meshcat.SetProperty("/Background", "bottom_color", [1.0, 1.0, 1.0])
+        self._add_person()
+        center = log.joint_position[0].mean(axis=0)
+        meshcat.SetCameraPose(center + [2.2, 1.0, 0.5], center)
+        self.update()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the Stop button was pressed."""
+        return self._meshcat.GetButtonClicks(_STOP_BUTTON) > 0
+
+    def update(self) -> None:
+        """Moves on when playing, and draws the sample nearest to the slider's time if it is new."""
+        now = clock.monotonic()
+        passed, self._last_update = now - self._last_update, now
+        clicks = self._meshcat.GetButtonClicks(_PLAY_BUTTON)
+        if clicks != self._clicks:
+            self._playing = not self._playing
+            self._clicks = clicks
+        time = self._meshcat.GetSliderValue(_TIME_SLIDER)
+        if self._playing:
+            time = time + passed if time < self._end else float(self._log.time[0])
+            self._meshcat.SetSliderValue(_TIME_SLIDER, min(time, self._end))
+        sample = int(np.argmin(np.abs(self._log.time - time)))
+        if sample != self.sample:
+            self._show(sample)
+            self.sample = sample
+
+    def _add_person(self) -> None:
+        a, b, radius = (self._log.capsules[0][0], self._log.capsules[1][0], self._log.capsules[2])
+        for k, r in enumerate(radius):
+            length = float(np.linalg.norm(b[k] - a[k]))
+            shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
+            self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
+
+    def _show(self, i: int) -> None:
+        log = self._log
+        self.scene.show_garment(log.garment_position(i))
+        self.scene.show_grippers(np.stack([log.gripper_position[side][i] for side in SIDES]))
+        self.scene.show_stage(log.stage[i])
+        for k, (a, b) in enumerate(zip(log.capsules[0][i], log.capsules[1][i], strict=True)):
+            axis = b - a
+            rotation = RotationMatrix()
+            if np.linalg.norm(axis) > 1e-6:
+                rotation = RotationMatrix.MakeFromOneVector(axis, 2)
+            pose = RigidTransform(rotation, 0.5 * (a + b))
+            self._meshcat.SetTransform(f"dressing/person/{k}", pose)

@@ -1,0 +1,124 @@
+"""A dressing as one HTML file that moves: no server, no library, nothing loaded from elsewhere.
+
+The garment's nodes are quantised to at least 0.1 mm, each frame is stored as the difference to
+the frame before, low and high bytes apart, and the whole is deflated: a minute of 3,700 nodes
+takes some ten megabytes. The page inflates it with the browser's own DecompressionStream.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import SIDES, STAGE_NAMES, RunLog
+from drake_dress.report.stills import floor_height
+
+MAX_BYTES = 25_000_000
+_RESOLUTION = 1e-4  # m
+_INT16_STEPS = 65_000
+
+
+def write_replay_html(
+    log: RunLog, path: str | Path, fps: float = 15.0, max_bytes: int = MAX_BYTES
+) -> None:
+    """Writes the replay of a log.
+
+    Args:
+        log: with at least one sample.
+        path: of the HTML file.
+        fps: frames a second of simulated time; the page interpolates. Halved until the file fits.
+        max_bytes: size the file keeps below.
+
+    Raises:
+        UserError: the log has no samples.
+    """
+    if not len(log):
+        raise UserError(str(log.path), "/time", "holds no sample; expected at least one")
+    while True:
+        page = _page(log, fps)
+        if len(page) <= max_bytes or fps < 0.5:
+            break
+        fps *= 0.5
+    Path(path).write_bytes(page)
+
+
+def _page(log: RunLog, fps: float) -> bytes:
+    frames = _frames(log.time, fps)
+    position = np.stack([log.garment_position(i) for i in frames])
+    # A run that blew up is worth watching up to there.
+    finite = np.isfinite(position).all(axis=(1, 2))
+    good = max(1, len(frames) if finite.all() else int(np.argmin(finite)))
+    frames, position = frames[:good], np.nan_to_num(position[:good])
+    low = position.min(axis=(0, 1))
+    step = max(_RESOLUTION, float((position.max(axis=(0, 1)) - low).max()) / _INT16_STEPS)
+    a, b, radius = log.capsules
+    a, b = np.nan_to_num(a[frames]), np.nan_to_num(b[frames])
+    meta = {
+        "frames": len(frames),
+        "nodes": position.shape[1],
+        "low": low.tolist(),
+        "step": step,
+        "time": [round(float(t), 4) for t in log.time[frames]],
+        "stage": log.stage[frames].tolist(),
+        "stageNames": list(STAGE_NAMES),
+        "s": [[round(float(log.dressing[side][i, 0]), 3) for side in SIDES] for i in frames]
+        if all(np.isfinite(log.dressing[side][frames, 0]).all() for side in SIDES)
+        else None,
+        "force": [
+            [round(float(np.linalg.norm(log.gripper_force[side][i])), 1) for side in SIDES]
+            for i in frames
+        ]
+        if all(np.isfinite(log.gripper_force[side][frames]).all() for side in SIDES)
+        else None,
+        "loops": {name: loop.tolist() for name, loop in log.loops.items()},
+        "floor": floor_height(position[0], a[0], b[0], radius),
+        "center": log.joint_position[0].mean(axis=0).tolist(),
+    }
+    grippers = np.stack([log.gripper_position[side][frames] for side in SIDES], axis=1)
+    blobs = {
+        "positions": _encode(np.round((position - low) / step).astype(np.int64)),
+        "faces": _base64(log.faces.astype("<u4").tobytes()),
+        "capsuleA": _base64(a.astype("<f4").tobytes()),
+        "capsuleB": _base64(b.astype("<f4").tobytes()),
+        "radius": _base64(radius.astype("<f4").tobytes()),
+        "grippers": _base64(np.nan_to_num(grippers).astype("<f4").tobytes()),
+    }
+    template = resources.files("drake_dress.report").joinpath("viewer.html").read_text("utf-8")
+    page = template.replace('"@META@"', json.dumps(meta, allow_nan=False))
+    for name, blob in blobs.items():
+        page = page.replace(f"@{name}@", blob)
+    return page.encode("utf-8")
+
+
+def _frames(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
+    """Returns the samples nearest to a regular grid, first and last among them."""
+    count = max(1, round((time[-1] - time[0]) * fps)) + 1
+    wanted = np.linspace(time[0], time[-1], count)
+    right = np.clip(np.searchsorted(time, wanted), 1, max(1, len(time) - 1))
+    if len(time) == 1:
+        return np.zeros(1, dtype=np.int64)
+    nearest = np.where(wanted - time[right - 1] < time[right] - wanted, right - 1, right)
+    return np.unique(nearest).astype(np.int64)
+
+
+def _encode(steps: npt.NDArray[np.int64]) -> str:
+    """Returns differences in time of (frames, n, 3) modulo 2^16, byte planes apart, deflated."""
+    difference = np.diff(steps, axis=0, prepend=0).astype(np.uint16)
+    # x, y and z of a frame apart as well: neighbours then resemble each other.
+    planes = difference.transpose(0, 2, 1).ravel()
+    # Zigzag: small negative differences get a zero high byte too.
+    signed = planes.view(np.int16).astype(np.int32)
+    zigzag = ((signed << 1) ^ (signed >> 15)).astype(np.uint16)
+    raw = (zigzag & 0xFF).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes()
+    return _base64(zlib.compress(raw, 6))
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")

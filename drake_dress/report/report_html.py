@@ -1,0 +1,381 @@
+"""A run as one page to read, `report.html`: verdict, limits, course, pictures; self-contained."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib import image as matplotlib_image
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import SIDES, STAGE_NAMES, RunLog
+from drake_dress.report.measures import Measures, measure
+from drake_dress.report.stills import CameraPose, render_still
+from drake_dress.report.summary import SuccessRules
+
+_COLOR = {"left": "#0b7a5e", "right": "#b8453b"}
+_STAGE_SHADE = ("#eef1f4", "#dbe8f5", "#dff1e4")
+_LIMIT: dict[str, Any] = {"color": "#8a2b2b", "linestyle": (0, (4, 3)), "linewidth": 1.0}
+_STILL_SIZE = (560, 440)
+
+
+def write_report(
+    run_dir: str | Path, *, rules: SuccessRules | None = None, measures: Measures | None = None
+) -> Path:
+    """Writes `report.html` from `run.h5` and `summary.json` beside it; returns its path.
+
+    Args:
+        run_dir: holds both.
+        rules: the limits that were asked.
+        measures: of this log where they are known already; computed otherwise.
+
+    Raises:
+        UserError: one of the two is missing or cannot be used.
+    """
+    run_dir = Path(run_dir)
+    summary = _read_summary(run_dir / "summary.json")
+    with RunLog.open(run_dir / "run.h5") as log:
+        m = measures if measures is not None else measure(log)
+        page = _page(log, summary, m, rules or SuccessRules())
+    path = run_dir / "report.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def _read_summary(path: Path) -> dict[str, Any]:
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(str(path), "", "cannot be read; expected a run's summary.json") from error
+    except ValueError as error:
+        raise UserError(str(path), "", f"is not JSON: {error}") from error
+    if not isinstance(summary, dict):
+        raise UserError(str(path), "", f"holds a {type(summary).__name__}; expected an object")
+    return summary
+
+
+def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules) -> str:
+    success = bool(summary.get("success"))
+    verdict = "Both sleeves are on" if success else "The dressing failed"
+    detail = (
+        f"after {_figure(summary.get('dressing_time_s'), '{:.1f} s')} of simulated time"
+        if success
+        else str(summary.get("reason"))
+    )
+    parts = [
+        f'<header class="{"good" if success else "bad"}"><h1>{verdict}</h1>'
+        f"<p>{html.escape(detail)}</p></header>",
+        "<h2>Limits asked and reached</h2>",
+        _limits(summary, rules),
+        "<h2>Pace</h2>",
+        _pace(summary),
+    ]
+    if len(log):
+        parts += ["<h2>Pictures</h2>", _pictures(log, m), "<h2>Course</h2>", _shading()]
+        parts += [_chart(title, note, draw) for title, note, draw in _charts(log, m, rules)]
+    parts += [
+        "<h2>Scenario</h2>",
+        f"<p>drake_dress {html.escape(log.version)}, seed {log.seed}</p>",
+        f"<details><summary>resolved YAML</summary><pre>{html.escape(log.scenario_text)}</pre>"
+        "</details>",
+    ]
+    title = "Dressing report"
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}</title><style>{_STYLE}</style></head><body><main>"
+        + "\n".join(parts)
+        + "</main></body></html>\n"
+    )
+
+
+def _limits(summary: dict[str, Any], rules: SuccessRules) -> str:
+    rows: list[tuple[str, str, str, bool | None]] = []
+
+    def at_most(name: str, key: str, limit: float, text: str, scale: float = 1.0) -> None:
+        value = summary.get(key)
+        met = None if value is None else bool(value <= limit)
+        asked = "≤ " + text.format(scale * limit)
+        rows.append((name, asked, _figure(value, text, scale), met))
+
+    for side in SIDES:
+        s = summary.get(f"s_{side}")
+        met = s is not None and s >= rules.min_s
+        rows.append((f"progress s, {side}", f"≥ {rules.min_s:g}", _figure(s, "{:.2f}"), met))
+    for side in SIDES:
+        inside = bool(summary.get(f"arm_inside_{side}"))
+        number = summary.get(f"linking_number_{side}")
+        shown = f"{number:+d}" if number else ("±1" if inside else "0")
+        rows.append((f"linking number of {side} armhole and arm", "±1", shown, inside))
+    for side in SIDES:
+        through = bool(summary.get(f"hand_through_cuff_{side}"))
+        rows.append((f"{side} hand through the cuff", "", "yes" if through else "no", None))
+    at_most("gripper force, largest", "max_gripper_force_N", rules.max_gripper_force, "{:.1f} N")
+    at_most(
+        "penetration, deepest", "max_penetration_m", rules.max_penetration, "{:.1f} mm", scale=1e3
+    )
+    at_most(
+        "strain of 99 % of the edges, largest",
+        "max_edge_strain",
+        rules.max_edge_strain,
+        "{:.1f} %",
+        scale=1e2,
+    )
+    rows.append(
+        (
+            "contact force at one node, largest",
+            "",
+            _figure(summary.get("max_contact_force_N"), "{:.2f} N"),
+            None,
+        )
+    )
+    mark = {
+        True: '<td class="yes">met</td>',
+        False: '<td class="no">broken</td>',
+        None: "<td></td>",
+    }
+    body = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{asked}</td><td>{reached}</td>{mark[met]}</tr>"
+        for name, asked, reached, met in rows
+    )
+    return (
+        "<table><thead><tr><th></th><th>asked</th><th>reached</th><th></th></tr></thead>"
+        f"<tbody>{body}</tbody></table>"
+    )
+
+
+def _pace(summary: dict[str, Any]) -> str:
+    rows = [
+        ("dressing time", _figure(summary.get("dressing_time_s"), "{:.1f} s")),
+        ("simulated time", _figure(summary.get("simulated_time_s"), "{:.1f} s")),
+        ("wall time", _figure(summary.get("wall_time_s"), "{:.1f} s")),
+        ("real-time factor", _figure(summary.get("realtime_factor"), "{:.2f}")),
+    ]
+    for name in ("global", "local"):
+        solve = summary.get(f"{name}_solve_ms") or {}
+        rate = _figure(summary.get(f"{name}_rate_hz"), "{:.1f} Hz")
+        median = _figure(solve.get("median"), "{:.1f} ms")
+        p99 = _figure(solve.get("p99"), "{:.1f} ms")
+        rows.append((f"{name} controller", f"{rate}, solves {median} (median), {p99} (99 %)"))
+    return (
+        "<table><tbody>"
+        + "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows)
+        + "</tbody></table>"
+    )
+
+
+def _figure(value: Any, text: str, scale: float = 1.0) -> str:
+    return "–" if value is None else text.format(scale * value)
+
+
+def _pictures(log: RunLog, m: Measures) -> str:
+    inserted = [
+        (first, k) for k in (0, 1) if (first := m.inserted_since(k)) is not None and first > 0
+    ]
+    shots: list[tuple[str, int, float]] = [("start", 0, 0.45)]
+    for count, (i, k) in enumerate(sorted(inserted)):
+        name = f"insertion of the {('first', 'second')[count]} sleeve ({SIDES[k]})"
+        shots.append((name, i, (0.95, -0.95)[k]))
+    last = len(log) - 1
+    shots += [("end", last, 0.45), ("end, from behind", last, np.pi + 0.45)]
+    figures = []
+    for name, i, azimuth in shots:
+        if not m.finite[i]:
+            continue
+        a, b, radius = log.capsules
+        grippers = np.stack([log.gripper_position[side][i] for side in SIDES])
+        target = log.joint_position[i].mean(axis=0) - [0.0, 0.0, 0.12]
+        eye = target + 2.9 * np.array([np.cos(azimuth), np.sin(azimuth), 0.22])
+        camera = CameraPose(tuple(eye), tuple(target))
+        picture = render_still(
+            log.faces, log.garment_position(i), a[i], b[i], radius, grippers, camera, _STILL_SIZE
+        )
+        caption = f"{name}, t = {log.time[i]:.1f} s"
+        figures.append(
+            f'<figure><img alt="{caption}" src="data:image/png;base64,{_png(picture)}">'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+    missing = [SIDES[k] for k in (0, 1) if m.inserted_since(k) is None]
+    note = "".join(
+        f'<p class="note">The {side} arm was not inside its sleeve at the end.</p>'
+        for side in missing
+    )
+    return f'<div class="pictures">{"".join(figures)}</div>{note}'
+
+
+def _png(picture: npt.NDArray[np.uint8]) -> str:
+    buffer = io.BytesIO()
+    matplotlib_image.imsave(buffer, picture, format="png")
+    return base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _charts(
+    log: RunLog, m: Measures, rules: SuccessRules
+) -> list[tuple[str, str, Callable[[list[Axes]], None]]]:
+    t = log.time
+
+    def progress(axes: list[Axes]) -> None:
+        for k, side in enumerate(SIDES):
+            axes[0].plot(t, log.dressing[side][:, 0], color=_COLOR[side], label=side)
+            i = m.inserted_since(k)
+            if i is not None:
+                axes[0].plot(t[i], log.dressing[side][i, 0], "o", color=_COLOR[side], ms=6)
+            axes[1].plot(t, 1e3 * log.dressing[side][:, 1], color=_COLOR[side], label=side)
+        axes[0].axhline(rules.min_s, **_LIMIT)
+        axes[0].set_ylim(-0.05, 2.1)
+        axes[0].set_ylabel("progress s")
+        axes[1].set_ylabel("distance l, mm")
+
+    def angle(axes: list[Axes]) -> None:
+        for side in SIDES:
+            theta = np.degrees(np.unwrap(np.nan_to_num(log.dressing[side][:, 2])))
+            axes[0].plot(t, theta, color=_COLOR[side], label=side)
+        axes[0].set_ylabel("angle θ, °")
+
+    def gripper(axes: list[Axes]) -> None:
+        for k, side in enumerate(SIDES):
+            axes[0].plot(t, m.gripper_force[:, k], color=_COLOR[side], label=side)
+        axes[0].axhline(rules.max_gripper_force, **_LIMIT)
+        axes[0].set_ylim(bottom=0.0)
+        axes[0].set_ylabel("gripper force, N")
+
+    def contact(axes: list[Axes]) -> None:
+        axes[0].plot(t, m.total_contact_force, color="#37474f", label="sum of the nodes")
+        axes[0].plot(t, m.node_contact_force, color="#c77f1a", label="largest at one node")
+        axes[0].set_ylim(bottom=0.0)
+        axes[0].set_ylabel("contact force, N")
+
+    def bounds(axes: list[Axes]) -> None:
+        axes[0].plot(t, 1e2 * m.edge_strain, color="#37474f", label="99 % of the edges")
+        axes[0].plot(t, 1e2 * m.edge_strain_max, color="#b0bec5", label="worst edge", zorder=1)
+        axes[0].axhline(1e2 * rules.max_edge_strain, **_LIMIT)
+        axes[0].set_ylabel("strain, %")
+        worst = np.nanmax(m.edge_strain, initial=rules.max_edge_strain)
+        axes[0].set_ylim(0.0, 1.6e2 * worst)
+        axes[1].plot(t, 1e3 * m.penetration, color="#37474f")
+        axes[1].axhline(1e3 * rules.max_penetration, **_LIMIT)
+        axes[1].set_ylabel("penetration, mm")
+        axes[1].set_ylim(bottom=0.0)
+
+    def solves(axes: list[Axes]) -> None:
+        for name, color in (("global", "#2f6fb3"), ("local", "#c77f1a")):
+            solve = 1e3 * log.solve_time(name)
+            if np.isfinite(solve).any():
+                axes[0].plot(t, solve, ".", color=color, ms=4, label=name)
+        axes[0].set_yscale("log")
+        axes[0].set_ylabel("solve time, ms")
+
+    charts: list[tuple[str, str, Callable[[list[Axes]], None]]] = [
+        (
+            "Progress and distance by stage",
+            "s is 0 at the hand, 1 at the elbow, 2 at the shoulder; a dot marks where the arm "
+            "came to be inside the armhole for good.",
+            progress,
+        ),
+        ("Angle about the arm", "", angle),
+        ("Force of the garment on the grippers", "", gripper),
+        (
+            "Contact force between person and garment",
+            "Magnitudes; the sum counts forces that cancel each other.",
+            contact,
+        ),
+        ("Strain and penetration", "", bounds),
+    ]
+    if any(np.isfinite(log.solve_time(name)).any() for name in ("global", "local")):
+        charts.append(("Solve times", "", solves))
+    return [(title, note, _with_stages(log, draw)) for title, note, draw in charts]
+
+
+def _with_stages(log: RunLog, draw: Callable[[list[Axes]], None]) -> Callable[[list[Axes]], None]:
+    """Returns a drawing with the stages in two strips on top: left above, right below."""
+
+    def drawn(axes: list[Axes]) -> None:
+        draw(axes)
+        for ax in axes:
+            for k in (0, 1):
+                change = np.flatnonzero(np.diff(log.stage[:, k])) + 1
+                bounds = [0, *change.tolist(), len(log) - 1]
+                for i, j in zip(bounds[:-1], bounds[1:], strict=True):
+                    ax.axvspan(
+                        log.time[i],
+                        log.time[j],
+                        ymin=0.5 * (1 - k),
+                        ymax=0.5 * (2 - k),
+                        color=_STAGE_SHADE[int(np.clip(log.stage[i, k], 0, 2))],
+                        lw=0,
+                        zorder=0,
+                    )
+            if len(log) > 1:
+                ax.set_xlim(log.time[0], log.time[-1])
+        if axes[0].get_legend_handles_labels()[0]:
+            axes[0].legend(loc="upper left", frameon=False, fontsize=9, ncols=2)
+
+    return drawn
+
+
+def _chart(title: str, note: str, draw: Callable[[list[Axes]], None]) -> str:
+    rows = 2 if title in ("Progress and distance by stage", "Strain and penetration") else 1
+    figure = Figure(figsize=(9.0, 2.5 * rows + 0.3), layout="constrained")
+    FigureCanvasSVG(figure)
+    axes = list(np.ravel(figure.subplots(rows, 1, sharex=True)))
+    draw(axes)
+    for ax in axes:
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=9)
+    axes[-1].set_xlabel("time, s")
+    buffer = io.BytesIO()
+    # As an image of its own: identifiers of several inline pictures would clash.
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f'<figure><h3>{title}</h3><img alt="{title}" src="data:image/svg+xml;base64,{data}">' + (
+        f"<figcaption>{note}</figcaption></figure>" if note else "</figure>"
+    )
+
+
+def _shading() -> str:
+    shades = ", ".join(
+        f'<span class="key" style="background:{shade}"></span>{name}'
+        for name, shade in zip(STAGE_NAMES, _STAGE_SHADE, strict=True)
+    )
+    return f'<p class="note">Shaded by stage: {shades}; upper half left, lower half right.</p>'
+
+
+_STYLE = """
+:root { --ink: #26303b; --soft: #66727f; --line: #dfe4ea; }
+body { margin: 0; background: #f3f5f7; color: var(--ink);
+  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", sans-serif; }
+main { max-width: 960px; margin: 0 auto; padding: 24px 20px 60px; }
+header { border-radius: 12px; padding: 18px 24px; margin-bottom: 8px; }
+header.good { background: #dff1e4; border-left: 8px solid #2b8a57; }
+header.bad { background: #fbe4e1; border-left: 8px solid #b8453b; }
+h1 { margin: 0; font-size: 28px; } header p { margin: 4px 0 0; font-size: 18px; }
+h2 { margin: 34px 0 10px; font-size: 20px; } h3 { margin: 0 0 6px; font-size: 16px; }
+table { border-collapse: collapse; background: #fff; border-radius: 10px; overflow: hidden;
+  box-shadow: 0 1px 4px rgba(30,45,60,.08); min-width: min(100%, 620px);
+  font-variant-numeric: tabular-nums; }
+td, th { text-align: left; padding: 7px 16px; border-bottom: 1px solid var(--line); }
+th { color: var(--soft); font-weight: 500; font-size: 14px; }
+tr:last-child td { border-bottom: 0; }
+.yes { color: #1f7a4a; } .no { color: #b03228; font-weight: 600; }
+figure { margin: 0 0 18px; background: #fff; border-radius: 10px; padding: 14px 16px;
+  box-shadow: 0 1px 4px rgba(30,45,60,.08); }
+figure img { display: block; width: 100%; height: auto; }
+figcaption, .note { color: var(--soft); font-size: 14px; margin-top: 6px; }
+.pictures { display: grid; gap: 14px;
+  grid-template-columns: repeat(auto-fill, minmax(min(100%, 380px), 1fr)); }
+.pictures figure { margin: 0; padding: 0 0 10px; overflow: hidden; }
+.pictures figcaption { padding: 0 12px; }
+.key { display: inline-block; width: 14px; height: 12px; border: 1px solid #c4ccd4;
+  margin: 0 4px 0 8px; vertical-align: -1px; }
+pre { overflow: auto; background: #fff; padding: 12px; border-radius: 10px; font-size: 13px; }
+"""

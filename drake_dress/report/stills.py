@@ -1,0 +1,186 @@
+"""Still pictures of a dressing, rendered by Drake without a display."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.common import MemoryFile
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    ClippingRange,
+    ColorRenderCamera,
+    Cylinder,
+    GeometryInstance,
+    InMemoryMesh,
+    LightParameter,
+    MakeRenderEngineVtk,
+    Mesh,
+    PerceptionProperties,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+    RenderLabel,
+    Rgba,
+    SceneGraph,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.sensors import CameraInfo
+
+FloatArray = npt.NDArray[np.float64]
+
+OUTSIDE_COLOR = (0.22, 0.44, 0.70)
+LINING_COLOR = (0.87, 0.62, 0.28)
+SKIN_COLOR = (0.87, 0.70, 0.58)
+GRIPPER_COLOR = (0.25, 0.26, 0.28)
+_FLOOR_COLOR = (0.76, 0.77, 0.79)
+_BACKGROUND = (0.95, 0.96, 0.97)
+_FLOOR_RADIUS = 1.6  # m
+_GRIPPER_SIZE = 0.05  # m
+_LINING_OFFSET = 2e-3  # m, so that the lining does not fight with the outside for the pixel
+
+
+@dataclass(frozen=True)
+class CameraPose:
+    """Where a picture is taken from.
+
+    Attributes:
+        eye: (3,) p_WC, m.
+        target: (3,) the point in the middle of the picture, m.
+        field_of_view: vertical, rad.
+    """
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    field_of_view: float = 0.6
+
+
+def render_still(
+    faces: npt.NDArray[np.int32],
+    position: FloatArray,
+    capsule_a: FloatArray,
+    capsule_b: FloatArray,
+    capsule_radius: FloatArray,
+    grippers: FloatArray,
+    camera: CameraPose,
+    size: tuple[int, int] = (640, 480),
+    floor: float | None = None,
+) -> npt.NDArray[np.uint8]:
+    """Returns a picture (height, width, 3), RGB.
+
+    Args:
+        faces: (F,3) of the garment; a triangle's outside is where its normal points.
+        position: (n,3) nodes, world, m.
+        capsule_a: (c,3) first ends of the person's capsules, world, m.
+        capsule_b: (c,3) their second ends, m.
+        capsule_radius: (c,), m.
+        grippers: (g,3), world, m.
+        camera: where it is taken from.
+        size: width, height in pixels.
+        floor: height of the floor, m; None: just below everything shown.
+    """
+    graph: SceneGraph = SceneGraph()
+    graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters()))
+    source = graph.RegisterSource("still")
+
+    def add(shape: Shape, X_WG: RigidTransform, color: tuple[float, float, float]) -> None:
+        instance = GeometryInstance(X_WG, shape, f"g{graph.model_inspector().num_geometries()}")
+        properties = PerceptionProperties()
+        properties.AddProperty("phong", "diffuse", Rgba(*color, 1.0))
+        properties.AddProperty("label", "id", RenderLabel(1))
+        instance.set_perception_properties(properties)
+        graph.RegisterAnchoredGeometry(source, instance)
+
+    normals = node_normals(faces, position)
+    add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
+    lining = position - _LINING_OFFSET * normals
+    add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
+    for a, b, r in zip(capsule_a, capsule_b, capsule_radius, strict=True):
+        length = float(np.linalg.norm(b - a))
+        if length > 1e-6:
+            rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
+            add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), SKIN_COLOR)
+        else:
+            add(Sphere(r), RigidTransform(a), SKIN_COLOR)
+    for p in np.reshape(grippers, (-1, 3)):
+        add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
+    if floor is None:
+        floor = floor_height(position, capsule_a, capsule_b, capsule_radius)
+    middle = [camera.target[0], camera.target[1], floor - 0.01]
+    add(Cylinder(_FLOOR_RADIUS, 0.02), RigidTransform(middle), _FLOOR_COLOR)
+
+    query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
+    image = query.RenderColorImage(_camera(camera, size), graph.world_frame_id(), _pose(camera))
+    return np.array(image.data[:, :, :3])
+
+
+def floor_height(
+    position: FloatArray, capsule_a: FloatArray, capsule_b: FloatArray, capsule_radius: FloatArray
+) -> float:
+    """Returns a height below garment (n,3) and capsules (c,3), (c,3), (c,), m."""
+    low = float(position[:, 2].min())
+    if len(capsule_radius):
+        ends = np.minimum(capsule_a[:, 2], capsule_b[:, 2]) - capsule_radius
+        low = min(low, float(ends.min()))
+    return low - 0.005
+
+
+def node_normals(faces: npt.NDArray[np.int32], position: FloatArray) -> FloatArray:
+    """Returns (n,3) unit normals at the nodes, the area-weighted mean of the triangles'."""
+    p = position[faces]
+    face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normals = np.zeros_like(position)
+    for corner in range(3):
+        np.add.at(normals, faces[:, corner], face)
+    unit: FloatArray = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    return unit
+
+
+def _mesh(faces: npt.NDArray[np.int32], position: FloatArray, normals: FloatArray) -> Mesh:
+    lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in position]
+    lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in normals]
+    lines += [f"f {i}//{i} {j}//{j} {k}//{k}" for i, j, k in faces + 1]
+    text = "\n".join(lines) + "\n"
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "garment")))
+
+
+def _render_parameters() -> RenderEngineVtkParams:
+    # A key light from the front left above casts the shadows; lamps on all sides, which cast
+    # none, keep the shaded side readable.
+    def lamp(x: float, y: float, z: float, intensity: float) -> LightParameter:
+        return LightParameter(type="point", frame="world", position=(x, y, z), intensity=intensity)
+
+    key = LightParameter(
+        type="directional", frame="world", direction=(-0.6, -0.35, -1.2), intensity=0.55
+    )
+    return RenderEngineVtkParams(
+        default_clear_color=_BACKGROUND,
+        cast_shadows=True,
+        shadow_map_size=2048,
+        lights=[
+            key,
+            lamp(4.0, 3.0, 2.2, 0.5),
+            lamp(4.0, -3.0, 1.5, 0.5),
+            lamp(-4.0, 2.5, 2.0, 0.55),
+            lamp(-4.0, -2.5, 2.0, 0.5),
+        ],
+    )
+
+
+def _camera(camera: CameraPose, size: tuple[int, int]) -> ColorRenderCamera:
+    info = CameraInfo(size[0], size[1], camera.field_of_view)
+    return ColorRenderCamera(
+        RenderCameraCore("vtk", info, ClippingRange(0.05, 20.0), RigidTransform()), False
+    )
+
+
+def _pose(camera: CameraPose) -> RigidTransform:
+    """Returns X_WC with Cz from eye to target and Cy downward."""
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    z = (target - eye) / np.linalg.norm(target - eye)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    return RigidTransform(RotationMatrix(np.stack([x, np.cross(z, x), z], axis=1)), eye)

@@ -1,0 +1,1 @@
+"""Drake systems, one a file."""

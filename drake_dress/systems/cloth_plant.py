@@ -1,0 +1,203 @@
+"""The simulated garment as a Drake system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce, SpatialVelocity
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.obstacles import Obstacles
+from drake_dress.models.human.body import Capsule
+
+FloatArray = np.ndarray
+
+
+class ClothPlant(LeafSystem):
+    """The true garment: finer and stepped finer than the controller's, and with its own scheme.
+
+    .. pydrake_system::
+
+        name: ClothPlant
+        input_ports:
+        - body_poses
+        - body_spatial_velocities
+        - left_gripper_position
+        - left_gripper_velocity
+        - right_gripper_position
+        - right_gripper_velocity
+        output_ports:
+        - garment_position
+        - garment_velocity
+        - contact
+        - contact_force
+        - left_gripper_force
+        - right_gripper_force
+        - person_forces
+
+    garment_position, garment_velocity: (3n,) row-major (n,3), m, m/s, world. contact: (n,) 0 none,
+    1 stick, 2 slip. contact_force: (3n,) of the person on the garment, N. *_gripper_force: (3,)
+    of the garment on the gripper, N. person_forces: list of ExternallyAppliedSpatialForce, one for
+    each body that is touched. All outputs depend on discrete state only.
+
+    Args:
+        cloth: the stepper; its held nodes are those of the left, then of the right gripper.
+        held_count: how many nodes the left and the right gripper hold.
+        start: (n,3) garment at time 0, m.
+        start_grippers: (2,3) p_WG of left and right at time 0, m.
+        capsules: of the person, fixed in their bodies.
+        body_indices: body name to its index in the plant.
+    """
+
+    def __init__(
+        self,
+        cloth: ImplicitCloth,
+        held_count: tuple[int, int],
+        start: FloatArray,
+        start_grippers: FloatArray,
+        capsules: Sequence[Capsule],
+        body_indices: dict[str, BodyIndex],
+    ) -> None:
+        super().__init__()
+        self.cloth = cloth
+        n = cloth.elements.node_count
+        self._n = n
+        self._side = np.repeat([0, 1], held_count)
+        self._offset = start[cloth.held] - start_grippers[self._side]
+        self._capsules = list(capsules)
+        self._names = sorted({c.body for c in capsules})
+        self._body_of = np.array([self._names.index(c.body) for c in capsules], dtype=np.int32)
+        self._index = [int(body_indices[name]) for name in self._names]
+        self._a = np.array([c.a_B for c in capsules])
+        self._b = np.array([c.b_B for c in capsules])
+        self._radius = np.array([c.radius for c in capsules])
+
+        self._x = self.DeclareDiscreteState(np.array(start).ravel())
+        self._v = self.DeclareDiscreteState(np.zeros(3 * n))
+        self._mode = self.DeclareDiscreteState(np.zeros(n))
+        self._owner = self.DeclareDiscreteState(np.full(n, -1.0))
+        self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
+        # Force and moment about the body's origin, of the garment on each body.
+        self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
+
+        self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+        self._velocities = self.DeclareAbstractInputPort(
+            "body_spatial_velocities", Value[list[SpatialVelocity]]()
+        )
+        self._grip = [
+            (
+                self.DeclareVectorInputPort(f"{side}_gripper_position", 3),
+                self.DeclareVectorInputPort(f"{side}_gripper_velocity", 3),
+            )
+            for side in ("left", "right")
+        ]
+        ticket = {self.xd_ticket()}
+        self.DeclareVectorOutputPort("garment_position", 3 * n, self._calc(self._x), ticket)
+        self.DeclareVectorOutputPort("garment_velocity", 3 * n, self._calc(self._v), ticket)
+        self.DeclareVectorOutputPort("contact", n, self._calc_contact, ticket)
+        self.DeclareVectorOutputPort("contact_force", 3 * n, self._calc_contact_force, ticket)
+        for i, side in enumerate(("left", "right")):
+            self.DeclareVectorOutputPort(
+                f"{side}_gripper_force", 3, self._calc_gripper_force(i), ticket
+            )
+        self.DeclareAbstractOutputPort(
+            "person_forces",
+            lambda: Value[list[ExternallyAppliedSpatialForce]]([]),
+            self._calc_person_forces,
+            ticket,
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(cloth.time_step, 0.0, self._update)
+
+    def obstacles(self, context: Context) -> Obstacles:
+        """Returns the person's capsules in the world, as the body ports say."""
+        poses = self._poses.Eval(context)
+        velocities = self._velocities.Eval(context)
+        a, b = np.empty_like(self._a), np.empty_like(self._b)
+        velocity, omega = np.empty_like(self._a), np.empty_like(self._a)
+        for k, index in enumerate(self._index):
+            rows = self._body_of == k
+            rotation, origin = poses[index].rotation().matrix(), poses[index].translation()
+            a[rows] = self._a[rows] @ rotation.T + origin
+            b[rows] = self._b[rows] @ rotation.T + origin
+            w = velocities[index].rotational()
+            omega[rows] = w
+            velocity[rows] = velocities[index].translational() + np.cross(w, a[rows] - origin)
+        return Obstacles(a, b, self._radius, velocity, omega)
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        n, h = self._n, self.cloth.time_step
+        state = ClothState(
+            context.get_discrete_state(self._x).value().reshape(n, 3),
+            context.get_discrete_state(self._v).value().reshape(n, 3),
+            context.get_discrete_state(self._mode).value().astype(np.int32),
+            context.get_discrete_state(self._reaction).value().reshape(n, 3),
+            context.get_discrete_state(self._owner).value().astype(np.int32),
+        )
+        held = state.x[self.cloth.held]
+        target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
+        held_velocity = (target[self._side] + self._offset - held) / h
+        after, _ = self.cloth.step(state, self.obstacles(context), held_velocity)
+        discrete.set_value(self._x, after.x.ravel())
+        discrete.set_value(self._v, after.v.ravel())
+        discrete.set_value(self._mode, after.mode.astype(np.float64))
+        discrete.set_value(self._owner, after.owner.astype(np.float64))
+        discrete.set_value(self._reaction, after.reaction.ravel())
+        discrete.set_value(self._wrench, self._wrenches(context, state.x, after).ravel())
+
+    def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
+        """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
+        poses = self._poses.Eval(context)
+        wrench = np.zeros((len(self._names), 6))
+        rows = np.flatnonzero(after.owner >= 0)
+        body = self._body_of[after.owner[rows]]
+        for k, index in enumerate(self._index):
+            mine = rows[body == k]
+            if len(mine):
+                force = -after.reaction[mine]
+                arm = x[mine] - poses[index].translation()
+                wrench[k, :3] = np.cross(arm, force).sum(axis=0)
+                wrench[k, 3:] = force.sum(axis=0)
+        return wrench
+
+    def _calc(self, index):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state(index).value())
+
+        return calc
+
+    def _calc_contact(self, context: Context, output: BasicVector) -> None:
+        mode = context.get_discrete_state(self._mode).value()
+        output.SetFromVector(np.where(mode <= 2, mode, 0.0))
+
+    def _calc_contact_force(self, context: Context, output: BasicVector) -> None:
+        reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3).copy()
+        reaction[self.cloth.held] = 0.0
+        output.SetFromVector(reaction.ravel())
+
+    def _calc_gripper_force(self, side: int):  # type: ignore[no-untyped-def]
+        nodes = self.cloth.held[self._side == side]
+
+        def calc(context: Context, output: BasicVector) -> None:
+            reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3)
+            output.SetFromVector(-reaction[nodes].sum(axis=0))
+
+        return calc
+
+    def _calc_person_forces(self, context: Context, output: Value) -> None:
+        wrench = context.get_discrete_state(self._wrench).value().reshape(-1, 6)
+        forces = []
+        for k, index in enumerate(self._index):
+            if not np.any(wrench[k]):
+                continue
+            applied = ExternallyAppliedSpatialForce()
+            applied.body_index = BodyIndex(index)
+            applied.p_BoBq_B = np.zeros(3)
+            applied.F_Bq_W = SpatialForce(tau=wrench[k, :3], f=wrench[k, 3:])
+            forces.append(applied)
+        output.set_value(forces)

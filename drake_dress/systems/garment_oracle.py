@@ -1,0 +1,45 @@
+"""What a perfect garment tracker would tell the controller."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+
+class GarmentOracle(LeafSystem):
+    """Maps the true garment to the nodes of the controller's own garment.
+
+    .. pydrake_system::
+
+        name: GarmentOracle
+        input_ports:
+        - garment_position
+        - garment_velocity
+        output_ports:
+        - estimated_position
+        - estimated_velocity
+
+    Inputs (3n,) of the true garment, outputs (3m,) of the controller's, row-major, m and m/s. It
+    stands where a garment tracker will: it alone may read a `cheat_` port of the station.
+
+    Args:
+        transfer: (m,n) barycentric weights, rows sum to 1.
+    """
+
+    def __init__(self, transfer: sp.csr_array) -> None:
+        super().__init__()
+        self._transfer = transfer
+        m, n = transfer.shape
+        for i, name in enumerate(("position", "velocity")):
+            port = self.DeclareVectorInputPort(f"garment_{name}", 3 * n)
+            self.DeclareVectorOutputPort(
+                f"estimated_{name}", 3 * m, self._calc(i, n), {port.ticket()}
+            )
+
+    def _calc(self, port: int, n: int):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            value = self.get_input_port(port).Eval(context).reshape(n, 3)
+            output.SetFromVector(np.asarray(self._transfer @ value).ravel())
+
+        return calc

@@ -1,0 +1,171 @@
+"""The garment, the grippers and what they aim at, live in Meshcat."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from pydrake.geometry import Box, Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+STAGE_NAMES = ("prepare", "dress", "done")
+OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
+LINING = Rgba(0.87, 0.62, 0.28, 1.0)
+_GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)
+_TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1.0)}
+_TEXT = Rgba(0.1, 0.12, 0.15, 1.0)
+_TEXT_HEIGHT = 0.07  # m
+_TEXT_ABOVE = 0.5  # m above the garment, clear of a head
+_SIDES = ("left", "right")
+
+
+class GarmentVisualizer(LeafSystem):
+    """Publishes the garment to Meshcat at a fixed rate.
+
+    .. pydrake_system::
+
+        name: GarmentVisualizer
+        input_ports:
+        - garment_position
+        - targets (optional)
+        - stage (optional)
+        - gripper_position (optional)
+        output_ports: []
+
+    garment_position: (3n,) row-major (n,3), m. targets: (6,) where the left and the right armhole
+    should go, m; NaN hides one. stage: (2,) 0 prepare, 1 dress, 2 done; written above
+    the garment. gripper_position: (6,) left, right, m. All in the world frame. The person is
+    drawn by Drake's MeshcatVisualizer.
+
+    Args:
+        meshcat: to draw in.
+        faces: (F,3) triangles; the outside is where their normals point.
+        node_count: n.
+        period: of publishing, s.
+        path: in Meshcat's tree under which all is drawn.
+    """
+
+    def __init__(
+        self,
+        meshcat: Meshcat,
+        faces: npt.NDArray[np.int32],
+        node_count: int,
+        period: float = 1.0 / 15.0,
+        path: str = "dressing",
+    ) -> None:
+        super().__init__()
+        self._faces = np.asfortranarray(np.asarray(faces, dtype=np.int32).T)
+        self._scene = DressingScene(meshcat, self._faces, path)
+        self._garment = self.DeclareVectorInputPort("garment_position", 3 * node_count)
+        self._targets = self.DeclareVectorInputPort("targets", 6)
+        self._stage = self.DeclareVectorInputPort("stage", 2)
+        self._grippers = self.DeclareVectorInputPort("gripper_position", 6)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
+        self.DeclareForcedPublishEvent(self._publish)
+
+    def _publish(self, context: Context) -> EventStatus:
+        self._scene.show_garment(self._garment.Eval(context).reshape(-1, 3))
+        if self._targets.HasValue(context):
+            self._scene.show_targets(self._targets.Eval(context).reshape(2, 3))
+        if self._grippers.HasValue(context):
+            self._scene.show_grippers(self._grippers.Eval(context).reshape(2, 3))
+        if self._stage.HasValue(context):
+            self._scene.show_stage(self._stage.Eval(context))
+        return EventStatus.Succeeded()
+
+
+class DressingScene:
+    """Draws in Meshcat what a dressing shows beside the person; live and in the replay.
+
+    Args:
+        meshcat: to draw in.
+        faces: (3,F) triangles, as Meshcat takes them.
+        path: in Meshcat's tree under which all is drawn.
+
+    Attributes:
+        label: the stages as they are written.
+    """
+
+    def __init__(self, meshcat: Meshcat, faces: npt.NDArray[np.int32], path: str) -> None:
+        self._meshcat = meshcat
+        self._faces = faces
+        self._path = path
+        self._drawn: set[str] = set()
+        self._label_at: npt.NDArray[np.float64] | None = None
+        self.label = ""
+
+    def show_garment(self, position: npt.NDArray[np.float64]) -> None:
+        """Draws the nodes (n,3), m: outside and lining in a colour each."""
+        vertices = np.asfortranarray(position.T)
+        if self._label_at is None and np.isfinite(position).all():
+            self._label_at = position.mean(axis=0)
+            self._label_at[2] = position[:, 2].max() + _TEXT_ABOVE
+        # Two one-sided meshes rather than one double-sided: inside and outside can be told apart.
+        for name, color, side in (
+            ("outside", OUTSIDE, Meshcat.SideOfFaceToRender.kFrontSide),
+            ("lining", LINING, Meshcat.SideOfFaceToRender.kBackSide),
+        ):
+            self._meshcat.SetTriangleMesh(
+                f"{self._path}/garment/{name}", vertices, self._faces, color, side=side
+            )
+
+    def show_grippers(self, position: npt.NDArray[np.float64]) -> None:
+        """Draws the grippers (2,3), m."""
+        for side, p in zip(_SIDES, position, strict=True):
+            self._place(f"{self._path}/gripper/{side}", Box(0.05, 0.05, 0.05), _GRIPPER, p)
+
+    def show_targets(self, position: npt.NDArray[np.float64]) -> None:
+        """Draws where the armholes should go (2,3), m; NaN hides one."""
+        for side, p in zip(_SIDES, position, strict=True):
+            self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
+
+    def show_stage(self, stage: npt.ArrayLike) -> None:
+        """Writes the stages (2,) of left and right above where the garment was first shown."""
+        names = [STAGE_NAMES[int(np.clip(s, 0, 2))] for s in np.ravel(np.asarray(stage))]
+        label = f"left: {names[0]}   right: {names[1]}"
+        if label == self.label or self._label_at is None:
+            return
+        self.label = label
+        # Meshcat knows no text, so its pixels are drawn: twice, to be read from the front and
+        # from behind, each with the person's left where the viewer sees it.
+        written = f"right: {names[1]}   left: {names[0]}"
+        for name, text, toward in (("front", written, 1.0), ("back", label, -1.0)):
+            flat, triangles = _text_mesh(text, _TEXT_HEIGHT)
+            vertices = np.zeros((3, flat.shape[1]), order="F")
+            vertices[1], vertices[2] = toward * flat[0], flat[1]
+            vertices += self._label_at[:, None]
+            side = Meshcat.SideOfFaceToRender.kFrontSide
+            path = f"{self._path}/stage/{name}"
+            self._meshcat.SetTriangleMesh(path, vertices, triangles, _TEXT, side=side)
+
+    def _place(
+        self, path: str, shape: Box | Sphere, color: Rgba, p: npt.NDArray[np.float64]
+    ) -> None:
+        visible = bool(np.isfinite(p).all())
+        if path not in self._drawn:
+            self._meshcat.SetObject(path, shape, color)
+            self._drawn.add(path)
+        self._meshcat.SetProperty(path, "visible", visible)
+        if visible:
+            self._meshcat.SetTransform(path, RigidTransform(p))
+
+
+def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
+    figure = Figure(figsize=(0.18 * len(text) + 0.4, 0.6), dpi=72)
+    canvas = FigureCanvasAgg(figure)
+    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")
+    canvas.draw()
+    ink = np.asarray(canvas.buffer_rgba())[:, :, 0] < 128
+    edge = np.diff(ink.astype(np.int8), axis=1, prepend=0, append=0)
+    row, start = np.nonzero(edge == 1)
+    _, end = np.nonzero(edge == -1)
+    top = ink.shape[0] - row
+    x = np.stack([start, end, end, start], axis=1) - 0.5 * ink.shape[1]
+    y = np.stack([top - 1, top - 1, top, top], axis=1) - 0.5 * ink.shape[0]
+    points = np.stack([x.ravel(), y.ravel()]) * (height / 22.0)
+    corner = 4 * np.arange(len(row), dtype=np.int32)
+    triangles = np.concatenate([corner + np.array([[0], [1], [2]]), corner + [[0], [2], [3]]], 1)
+    return points, np.asfortranarray(triangles, dtype=np.int32)

@@ -1,0 +1,143 @@
+"""The global controller as a Drake system."""
+
+from __future__ import annotations
+
+import time as clock
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+
+from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
+from drake_dress.models.dressing.stages import Stage
+
+
+@dataclass(frozen=True)
+class TimedPlan:
+    """Gripper velocities (N,2,3), m/s, each for `time_step` s, the first from `start` s on."""
+
+    start: float
+    time_step: float
+    velocity: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Finished:
+    decision: Decision
+    state: PolicyState
+    solve_time: float
+
+
+class GlobalMpc(LeafSystem):
+    """Solves for a plan at a fixed rate and hands it out after a modelled delay.
+
+    .. pydrake_system::
+
+        name: GlobalMpc
+        input_ports:
+        - garment_position
+        - garment_velocity
+        - predicted_joint_position
+        output_ports:
+        - plan
+        - stage
+        - target
+        - solve_time
+
+    garment_*: (3m,) of the controller's garment, m, m/s. plan: TimedPlan. stage: (2,) 0 prepare,
+    1 dress, 2 done. target: (6,) where left and right armhole shall be next, m. solve_time: (2,)
+    wall time of the last solve that ended, s, and the count of solves ended.
+
+    A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
+    however long it really took: the run is the same on any machine. It runs on a thread of its
+    own meanwhile, beside the simulated garment.
+
+    Args:
+        policy: does the work.
+        period: between solves, s.
+        delay: from what is seen to the use of the plan, s, less than the period.
+    """
+
+    def __init__(self, policy: DressingPolicy, period: float, delay: float) -> None:
+        super().__init__()
+        if not 0.0 < delay < period:
+            raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
+        self._policy = policy
+        self._delay = delay
+        self._period = period
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
+        self._pending: Future[_Finished] | None = None
+        m, n = len(policy.mesh.rest_position), policy.parameters.horizon
+        self._node_count = m
+        idle = TimedPlan(0.0, policy.parameters.time_step, np.zeros((n, 2, 3)))
+        self._plan = self.DeclareAbstractState(Value(idle))
+        self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
+        self._shown = self.DeclareDiscreteState(np.zeros(10))
+        self.DeclareVectorInputPort("garment_position", 3 * m)
+        self.DeclareVectorInputPort("garment_velocity", 3 * m)
+        self.DeclareVectorInputPort("predicted_joint_position", 18 * (n + 1))
+        ticket = {self.abstract_state_ticket(self._plan)}
+        self.DeclareAbstractOutputPort(
+            "plan",
+            lambda: Value(idle),
+            lambda context, output: output.set_value(
+                context.get_abstract_state(self._plan).get_value()
+            ),
+            ticket,
+        )
+        shown = {self.discrete_state_ticket(self._shown)}
+        for name, rows in (
+            ("stage", slice(0, 2)),
+            ("target", slice(2, 8)),
+            ("solve_time", slice(8, 10)),
+        ):
+            self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), shown)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._finish)
+
+    def _begin(self, context: Context, state: State) -> None:
+        x = self.get_input_port(0).Eval(context).reshape(-1, 3).copy()
+        v = self.get_input_port(1).Eval(context).reshape(-1, 3).copy()
+        joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3).copy()
+        memory = context.get_abstract_state(self._memory).get_value()
+        now = context.get_time()
+        self._pending = self._worker.submit(self._solve, memory, x, v, joints, now)
+
+    def _solve(
+        self, memory: PolicyState, x: np.ndarray, v: np.ndarray, joints: np.ndarray, now: float
+    ) -> _Finished:
+        begin = clock.perf_counter()
+        steps = round(self._period / self._policy.parameters.time_step)
+        state, decision = self._policy.decide(memory, x, v, joints, now, steps)
+        return _Finished(decision, state, clock.perf_counter() - begin)
+
+    def _finish(self, context: Context, state: State) -> None:
+        if self._pending is None:
+            return
+        finished = self._pending.result()
+        self._pending = None
+        decision = finished.decision
+        plan = TimedPlan(
+            context.get_time(), self._policy.parameters.time_step, decision.plan.velocity
+        )
+        state.get_mutable_abstract_state(self._plan).set_value(plan)
+        state.get_mutable_abstract_state(self._memory).set_value(finished.state)
+        shown = context.get_discrete_state(self._shown).value()
+        stages: tuple[Stage, Stage] = finished.state.stages.stage
+        state.get_mutable_discrete_state(self._shown).SetFromVector(
+            np.concatenate(
+                [
+                    [float(s) for s in stages],
+                    decision.target.ravel(),
+                    [finished.solve_time, shown[9] + 1.0],
+                ]
+            )
+        )
+
+    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state(self._shown).value()[rows])
+
+        return calc

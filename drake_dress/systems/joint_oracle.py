@@ -1,0 +1,36 @@
+"""What a perfect pose estimator would tell of the person's arms."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+
+class JointOracle(LeafSystem):
+    """Reads shoulder, elbow and hand of both arms off the true person.
+
+    .. pydrake_system::
+
+        name: JointOracle
+        input_ports:
+        - body_poses
+        output_ports:
+        - joint_position
+
+    joint_position: (18,) row-major (6,3): shoulder, elbow, hand of left, then of right, m, world.
+
+    Args:
+        points: body index and point in the body's frame (3,), m, for each of the six joints.
+    """
+
+    def __init__(self, points: list[tuple[int, np.ndarray]]) -> None:
+        super().__init__()
+        self._points = points
+        self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+        self.DeclareVectorOutputPort("joint_position", 18, self._calc)
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        poses = self.get_input_port(0).Eval(context)
+        output.SetFromVector(np.concatenate([poses[body] @ p for body, p in self._points]))

@@ -1,0 +1,130 @@
+"""Small made-up runs: a coat that moves onto a person without any physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.report.log import SIDES, RunLogWriter, Sample
+
+FloatArray = npt.NDArray[np.float64]
+
+SHOULDER_HEIGHT = 1.4  # m
+ARM_RADIUS = 0.035  # m
+
+
+def coat(spacing: float = 0.04) -> GarmentMesh:
+    """Returns a coat."""
+    return make_coat(CoatParameters(), spacing)
+
+
+def dressed_joints(garment: GarmentMesh) -> FloatArray:
+    """Returns (6,3) joints of arms that run through the sleeves of a coat at shoulder height."""
+    x = garment.rest_position + [0.0, 0.0, SHOULDER_HEIGHT]
+    joints = []
+    for side in SIDES:
+        armhole = x[garment.loops[f"{side}_armhole"]].mean(axis=0)
+        cuff = x[garment.loops[f"{side}_cuff"]].mean(axis=0)
+        along = cuff - armhole
+        joints += [armhole + 0.05 * along, armhole + 0.45 * along, armhole + 1.08 * along]
+    return np.array(joints)
+
+
+def capsules(joints: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns ends (6,3), (6,3) and radius (6,) of four limbs, a trunk and a head."""
+    trunk = np.array([[0.0, 0.0, 0.75], [0.0, 0.0, 1.62]])
+    end = np.array([[0.0, 0.0, 1.2], [0.0, 0.0, 1.62]])
+    return (
+        np.concatenate([joints[[0, 1, 3, 4]], trunk]),
+        np.concatenate([joints[[1, 2, 4, 5]], end]),
+        np.array([ARM_RADIUS] * 4 + [0.08, 0.09]),
+    )
+
+
+def dressing(
+    garment: GarmentMesh,
+    count: int = 21,
+    duration: float = 10.0,
+    travel: float = 1.0,
+    beside: bool = False,
+) -> list[Sample]:
+    """Returns samples of a coat that comes from behind and ends on the person.
+
+    Args:
+        garment: the coat.
+        count: of samples.
+        duration: s.
+        travel: 1: it comes from behind, through the person; 0: it is on from the start.
+        beside: the coat ends in front of the arms, which stay outside, but s says 2: the false
+            success.
+    """
+    joints = dressed_joints(garment)
+    a, b, _ = capsules(joints)
+    samples = []
+    for i, time in enumerate(np.linspace(0.0, duration, count)):
+        share = i / (count - 1)
+        end = 0.5 if beside else 0.0
+        away = travel * (1.0 - share)
+        offset = np.array([end - 0.5 * away, 0.0, SHOULDER_HEIGHT + 0.1 * away])
+        position = garment.rest_position + offset
+        force = np.zeros_like(position)
+        force[:5, 0] = 0.2 * share
+        on = np.clip([2.4 * share, 2.4 * share - 0.3], 0.0, 2.0)
+        samples.append(
+            Sample(
+                time=float(time),
+                garment_position=position,
+                contact=(np.linalg.norm(force, axis=1) > 0).astype(np.int8),
+                contact_force=force,
+                joint_position=joints,
+                gripper_position={
+                    side: position[garment.grasp[side]].mean(axis=0) for side in SIDES
+                },
+                gripper_force={
+                    "left": np.array([0.0, 0.0, -3.0 - 10.0 * share]),
+                    "right": np.array([0.0, 2.0, -3.0]),
+                },
+                dressing={
+                    side: (float(on[k]), 0.05 * (1.0 - share), 0.3 * share)
+                    for k, side in enumerate(SIDES)
+                },
+                stage=np.where(on >= 1.9, 2, np.where(on > 0.5, 1, 0)),
+                global_solve_time=0.3 if i % 5 == 0 else np.nan,
+                local_solve_time=0.004,
+                estimate_garment_position=position,
+                estimate_joint_position=joints,
+                capsule_a=a,
+                capsule_b=b,
+            )
+        )
+    return samples
+
+
+def stretched(sample: Sample, garment: GarmentMesh, factor: float) -> Sample:
+    """Returns a sample with its garment enlarged about its middle."""
+    position = np.asarray(sample.garment_position)
+    middle = position.mean(axis=0)
+    return replace(sample, garment_position=middle + factor * (position - middle))
+
+
+def write(path: Path, garment: GarmentMesh, samples: list[Sample]) -> Path:
+    """Writes samples to a log and returns its path."""
+    _, _, radius = capsules(dressed_joints(garment))
+    with RunLogWriter(
+        path,
+        garment=garment,
+        scenario_text="name: synthetic\n",
+        version="0.0",
+        seed=3,
+        radius=np.full(6, ARM_RADIUS),
+        capsule_radius=radius,
+        estimate_garment=garment,
+    ) as log:
+        for sample in samples:
+            log.append(sample)
+    return path

@@ -1,0 +1,251 @@
+"""The log keeps what was written, however the writer ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import JOINT_NAMES, SIDES, RunLog, RunLogWriter
+from tests.report import synthetic
+
+
+@pytest.fixture(scope="module")
+def garment():
+    return synthetic.coat(0.06)
+
+
+@pytest.fixture
+def samples(garment):
+    return synthetic.dressing(garment, count=6)
+
+
+@pytest.fixture
+def path(tmp_path, garment, samples):
+    return synthetic.write(tmp_path / "run.h5", garment, samples)
+
+
+def test_what_is_read_is_what_was_written(path, garment, samples):
+    with RunLog.open(path) as log:
+        assert len(log) == len(samples)
+        assert log.time.tolist() == [s.time for s in samples]  # to the last bit
+        assert (log.seed, log.version, log.scenario_text) == (3, "0.0", "name: synthetic\n")
+        np.testing.assert_array_equal(log.faces, garment.faces)
+        np.testing.assert_array_equal(log.rest_position, garment.rest_position)
+        for name, loop in garment.loops.items():
+            np.testing.assert_array_equal(log.loops[name], loop)
+        for i, s in enumerate(samples):
+            np.testing.assert_allclose(log.garment_position(i), s.garment_position, atol=1e-6)
+            np.testing.assert_allclose(log.contact_force(i), s.contact_force, atol=1e-6)
+            np.testing.assert_array_equal(log.contact(i), s.contact)
+            np.testing.assert_array_equal(log.joint_position[i], s.joint_position)
+            np.testing.assert_array_equal(log.capsules[0][i], s.capsule_a)
+            np.testing.assert_array_equal(log.stage[i], s.stage)
+            for side in SIDES:
+                np.testing.assert_array_equal(
+                    log.gripper_position[side][i], s.gripper_position[side]
+                )
+                np.testing.assert_array_equal(log.gripper_force[side][i], s.gripper_force[side])
+                np.testing.assert_array_equal(log.dressing[side][i], s.dressing[side])
+        np.testing.assert_array_equal(
+            log.solve_time("global"), [s.global_solve_time for s in samples]
+        )
+
+
+def test_layout_is_the_published_one(path, garment, samples):
+    count, n, f = len(samples), len(garment.rest_position), len(garment.faces)
+    expected = {
+        "time": (count,),
+        "garment/faces": (f, 3),
+        "garment/rest_position": (n, 3),
+        "garment/position": (count, n, 3),
+        "garment/contact": (count, n),
+        "garment/contact_force": (count, n, 3),
+        "human/joint_position": (count, 6, 3),
+        "human/radius": (6,),
+        "control/stage": (count, 2),
+        "control/global/solve_time": (count,),
+        "control/local/solve_time": (count,),
+        "estimate/garment/position": (count, n, 3),
+        "estimate/human/joint_position": (count, 6, 3),
+    }
+    for side in SIDES:
+        expected |= {f"gripper/{side}/{name}": (count, 3) for name in ("position", "force")}
+        expected |= {f"dressing/{side}/{name}": (count,) for name in ("s", "l", "theta")}
+        for opening in ("armhole", "cuff"):
+            name = f"{side}_{opening}"
+            expected[f"garment/loops/{name}"] = (len(garment.loops[name]),)
+    with h5py.File(path) as file:
+        assert file.attrs["schema"] == "drake_dress.log/1"
+        assert {"scenario", "version", "seed"} <= set(file.attrs)
+        assert {name: file[name].shape for name in expected} == expected
+        assert file["time"].dtype == np.float64
+        assert list(file["human/joint_position"].attrs["names"]) == list(JOINT_NAMES)
+        assert file["gripper/left/force"].attrs["unit"] == "N"
+        assert file["garment/position"].attrs["frame"] == "world"
+
+
+def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):
+    path = tmp_path / "run.h5"
+
+    def interrupted(rows):
+        # The signal comes after some datasets of the sample have grown.
+        rows = dict(rows)
+        last = list(rows)[3]
+        rows[last] = _Interrupt()
+        return rows
+
+    with pytest.raises(KeyboardInterrupt):
+        with RunLogWriter(
+            path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)
+        ) as writer:
+            for sample in samples[:3]:
+                writer.append(sample)
+            original = writer._rows
+            writer._rows = lambda s: interrupted(original(s))  # type: ignore[method-assign]
+            writer.append(samples[3])
+    with RunLog.open(path) as log:
+        assert log.time.tolist() == [s.time for s in samples[:3]]
+
+
+class _Interrupt:
+    def __array__(self, dtype=None, copy=None):
+        raise KeyboardInterrupt
+
+
+def test_killed_process_leaves_what_was_flushed(tmp_path):
+    path = tmp_path / "run.h5"
+    root = Path(__file__).resolve().parents[2]
+    script = f"""
+import numpy as np
+from dataclasses import replace
+from drake_dress.report.log import RunLogWriter
+from tests.report import synthetic
+garment = synthetic.coat(0.06)
+sample = synthetic.dressing(garment, count=2)[0]
+writer = RunLogWriter({str(path)!r}, garment=garment, scenario_text="", version="", seed=0,
+                      radius=np.ones(6), capsule_radius=np.ones(6), flush_period=0.05)
+for i in range(10**6):
+    writer.append(replace(sample, time=0.01 * i))
+    if i == 600:
+        print("written", flush=True)
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "written\n"
+    with pytest.raises(UserError, match="still being written"):
+        RunLog.open(path)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    with RunLog.open(path) as log:
+        assert len(log) >= 300
+        assert np.isfinite(log.garment_position(len(log) - 1)).all()
+
+
+def test_time_must_increase(tmp_path, garment, samples):
+    with RunLogWriter(
+        tmp_path / "run.h5",
+        garment=garment,
+        scenario_text="",
+        version="",
+        seed=0,
+        radius=np.ones(6),
+    ) as writer:
+        writer.append(samples[1])
+        with pytest.raises(ValueError, match="not later"):
+            writer.append(samples[1])
+
+
+def test_wrong_shape_is_told(tmp_path, garment, samples):
+    bad = replace(samples[0], joint_position=np.zeros((5, 3)))
+    with RunLogWriter(
+        tmp_path / "run.h5",
+        garment=garment,
+        scenario_text="",
+        version="",
+        seed=0,
+        radius=np.ones(6),
+    ) as writer:
+        with pytest.raises(ValueError, match="joint_position"):
+            writer.append(bad)
+        writer.append(samples[0])
+    with RunLog.open(tmp_path / "run.h5") as log:
+        assert len(log) == 1
+
+
+def _edit(path: Path, change) -> None:
+    with h5py.File(path, "r+") as file:
+        change(file)
+
+
+def _delete_positions(file: h5py.File) -> None:
+    del file["garment/position"]
+
+
+def _delete_loop(file: h5py.File) -> None:
+    del file["garment/loops/left_cuff"]
+
+
+def _other_schema(file: h5py.File) -> None:
+    file.attrs["schema"] = "drake_dress.log/9"
+
+
+def _no_schema(file: h5py.File) -> None:
+    del file.attrs["schema"]
+
+
+def _time_back(file: h5py.File) -> None:
+    file["time"][2] = 0.0
+
+
+def _short_force(file: h5py.File) -> None:
+    file["gripper/left/force"].resize(3, axis=0)
+
+
+def _wild_face(file: h5py.File) -> None:
+    file["garment/faces"][0, 0] = 10**6
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        (_delete_positions, "/garment/position"),
+        (_delete_loop, "/garment/loops/left_cuff"),
+        (_other_schema, "schema"),
+        (_no_schema, "schema"),
+        (_time_back, "/time"),
+        (_short_force, "/gripper/left/force"),
+        (_wild_face, "/garment/faces"),
+    ],
+)
+def test_unusable_log_names_file_and_key(path, change, key):
+    _edit(path, change)
+    with pytest.raises(UserError) as error:
+        RunLog.open(path)
+    assert str(error.value).startswith(f"{path}: {key}: ")
+    assert "\n" not in str(error.value)
+
+
+def test_what_is_no_log_is_refused(tmp_path):
+    text = tmp_path / "text.h5"
+    text.write_text("no HDF5\n")
+    cut = tmp_path / "cut.h5"
+    cut.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(20))
+    for path in (tmp_path / "absent.h5", text, cut, tmp_path):
+        with pytest.raises(UserError):
+            RunLog.open(path)

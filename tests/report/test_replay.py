@@ -1,0 +1,63 @@
+"""The replay in Meshcat follows its slider."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import RunLog
+from drake_dress.report.replay import MeshcatReplay, show_replay
+from tests.report import synthetic
+
+
+@pytest.fixture
+def path(tmp_path):
+    garment = synthetic.coat(0.06)
+    return synthetic.write(tmp_path / "run.h5", garment, synthetic.dressing(garment, count=5))
+
+
+def test_slider_chooses_the_sample(path):
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    with RunLog.open(path) as log:
+        replay = MeshcatReplay(meshcat, log)
+        assert not replay.stopped
+        assert (replay.sample, replay.scene.label) == (0, "left: prepare   right: prepare")
+        assert _draws(meshcat, log.garment_position(0))
+        meshcat.SetSliderValue("Time (s)", 10.0)
+        replay.update()
+        assert (replay.sample, replay.scene.label) == (4, "left: done   right: done")
+        assert _draws(meshcat, log.garment_position(4))
+        assert not _draws(meshcat, log.garment_position(0))
+
+
+def _draws(meshcat, position):
+    # Meshcat sends vertices as float32.
+    packed = meshcat._GetPackedObject("dressing/garment/outside")
+    return position.astype("<f4").tobytes() in packed
+
+
+def test_interrupt_ends_the_replay_well(path):
+    root = Path(__file__).resolve().parents[2]
+    script = (
+        "import sys; from drake_dress.report.replay import show_replay;"
+        f"sys.exit(show_replay({str(path)!r}))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=root
+    )
+    assert process.stdout is not None
+    assert "http://localhost:" in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=20) == 0
+    process.stdout.close()
+
+
+def test_missing_log_is_told(tmp_path):
+    with pytest.raises(UserError):
+        show_replay(tmp_path / "absent.h5")

@@ -1,0 +1,96 @@
+"""The replay opens from a file, without a server, and moves."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+
+import numpy as np
+import pytest
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import RunLog
+from drake_dress.report.replay_html import _encode, _frames, write_replay_html
+from tests.report import synthetic
+from tests.report.browser import needs_chromium, screenshot
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay")
+    garment = synthetic.coat(0.05)
+    path = synthetic.write(folder / "run.h5", garment, synthetic.dressing(garment))
+    with RunLog.open(path) as log:
+        write_replay_html(log, folder / "replay.html")
+    return folder / "replay.html"
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    text = page.read_text()
+    assert not re.search(r"https?://|src=|@import|<link", text)
+    assert "@positions@" not in text and "@META@" not in text
+
+
+@needs_chromium
+def test_garment_moves_and_the_rest_stays(page, tmp_path):
+    first = screenshot(f"{page.as_uri()}#t=0", tmp_path, "first")
+    again = screenshot(f"{page.as_uri()}#t=0", tmp_path, "again")
+    later = screenshot(f"{page.as_uri()}#t=10", tmp_path, "later")
+    assert np.abs(first - again).max() < 0.05
+
+    def garment(picture: np.ndarray) -> np.ndarray:
+        blue = picture[:, :, 2] > picture[:, :, 0] + 0.2
+        blue[:170] &= False  # the panels
+        blue[530:] &= False
+        return blue
+
+    before, after = garment(first), garment(later)
+    assert before.mean() > 0.02 and after.mean() > 0.02
+    moved = np.abs(first - later).max(axis=2) > 0.1
+    assert moved[before ^ after].mean() > 0.9
+    # far from the garment, the ground and the background are as they were
+    assert not moved[200:520, :150].any()
+    assert not moved[200:520, -150:].any()
+
+
+@needs_chromium
+def test_plays_by_itself(page, tmp_path):
+    opened = screenshot(f"{page.as_uri()}#t=0", tmp_path, "opened")
+    playing = screenshot(page.as_uri(), tmp_path, "playing")
+    moved = np.abs(opened - playing).max(axis=2) > 0.1
+    # How many frames fit into the page's time is the machine's affair; the panels do not count.
+    assert moved[170:530].mean() > 1e-3
+
+
+def test_encoding_is_undone_exactly():
+    steps = np.random.default_rng(0).integers(0, 65001, size=(4, 5, 3))
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(_encode(steps))), dtype=np.uint8)
+    half = len(raw) // 2
+    zigzag = raw[:half].astype(np.int64) | (raw[half:].astype(np.int64) << 8)
+    difference = (zigzag >> 1) ^ -(zigzag & 1)
+    decoded = np.cumsum(difference.reshape(4, 3, 5), axis=0) % 65536
+    np.testing.assert_array_equal(decoded.transpose(0, 2, 1), steps)
+
+
+def test_frames_keep_first_and_last():
+    time = np.arange(0.0, 2.0, 0.013)
+    frames = _frames(time, 15.0)
+    assert frames[0] == 0 and frames[-1] == len(time) - 1
+    assert np.all(np.diff(frames) > 0)
+    np.testing.assert_allclose(np.diff(time[frames]), 1 / 15, atol=0.014)
+    assert _frames(time[:1], 15.0).tolist() == [0]
+
+
+def test_size_is_kept_below_its_limit(page, tmp_path):
+    limit = page.stat().st_size - 2_000
+    with RunLog.open(page.parent / "run.h5") as log:
+        write_replay_html(log, tmp_path / "small.html", max_bytes=limit)
+    assert (tmp_path / "small.html").stat().st_size <= limit
+
+
+def test_empty_log_is_refused(tmp_path):
+    path = synthetic.write(tmp_path / "run.h5", synthetic.coat(0.06), [])
+    with RunLog.open(path) as log, pytest.raises(UserError):
+        write_replay_html(log, tmp_path / "replay.html")
+    assert not (tmp_path / "replay.html").exists()

@@ -1,0 +1,54 @@
+"""The report says how it went, on one page that needs nothing else."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from drake_dress.errors import UserError
+from drake_dress.report.log import RunLog
+from drake_dress.report.report_html import write_report
+from drake_dress.report.summary import summarize, write_summary
+from tests.report import synthetic
+
+
+def _run(folder, samples):
+    path = synthetic.write(folder / "run.h5", synthetic.coat(0.06), samples)
+    with RunLog.open(path) as log:
+        write_summary(summarize(log, wall_time=5.0), folder / "summary.json")
+    return write_report(folder).read_text()
+
+
+def test_report_of_a_success_shows_course_and_pictures(tmp_path):
+    text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06), travel=0.0))
+    assert "Both sleeves are on" in text
+    assert text.count("data:image/svg+xml") == 6
+    assert text.count("data:image/png") >= 3
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert "http" not in re.sub(r"base64,[^\"]*", "", text)
+
+
+def test_report_of_a_failure_says_the_reason(tmp_path):
+    text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06), beside=True))
+    assert "The dressing failed" in text
+    assert "left arm outside the sleeve: linking number 0" in text
+
+
+def test_insertion_of_each_sleeve_is_pictured(tmp_path):
+    text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06)))
+    assert "insertion of the first sleeve" in text
+    assert "insertion of the second sleeve" in text
+
+
+def test_empty_run_has_a_report(tmp_path):
+    assert "nothing was logged" in _run(tmp_path, [])
+
+
+def test_missing_or_broken_summary_is_told(tmp_path):
+    synthetic.write(tmp_path / "run.h5", synthetic.coat(0.06), [])
+    with pytest.raises(UserError):
+        write_report(tmp_path)
+    (tmp_path / "summary.json").write_text("{")
+    with pytest.raises(UserError):
+        write_report(tmp_path)

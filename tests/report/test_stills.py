@@ -1,0 +1,47 @@
+"""Pictures show garment and person in their colours, at their places."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drake_dress.report.stills import CameraPose, node_normals, render_still
+from tests.report import synthetic
+
+
+def _picture(offset: float) -> np.ndarray:
+    garment = synthetic.coat(0.05)
+    joints = synthetic.dressed_joints(garment)
+    position = garment.rest_position + [0.0, offset, synthetic.SHOULDER_HEIGHT]
+    return render_still(
+        garment.faces,
+        position,
+        *synthetic.capsules(joints),
+        grippers=np.array([[0.0, 0.3, 1.5]]),
+        camera=CameraPose((2.8, 0.4, 1.5), (0.0, 0.0, 1.1)),
+        size=(320, 240),
+    ).astype(float)
+
+
+def test_coat_is_where_it_is():
+    left, right = _picture(0.4), _picture(-0.4)
+
+    def middle(picture: np.ndarray) -> float:
+        blue = picture[:, :, 2] > picture[:, :, 0] + 60.0
+        assert blue.mean() > 0.03
+        return float(np.nonzero(blue)[1].mean())
+
+    # seen from the front, the person's left is the picture's right
+    assert middle(left) > middle(right) + 40.0
+
+
+def test_person_is_skin_coloured_and_background_light():
+    picture = _picture(0.0)
+    skin = (picture[:, :, 0] > picture[:, :, 2] + 40.0) & (picture[:, :, 0] > 120.0)
+    assert skin.mean() > 0.005
+    assert picture[:20].mean() > 220.0
+
+
+def test_normals_of_a_flat_sheet_are_its_normal():
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    np.testing.assert_allclose(node_normals(faces, x), np.tile([0.0, 0.0, 1.0], (4, 1)))
