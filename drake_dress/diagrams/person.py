@@ -1,16 +1,28 @@
-"""The person as bodies of a MultibodyPlant: a torso that stands, arms that yield."""
+"""The person as bodies of a MultibodyPlant: a torso that stands, arms that yield.
+
+Each arm is three hinges at the shoulder and one at the elbow, each a spring and a damper about the
+scenario's pose. The pose is held against gravity by muscle tone: constant torques, as a person who
+holds still sets once and then forgets. Away from the pose gravity acts in full, so what a hand
+yields to a force follows from the springs and from the change of gravity's torques together.
+
+Limitations: the torso does not sway. Above the horizontal, gravity pulls an arm away from its pose;
+a pose there topples unless the shoulder's stiffness is more than what the arm's weight takes away
+(up to 7.6 N·m/rad for the measures preset).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.geometry import Capsule as CapsuleShape
 from pydrake.geometry import Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
+    FixedOffsetFrame,
     ModelInstanceIndex,
     RevoluteJoint,
     RevoluteSpring,
@@ -20,6 +32,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from drake_dress.errors import UserError
 from drake_dress.models.human.body import (
     SIDES,
     ArmPose,
@@ -31,27 +44,49 @@ from drake_dress.models.human.body import (
     shoulder_joint,
 )
 
-FloatArray = np.ndarray
+FloatArray = npt.NDArray[np.float64]
+Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
 
 
 @dataclass(frozen=True)
 class JointParameters:
-    """How the arms' joints yield: N·m/rad and N·m·s/rad."""
+    """How the arms' joints yield, the same for both arms.
+
+    Attributes:
+        shoulder_stiffness: of each of the shoulder's three hinges, N·m/rad.
+        shoulder_damping: likewise, N·m·s/rad.
+        elbow_stiffness: N·m/rad.
+        elbow_damping: N·m·s/rad.
+        abduction_limits: least and greatest angle, rad; those below likewise.
+        extension_limits: backward is positive.
+        rotation_limits: outward is positive.
+        elbow_limits: of its flexion.
+
+    Raises:
+        UserError: stiffness or damping is negative or not finite, or limits are not two finite
+            angles in rising order.
+    """
 
     shoulder_stiffness: float = 2.0
     shoulder_damping: float = 1.0
     elbow_stiffness: float = 1.5
     elbow_damping: float = 0.4
+    abduction_limits: Limits = (-0.6, 2.6)
+    extension_limits: Limits = (-2.6, 1.2)
+    rotation_limits: Limits = (-1.2, 1.2)
+    elbow_limits: Limits = (0.0, 2.5)
 
-
-# Anatomical limits, rad: abduction, extension (backward positive), rotation, elbow flexion.
-_LIMITS = {
-    "abduction": (-0.6, 2.6),
-    "extension": (-2.6, 1.2),
-    "rotation": (-1.2, 1.2),
-    "elbow": (0.0, 2.5),
-}
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name.endswith("_limits"):
+                expected = _expected_of_limits(value)
+            else:
+                good = _is_number(value) and value >= 0.0
+                expected = None if good else "a finite number, 0 or more"
+            if expected is not None:
+                raise UserError("person.joints", field.name, f"is {value!r}, expected {expected}")
 
 
 @dataclass(frozen=True)
@@ -62,9 +97,9 @@ class Person:
         model: the person's model instance.
         capsules: of all bodies, in body frames.
         body_indices: of the bodies that have capsules, by name.
-        joint_points: body index and point in its frame of shoulder, elbow, hand, left then right.
+        joint_points: body index and point in its frame (3,), m, of shoulder, elbow, hand, left
+            then right; `joint_positions` evaluates them.
         radius: (6,) limb radius at those points, m.
-        posture_angles: (4,) per side, the rest pose, rad.
     """
 
     model: ModelInstanceIndex
@@ -76,10 +111,17 @@ class Person:
     def tone_torque(self, plant: MultibodyPlant) -> FloatArray:
         """Returns the generalized forces (nv,) that balance gravity in the rest pose, N·m.
 
-        Muscle tone holds the arms up; it does not change when they are moved. `plant` is finalized.
+        Muscle tone holds the arms up; it does not change when they are moved. It belongs on the
+        plant's applied generalized force port, and is zero for whatever else is in the plant.
+
+        Args:
+            plant: finalized, its default context in the person's rest pose.
         """
-        context = plant.CreateDefaultContext()
-        torque: FloatArray = -plant.CalcGravityGeneralizedForces(context)
+        gravity = plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext())
+        torque = np.zeros(plant.num_velocities())
+        plant.SetVelocitiesInArray(
+            self.model, -plant.GetVelocitiesFromArray(self.model, gravity), torque
+        )
         return torque
 
 
@@ -93,17 +135,31 @@ def add_person(
 ) -> Person:
     """Adds a person who stands or sits at `position` (2,), m, and faces +x.
 
+    The default context of the finalized plant has the person in the rest pose. Bodies are drawn
+    where the plant has a SceneGraph; they do not collide, as only the garment touches them.
+
     Args:
         plant: not finalized.
         measures: body sizes and masses.
         posture: standing or sitting.
-        arms: rest pose of each arm.
-        joints: stiffness and damping.
+        arms: rest pose of each arm. One past a limit is kept, and the limit moved to it.
+        joints: stiffness, damping and limits.
         position: of the torso on the floor; the origin when None.
+
+    Raises:
+        UserError: posture, position or arms are not as said here.
     """
+    missing = [side for side in SIDES if side not in arms]
+    if missing:
+        raise UserError("person", "arms", f"lacks {', '.join(missing)}, expected left and right")
+    place = np.zeros(2) if position is None else np.asarray(position, dtype=np.float64)
+    if place.shape != (2,) or not np.all(np.isfinite(place)):
+        raise UserError(
+            "person", "position", f"has shape {place.shape}, expected (2,) finite numbers of m"
+        )
     model = plant.AddModelInstance("person")
     capsules = body_capsules(measures, posture)
-    origin = np.zeros(3) if position is None else np.array([position[0], position[1], 0.0])
+    origin = np.array([place[0], place[1], 0.0])
     torso = plant.AddRigidBody("torso", model, SpatialInertia.SolidBoxWithMass(60.0, 0.2, 0.4, 0.6))
     plant.WeldFrames(plant.world_frame(), torso.body_frame(), RigidTransform(origin))
     bodies: dict[str, RigidBody] = {"torso": torso}
@@ -163,7 +219,7 @@ def _add_arm(
         ("elbow", upper, at_elbow, fore, -y, pose.elbow_flexion, ke, de),
     )
     for name, parent, X_PJ, child, axis, angle, stiffness, damping in chain:  # noqa: N806
-        low, high = _LIMITS[name]
+        low, high = getattr(joints, f"{name}_limits")
         joint = plant.AddJoint(
             RevoluteJoint(
                 name=f"{side}_{name}",
@@ -180,9 +236,7 @@ def _add_arm(
     return upper, fore
 
 
-def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None):  # type: ignore[no-untyped-def]  # noqa: N803
-    from pydrake.multibody.tree import FixedOffsetFrame
-
+def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None) -> FixedOffsetFrame:  # noqa: N803
     return FixedOffsetFrame(f"{name}_frame", parent.body_frame(), X_PJ or RigidTransform())
 
 
@@ -216,3 +270,18 @@ def joint_positions(plant: MultibodyPlant, context: Context, person: Person) -> 
             for body, p in person.joint_points
         ]
     )
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+    )
+
+
+def _expected_of_limits(value: object) -> str | None:
+    """Returns what is wrong with limits, as what was expected; None when nothing is."""
+    if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(_is_number, value)):
+        return "two finite angles in rad"
+    if value[0] >= value[1]:
+        return "lower before upper, rad"
+    return None

@@ -46,6 +46,8 @@ class PolicyParameters:
         weights: of the costs.
         progress_step: advance of s asked for in one step of the prediction (k).
         approach_distance: cap of l_h, m.
+        tethered_forearm_share: the same for the second sleeve, from the opening's own normal (0).
+        tethered_approach_distance: cap of l_h for the second sleeve, m.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
         aside_free: distance beside that does not count, m.
@@ -68,6 +70,9 @@ class PolicyParameters:
     aside_free: float = 0.02
     overshoot: float = 0.06
     forearm_share: float = 0.2
+    tethered_forearm_share: float = 0.4
+    tethered_approach_distance: float = 0.12
+    tethered_inward: float = 1.0
     stages: StageParameters = field(default_factory=StageParameters)
 
 
@@ -187,7 +192,7 @@ class DressingPolicy:
             self._facts(x, joints[0], axes[0][0], sleeves[0], 0),
             self._facts(x, joints[0], axes[1][0], sleeves[1], 1),
         )
-        goals = [self._prepared(axes[i][0], sleeves[i], i)[0] for i in (0, 1)]
+        goals = [self._prepared(axes[i][0], sleeves[i], i, facts[1 - i].linked)[0] for i in (0, 1)]
         for i in (0, 1):
             if facts[i].linked:
                 goals[i] = axes[i][0].G(min(2.0, facts[i].s + p.progress_step))
@@ -209,7 +214,7 @@ class DressingPolicy:
         interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
         linked = abs(arm_linking_number(x[self._loops[side]], shoulder, elbow, hand, interior)) == 1
         s, _, _ = axis.coordinates(sleeve.p_c)
-        _, direction = self._prepared(axis, sleeve, side)
+        _, direction = self._prepared(axis, sleeve, side, False)
         offset = hand - sleeve.p_c
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
         return SleeveFacts(
@@ -221,11 +226,12 @@ class DressingPolicy:
         )
 
     def _prepared(
-        self, axis: ArmAxis, sleeve: SleeveState, side: int
+        self, axis: ArmAxis, sleeve: SleeveState, side: int, tethered: bool
     ) -> tuple[FloatArray, FloatArray]:
         """Returns position and direction of a prepared sleeve (Eq. Jpi).
 
         The opening is drawn over the hand along its own normal d, from outside inward. Before, it
+        is turned as it hangs, or, with the other sleeve on, as the garment's pull has turned it. It
         waits a cap of l_h outside the hand, and further back (against v_f) until it is in line: so
         the hand comes in by the open front. An arm that comes from anywhere else meets the outside
         of the front panel, with the armhole's centre at the hand and the hand not in it.
@@ -233,17 +239,22 @@ class DressingPolicy:
         p = self.parameters
         hand = axis.G(0.0)
         inward = LEFTWARD * (-1.0 if side == 0 else 1.0)
-        direction = (1.0 - p.forearm_share) * inward + p.forearm_share * axis.D(0.0)
+        opening = inward
+        if tethered:
+            opening = p.tethered_inward * inward + (1.0 - p.tethered_inward) * sleeve.v_c
+        share = p.tethered_forearm_share if tethered else p.forearm_share
+        direction = (1.0 - share) * opening + share * axis.D(0.0)
         direction = direction / np.linalg.norm(direction)
         offset = hand - sleeve.p_c
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
-        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), p.approach_distance)
+        cap = p.tethered_approach_distance if tethered else p.approach_distance
+        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
         goal = hand - (distance - p.overshoot) * direction
-        error = sleeve.p_c - (hand - p.approach_distance * direction)
-        error = error - FRONT * (FRONT @ error)
-        if distance == p.approach_distance:
+        if distance == cap and not tethered:
+            error = sleeve.p_c - (hand - cap * direction)
+            error = error - FRONT * (FRONT @ error)
             wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
-            goal = hand - p.approach_distance * direction - min(wait, p.behind_distance) * FRONT
+            goal = hand - cap * direction - min(wait, p.behind_distance) * FRONT
         return goal, direction
 
     def _target(
@@ -261,7 +272,9 @@ class DressingPolicy:
         for j in range(n):
             axis = axes[side][j + 1]
             if task in (Task.PREPARE, Task.REST) or not facts[side].linked:
-                position[j], direction[j] = self._prepared(axis, sleeves[side], side)
+                position[j], direction[j] = self._prepared(
+                    axis, sleeves[side], side, facts[1 - side].linked
+                )
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * p.progress_step

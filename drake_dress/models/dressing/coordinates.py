@@ -2,107 +2,190 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-# Share of the shorter limb that the arc at the elbow may take.
+# Share of the shorter limb that the arc at the elbow takes when no radius is given.
 _FILLET_SHARE = 0.3
-_SAMPLES = 129
+# Most of the shorter limb that an arc of a given radius may take: something straight stays.
+_MOST_SHARE = 0.9
+# Below this bend, rad, the arm is straight: the arc is a line and its plane is not defined. Also
+# how far from fully folded an arm must be.
+_STRAIGHT = 1e-6
+_SHORTEST_LIMB = 1e-6
+
+
+class DressingCoordinates(NamedTuple):
+    """Cylinder coordinates of a point about an arm.
+
+    Attributes:
+        s: progress of the nearest point of the axis: 0 hand, 1 elbow, 2 shoulder; limited to both.
+        l: distance to the axis, m.
+        theta: angle about the axis' direction, rad, in (−π, π].
+    """
+
+    s: float
+    l: float  # noqa: E741
+    theta: float
 
 
 class ArmAxis:
     """The curve hand – elbow – shoulder with an arc at the elbow, as a cylinder's axis.
 
-    s = 0 at the hand, 1 in the middle of the arc, 2 at the shoulder; between, s grows with arc
-    length. `G(s)` and `D(s)` are the paper's symbols: position (Eq. Jdi), and direction of the
-    arm from hand to shoulder.
+    s = 0 at the hand, 1 in the middle of the arc, 2 at the shoulder; on either side of the elbow s
+    grows with arc length. `G(s)` and `D(s)` are the paper's symbols: position (Eq. Jdi), and
+    direction of the arm from hand to shoulder. The paper draws the arc tangent to both limbs so
+    that D does not jump at the elbow; its radius is not given there.
 
     Args:
-        hand, elbow, shoulder: (3,), m, world.
+        hand, elbow, shoulder: (3,), m, world or any frame; results are in the same.
+        fillet_radius: of the arc, m, reduced so that the arc takes at most 0.9 of the shorter
+            limb. None: the arc takes 0.3 of the shorter limb, whatever the bend.
 
     Raises:
-        ValueError: two joints coincide.
+        ValueError: two joints coincide, the forearm lies folded back on the upper arm, a value is
+            not finite, or the radius is not positive.
+
+    Source: paper, section Problem Formulation.
     """
 
-    def __init__(self, hand: FloatArray, elbow: FloatArray, shoulder: FloatArray) -> None:
-        lower, upper = elbow - hand, shoulder - elbow
-        lower_length, upper_length = np.linalg.norm(lower), np.linalg.norm(upper)
-        if lower_length < 1e-6 or upper_length < 1e-6:
+    def __init__(
+        self,
+        hand: FloatArray,
+        elbow: FloatArray,
+        shoulder: FloatArray,
+        fillet_radius: float | None = None,
+    ) -> None:
+        self._hand, self._elbow, self._shoulder = (
+            np.array(p, dtype=np.float64) for p in (hand, elbow, shoulder)
+        )
+        lower, upper = self._elbow - self._hand, self._shoulder - self._elbow
+        lower_length, upper_length = float(np.linalg.norm(lower)), float(np.linalg.norm(upper))
+        if not np.isfinite(lower_length + upper_length):
+            raise ValueError("a joint of the arm is not finite")
+        shorter = min(lower_length, upper_length)
+        if shorter < _SHORTEST_LIMB:
             raise ValueError("two joints of the arm coincide")
+        if fillet_radius is not None and not (np.isfinite(fillet_radius) and fillet_radius > 0.0):
+            raise ValueError(f"fillet_radius is {fillet_radius}, expected a positive number of m")
+
         u, w = lower / lower_length, upper / upper_length
-        self._elbow = np.asarray(elbow, dtype=np.float64)
-        self._reference = np.cross(lower, upper)
-        cut = _FILLET_SHARE * min(lower_length, upper_length)
-        start, end = elbow - cut * u, elbow + cut * w
-        angle = float(np.arccos(np.clip(u @ w, -1.0, 1.0)))
-        # A circular arc tangent to both limbs, sampled; a straight arm needs none.
-        t = np.linspace(0.0, 1.0, _SAMPLES)
-        if angle < 1e-6:
-            arc = start + t[:, None] * (end - start)
+        cross = np.cross(u, w)
+        angle = float(np.arctan2(np.linalg.norm(cross), u @ w))
+        if angle > np.pi - _STRAIGHT:
+            raise ValueError("the forearm lies folded back on the upper arm")
+        straight = angle < _STRAIGHT
+        half_tangent = float(np.tan(0.5 * angle))
+        cut = _FILLET_SHARE * shorter
+        if fillet_radius is not None and not straight:
+            cut = min(fillet_radius * half_tangent, _MOST_SHARE * shorter)
+        self._u, self._w, self._angle, self._straight = u, w, angle, straight
+        self._start, self._end = self._elbow - cut * u, self._elbow + cut * w
+        self._lower, self._upper = lower_length - cut, upper_length - cut
+        if straight:
+            self._normal = _perpendicular(u)
+            self._inward, self._radius, self._half_arc = np.zeros(3), np.inf, cut
         else:
-            radius = cut / np.tan(0.5 * angle)
-            inward = w - (w @ u) * u
-            inward = inward / np.linalg.norm(inward)
-            phi = t * angle
-            arc = (
-                start
-                + radius * np.sin(phi)[:, None] * u
-                + radius * (1.0 - np.cos(phi))[:, None] * inward
-            )
-        self._points = np.vstack([hand, arc, shoulder])
-        length = np.concatenate(
-            [[0.0], np.cumsum(np.linalg.norm(np.diff(self._points, axis=0), axis=1))]
-        )
-        half = 1 + _SAMPLES // 2
-        self._s = np.where(
-            np.arange(len(length)) <= half,
-            length / length[half],
-            1.0 + (length - length[half]) / (length[-1] - length[half]),
-        )
-        tangent = np.vstack([u, _arc_tangents(u, w, angle, t), w])
-        self._tangent = tangent
+            self._normal = cross / np.linalg.norm(cross)
+            self._inward = np.cross(self._normal, u)
+            self._radius = cut / half_tangent
+            self._half_arc = 0.5 * angle * self._radius
 
     def G(self, s: float) -> FloatArray:  # noqa: N802
         """Returns the point (3,) of the axis at `s`, limited to [0, 2], m."""
-        s = min(2.0, max(0.0, s))
-        return np.array([np.interp(s, self._s, self._points[:, i]) for i in range(3)])
+        before, after = self._arc_length(s)
+        if before <= self._lower:
+            return self._hand + before * self._u
+        if after <= self._upper:
+            return self._shoulder - after * self._w
+        distance = before - self._lower
+        if self._straight:
+            return self._start + distance * self._u
+        phi = distance / self._radius
+        point: FloatArray = self._start + self._radius * (
+            np.sin(phi) * self._u + (1.0 - np.cos(phi)) * self._inward
+        )
+        return point
 
     def D(self, s: float) -> FloatArray:  # noqa: N802
-        """Returns the unit direction (3,) hand → shoulder at `s`, limited to [0, 2]."""
-        s = min(2.0, max(0.0, s))
-        d = np.array([np.interp(s, self._s, self._tangent[:, i]) for i in range(3)])
-        unit: FloatArray = d / np.linalg.norm(d)
-        return unit
+        """Returns the unit direction (3,) hand → shoulder at `s`, limited to [0, 2].
 
-    def coordinates(self, point: FloatArray) -> tuple[float, float, float]:
+        It is the direction of dG/ds, and continuous.
+        """
+        before, after = self._arc_length(s)
+        if before <= self._lower or self._straight:
+            return self._u.copy()
+        if after <= self._upper:
+            return self._w.copy()
+        phi = (before - self._lower) / self._radius
+        direction: FloatArray = np.cos(phi) * self._u + np.sin(phi) * self._inward
+        return direction
+
+    def coordinates(self, point: FloatArray) -> DressingCoordinates:
         """Returns (s, l, theta) of a point (3,): progress, distance to the axis, m, angle, rad.
 
-        theta is zero along (p_e − p_h) × (p_s − p_e), or along a fixed normal of a straight arm.
+        theta turns about D(s) and is zero along (p_e − p_h) × (p_s − p_e). A straight arm has no
+        such direction; then zero is along a normal that is fixed by the arm's own direction, and
+        theta tells points apart but is not comparable between arms.
+
+        s says nothing of whether the arm is covered: the paper's s = 0 for a sleeve that is not on
+        is for the caller, who knows the linking number. See `beyond_hand` for how far off it is.
         """
-        a, b = self._points[:-1], self._points[1:]
-        d = b - a
-        t = np.clip(np.einsum("ij,ij->i", point - a, d) / np.einsum("ij,ij->i", d, d), 0.0, 1.0)
-        foot = a + t[:, None] * d
-        distance = np.linalg.norm(point - foot, axis=1)
-        k = int(np.argmin(distance))
-        s = float(self._s[k] + t[k] * (self._s[k + 1] - self._s[k]))
+        s, foot = self._nearest(np.asarray(point, dtype=np.float64))
+        offset = point - foot
         direction = self.D(s)
-        reference = self._reference - (self._reference @ direction) * direction
-        if np.linalg.norm(reference) < 1e-9:
-            reference = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
-        reference = reference / np.linalg.norm(reference)
-        offset = point - foot[k]
-        theta = float(np.arctan2(offset @ np.cross(direction, reference), offset @ reference))
-        return s, float(distance[k]), theta
+        theta = float(np.arctan2(offset @ np.cross(direction, self._normal), offset @ self._normal))
+        return DressingCoordinates(s, float(np.linalg.norm(offset)), theta)
+
+    def beyond_hand(self, point: FloatArray) -> float:
+        """Returns how far a point (3,) lies past the hand, measured along the forearm, m.
+
+        Positive beyond the hand, where the sleeve cannot cover the arm and s stays 0; negative on
+        the elbow's side of the plane through the hand.
+        """
+        return float((self._hand - point) @ self._u)
+
+    def _arc_length(self, s: float) -> tuple[float, float]:
+        """Returns the length of axis before and after `s`, m."""
+        s = min(2.0, max(0.0, float(s)))
+        lower, upper = self._lower + self._half_arc, self._upper + self._half_arc
+        if s <= 1.0:
+            return s * lower, (1.0 - s) * lower + upper
+        return lower + (s - 1.0) * upper, (2.0 - s) * upper
+
+    def _nearest(self, point: FloatArray) -> tuple[float, FloatArray]:
+        """Returns progress and position of the nearest point of forearm, arc and upper arm."""
+        lower, upper = self._lower + self._half_arc, self._upper + self._half_arc
+        before = float(np.clip((point - self._hand) @ self._u, 0.0, self._lower))
+        after = float(np.clip((self._shoulder - point) @ self._w, 0.0, self._upper))
+        candidates = [
+            (before / lower, self._hand + before * self._u),
+            (2.0 - after / upper, self._shoulder - after * self._w),
+        ]
+        if self._straight:
+            distance = float(np.clip((point - self._start) @ self._u, 0.0, 2.0 * self._half_arc))
+            arc_foot = self._start + distance * self._u
+        else:
+            to_point = point - (self._start + self._radius * self._inward)
+            phi = float(np.arctan2(to_point @ self._u, -(to_point @ self._inward)))
+            # beyond an end of the arc that end is nearest, and the limb there is nearer still
+            phi = min(max(phi, 0.0), self._angle)
+            distance = self._radius * phi
+            arc_foot = self._start + self._radius * (
+                np.sin(phi) * self._u + (1.0 - np.cos(phi)) * self._inward
+            )
+        along = self._lower + distance
+        s_arc = along / lower if along <= lower else 1.0 + (along - lower) / upper
+        candidates.append((s_arc, arc_foot))
+        gaps = [float(np.sum((point - foot) ** 2)) for _, foot in candidates]
+        return candidates[int(np.argmin(gaps))]
 
 
-def _arc_tangents(u: FloatArray, w: FloatArray, angle: float, t: FloatArray) -> FloatArray:
-    if angle < 1e-6:
-        return np.tile(u, (len(t), 1))
-    inward = w - (w @ u) * u
-    inward = inward / np.linalg.norm(inward)
-    phi = (t * angle)[:, None]
-    tangents: FloatArray = np.cos(phi) * u + np.sin(phi) * inward
-    return tangents
+def _perpendicular(direction: FloatArray) -> FloatArray:
+    normal = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
+    unit: FloatArray = normal / np.linalg.norm(normal)
+    return unit

@@ -67,7 +67,9 @@ def arm_linking_number(
 
     Args:
         loop: (k,3) nodes of the armhole (or cuff) in order, m, world or any frame.
-        shoulder, elbow, hand: (3,) joints of the arm, m, same frame.
+        shoulder: (3,) joint of the arm, m, same frame.
+        elbow: (3,) likewise.
+        hand: (3,) likewise; the arm's line ends there.
         interior: (3,) a point in the torso where the arm's centre line ends, m, same frame.
 
     Raises:
@@ -92,9 +94,10 @@ def _apex(loop: FloatArray, line: FloatArray) -> FloatArray:
     candidates = center + _APEX_SHIFT * size * shifts
     clearance = np.full(len(candidates), np.inf)
     for p, q in zip(line[:-1], line[1:], strict=True):
-        along = (q - p) / max(float(np.linalg.norm(q - p)), 1e-12)
-        aside = np.linalg.norm(np.cross(candidates - p, along), axis=1)
-        clearance = np.minimum(clearance, aside)
+        length = float(np.linalg.norm(q - p))
+        if length > 0.0:
+            aside = np.linalg.norm(np.cross(candidates - p, q - p), axis=1) / length
+            clearance = np.minimum(clearance, aside)
     apex: FloatArray = candidates[int(np.argmax(clearance))]
     return apex
 

@@ -1,49 +1,86 @@
 """The state of a sleeve: centre and orientation of its armhole, with derivatives.
 
-The paper takes six keypoints and the smallest component of their PCA. Here all loop nodes count:
-the centre is their mean, and the orientation is the loop's area vector, which is smooth where the
-PCA flips and is what a flat loop's PCA gives.
+The paper takes six keypoints and the smallest component of their PCA. Here the whole loop counts.
+The centre is that of the polygon as a curve, so that it does not depend on how the mesh spaces its
+nodes (six keypoints are an option). The orientation is the loop's area vector ½ Σ x_i × x_{i+1}:
+it is what PCA gives for a flat loop, has a sign of its own, and is smooth with a closed-form
+derivative, while the PCA's axis has none of its own and jumps where two components are equal.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.errors import UserError
+from drake_dress.models.garment.mesh import SIDES, GarmentMesh
 
 FloatArray = npt.NDArray[np.float64]
+Center = Literal["arc_length", "keypoints"]
+
+_KEYPOINTS = 6  # per armhole, as in the paper's tracking section
+# Least |cosine| between an armhole's area vector and the way from its cuff that tells a direction.
+_LEAST_COSINE = 0.05
 
 
 @dataclass(frozen=True)
 class SleeveState:
-    """Armhole centre `p_c` (3,), m, and unit orientation `v_c` (3,), from cuff to armhole."""
+    """Armhole centre `p_c` (3,), m, and unit orientation `v_c` (3,), from cuff to armhole.
+
+    `v_c` is the way the sleeve is drawn up the arm, like the arm's direction D(s).
+    """
 
     p_c: FloatArray
     v_c: FloatArray
 
 
 def loop_orientation(mesh: GarmentMesh, side: str) -> float:
-    """Returns ±1, such that the signed area vector of the armhole points from cuff to armhole."""
+    """Returns ±1, such that the signed area vector of the armhole points from cuff to armhole.
+
+    Raises:
+        UserError: `side` is neither left nor right, or the armhole at rest lies edge-on to the way
+            from its cuff, so that neither sign can be told.
+    """
+    if side not in SIDES:
+        raise UserError("garment", "side", f"is {side!r}, expected one of {', '.join(SIDES)}")
     armhole = mesh.rest_position[mesh.loops[f"{side}_armhole"]]
     cuff = mesh.rest_position[mesh.loops[f"{side}_cuff"]]
-    toward = armhole.mean(axis=0) - cuff.mean(axis=0)
-    return 1.0 if float(_area_vector(armhole) @ toward) > 0.0 else -1.0
+    toward = _curve_center(armhole) - _curve_center(cuff)
+    area = _area_vector(armhole)
+    product = float(area @ toward)
+    if abs(product) <= _LEAST_COSINE * float(np.linalg.norm(area) * np.linalg.norm(toward)):
+        raise UserError(
+            "garment",
+            f"loops.{side}_armhole",
+            "lies edge-on to the way from its cuff at rest, expected an opening that faces it",
+        )
+    return 1.0 if product > 0.0 else -1.0
 
 
-def sleeve_state(x: FloatArray, loop: npt.NDArray[np.integer], sign: float) -> SleeveState:
+def sleeve_state(
+    x: FloatArray,
+    loop: npt.NDArray[np.integer],
+    sign: float,
+    center: Center = "arc_length",
+) -> SleeveState:
     """Returns the sleeve state of the nodes `x` (n,3), m.
+
+    A loop that is crumpled to no area has no orientation: v_c is then shorter than a unit vector.
 
     Args:
         x: (n,3) positions.
         loop: (k,) nodes of the armhole in order.
         sign: of the loop, see `loop_orientation`.
+        center: of the whole loop, weighted by arc length, or the mean of six keypoints at equal
+            arc length from the loop's first node on (paper, section on tracking).
     """
     points = x[loop]
     area = sign * _area_vector(points)
-    return SleeveState(points.mean(axis=0), area / max(float(np.linalg.norm(area)), 1e-12))
+    p_c = _curve_center(points) if center == "arc_length" else _keypoints(points).mean(axis=0)
+    return SleeveState(p_c, area / _size(area))
 
 
 def sleeve_state_vjp(
@@ -52,16 +89,22 @@ def sleeve_state_vjp(
     sign: float,
     p_bar: FloatArray,
     v_bar: FloatArray,
+    center: Center = "arc_length",
 ) -> FloatArray:
-    """Returns (k,3) the derivative of p̄·p_c + v̄·v_c with respect to the loop's nodes."""
+    """Returns (k,3) the derivative of p̄·p_c + v̄·v_c with respect to the loop's nodes.
+
+    Exact for the function as it is, change of the arc lengths included. Arguments as of
+    `sleeve_state`; p_bar, v_bar: (3,).
+    """
     points = x[loop]
     area = sign * _area_vector(points)
-    size = max(float(np.linalg.norm(area)), 1e-12)
+    size = _size(area)
     v_c = area / size
     area_bar = sign * (v_bar - (v_bar @ v_c) * v_c) / size
     # area = ½ Σ x_i × x_{i+1}: its derivative along dx_i is ½ dx_i × (x_{i+1} − x_{i−1})
     chord = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
-    result: FloatArray = p_bar / len(loop) + 0.5 * np.cross(chord, area_bar)
+    of_center = _curve_center_vjp if center == "arc_length" else _keypoint_mean_vjp
+    result: FloatArray = of_center(points, p_bar) + 0.5 * np.cross(chord, area_bar)
     return result
 
 
@@ -118,3 +161,69 @@ def entry_direction_vjp(
 def _area_vector(points: FloatArray) -> FloatArray:
     area: FloatArray = 0.5 * np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
     return area
+
+
+def _size(area: FloatArray) -> float:
+    return max(float(np.linalg.norm(area)), 1e-12)
+
+
+def _edges(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns unit directions (k,3) and lengths (k,), m, of the edges i → i+1."""
+    edge = np.roll(points, -1, axis=0) - points
+    length = np.maximum(np.linalg.norm(edge, axis=1), 1e-12)
+    return edge / length[:, None], length
+
+
+def _curve_center(points: FloatArray) -> FloatArray:
+    """Returns Σ ℓ_i m_i / Σ ℓ_i over edges with lengths ℓ and midpoints m."""
+    _, length = _edges(points)
+    center: FloatArray = length @ (0.5 * (points + np.roll(points, -1, axis=0))) / length.sum()
+    return center
+
+
+def _curve_center_vjp(points: FloatArray, p_bar: FloatArray) -> FloatArray:
+    direction, length = _edges(points)
+    middle = 0.5 * (points + np.roll(points, -1, axis=0))
+    center = length @ middle / length.sum()
+    middle_bar = (length / length.sum())[:, None] * p_bar
+    length_bar = (middle - center) @ p_bar / length.sum()
+    return 0.5 * (middle_bar + np.roll(middle_bar, 1, axis=0)) + _length_vjp(direction, length_bar)
+
+
+def _locate_keypoints(length: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Returns the edge (6,) that holds each keypoint, and which part of it (6,) lies before."""
+    ends = np.cumsum(length)
+    at = ends[-1] * np.arange(_KEYPOINTS) / _KEYPOINTS
+    edge = np.minimum(np.searchsorted(ends, at, side="right"), len(length) - 1)
+    return edge, (at - (ends - length)[edge]) / length[edge]
+
+
+def _keypoints(points: FloatArray) -> FloatArray:
+    direction, length = _edges(points)
+    edge, part = _locate_keypoints(length)
+    keypoints: FloatArray = points[edge] + (part * length[edge])[:, None] * direction[edge]
+    return keypoints
+
+
+def _keypoint_mean_vjp(points: FloatArray, p_bar: FloatArray) -> FloatArray:
+    direction, length = _edges(points)
+    edge, part = _locate_keypoints(length)
+    points_bar = np.zeros_like(points)
+    length_bar = np.zeros_like(length)
+    for number, (i, tau) in enumerate(zip(edge, part, strict=True)):
+        # keypoint = (1 − τ) x_i + τ x_{i+1}, τ ℓ_i = L·number/6 − Σ_{j<i} ℓ_j
+        share = p_bar / _KEYPOINTS
+        points_bar[i] += (1.0 - tau) * share
+        points_bar[(i + 1) % len(points)] += tau * share
+        slide = float(share @ direction[i])
+        length_bar += slide * number / _KEYPOINTS
+        length_bar[:i] -= slide
+        length_bar[i] -= slide * tau
+    return points_bar + _length_vjp(direction, length_bar)
+
+
+def _length_vjp(direction: FloatArray, length_bar: FloatArray) -> FloatArray:
+    """Returns (k,3) the derivative of Σ ℓ̄_i ℓ_i with respect to the nodes."""
+    pull = length_bar[:, None] * direction
+    result: FloatArray = np.roll(pull, 1, axis=0) - pull
+    return result

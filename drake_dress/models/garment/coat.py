@@ -4,11 +4,11 @@ The idea: the left half is a few structured grids that name each other's border 
 seam is shared by construction, and the right half is its mirror image. The grids are
 
     lower    columns around the left half of the chest ellipse × rows from hem to underarm,
-    front    from the underarm level up to the neckline and the shoulder seam,
+    front    from the underarm level up to the shoulder seam; its inner edge is the lapel,
     back     the same behind; its outer top nodes are those of the front: the shoulder seam,
     sleeve   a tube from the armhole loop (the columns under the arm that neither front nor
              back takes up, and the outer edges of both) to the cuff circle,
-    collar   a strip that stands on the neckline.
+    collar   a strip that stands on the neckline of the back.
 
 Numbers of columns and rows follow from the spacing; then the sizes are solved on the polygons, so
 that girths are met at any spacing and not only in the limit.
@@ -24,7 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.mesh import FloatArray, GarmentMesh, IntArray, loop_length
+from drake_dress.models.garment.mesh import (
+    FloatArray,
+    GarmentMesh,
+    IntArray,
+    edge_lengths,
+    loop_length,
+)
 
 SPACING_RANGE = (0.01, 0.06)  # m
 
@@ -41,6 +47,7 @@ class CoatParameters:
     cuff_girth: float = 0.32
     collar_height: float = 0.05
     neck_width: float = 0.17  # between the inner ends of the shoulder seams
+    front_opening: float = 0.22  # between the front edges at the underarm, part of the chest girth
     shoulder_slope: float = 0.04  # height of the seam's inner end above its outer end
     grasp_fraction: float = 0.75  # where a gripper holds, from neck (0) to shoulder tip (1)
     grasp_count: int = 10  # nodes that one gripper holds
@@ -86,8 +93,12 @@ def make_coat(parameters: CoatParameters, spacing: float, source: str = "coat") 
     """
     _check(parameters, spacing, source)
     draft = _shape(parameters, None, source)
-    counts = _count(parameters, draft, spacing)
-    return _build(parameters, _shape(parameters, counts, source), counts, source)
+    for fill in _FILLS:
+        counts = _count(parameters, draft, fill * spacing)
+        mesh = _build(parameters, _shape(parameters, counts, source), counts, source)
+        if edge_lengths(mesh.rest_position, mesh.faces).max() <= _LONGEST * spacing:
+            break
+    return mesh
 
 
 _RANGES = {
@@ -99,6 +110,7 @@ _RANGES = {
     "cuff_girth": (0.18, 0.6),
     "collar_height": (0.02, 0.15),
     "neck_width": (0.1, 0.26),
+    "front_opening": (0.01, 0.4),
     "shoulder_slope": (0.0, 0.08),
     "grasp_fraction": (0.0, 1.0),
     "grasp_count": (1, 60),
@@ -106,10 +118,10 @@ _RANGES = {
 _DEPTH_RATIO = 0.55  # depth of the chest ellipse by its width, from body measures
 _GAP_RATIO = 0.24  # part of the armhole that runs below the arm, across the side of the body
 _DIP_RATIO = 0.04  # by how much the middle of that part lies lower than its ends
-_FRONT_GAP = 0.02  # opening between the front edges, m
-_SLEEVE_SLOPE = np.deg2rad(40.0)  # of the sleeves below the horizontal
-_COLLAR_LEAN = np.deg2rad(15.0)  # of the collar outward from the vertical
-_FILL = 0.95  # grid step by spacing: a quad's diagonal lifts the mean edge above its sides
+_SLEEVE_SLOPE = np.deg2rad(58.0)  # of the sleeves below the horizontal
+_COLLAR_LEAN = np.deg2rad(8.0)  # of the collar outward from the vertical
+_FILLS = (1.0, 0.95, 0.9, 0.85, 0.8)  # grid step by spacing, tried in order
+_LONGEST = 1.6  # longest edge by spacing
 _MIRROR = np.array([1.0, -1.0, 1.0])
 
 
@@ -134,7 +146,6 @@ class _Shape:
     ring: FloatArray  # at underarm level
     front_edge: FloatArray
     front_armhole: FloatArray
-    front_neck: FloatArray
     seam: FloatArray  # from the neck to the shoulder tip
     back_armhole: FloatArray
     back_middle: FloatArray
@@ -179,9 +190,7 @@ def _check(p: CoatParameters, spacing: float, source: str) -> None:
         )
 
 
-def _count(p: CoatParameters, shape: _Shape, spacing: float) -> _Counts:
-    step = _FILL * spacing
-
+def _count(p: CoatParameters, shape: _Shape, step: float) -> _Counts:
     def count(*lengths: float, least: int) -> int:
         return max(least, round(float(np.mean(lengths)) / step))
 
@@ -189,17 +198,16 @@ def _count(p: CoatParameters, shape: _Shape, spacing: float) -> _Counts:
     gap = _GAP_RATIO * p.armhole_girth
     quarter = 0.25 * p.chest - 0.5 * gap
     # the collar leans outward from the neckline, which is shortest of all rows
-    front_neck = ceil(_length(shape.front_neck) / (1.05 * step))
     back_neck = ceil(_length(shape.back_neck) / (1.05 * step))
     return _Counts(
-        front=max(seam + front_neck, count(quarter - 0.5 * _FRONT_GAP, least=3)),
+        front=seam,  # the front panel ends in the shoulder seam, its inner edge is the lapel
         gap=count(gap, least=2),
         back=max(seam + back_neck, count(quarter, least=3)),
         seam=seam,
         upper=count(_length(shape.front_armhole), _length(shape.back_middle), least=3),
         lower=count(p.body_length - shape.depth, least=3),
         sleeve=count(p.sleeve_length, 0.8 * p.sleeve_length, least=4),
-        collar=count(p.collar_height, least=1),
+        collar=ceil(p.collar_height / (1.2 * step)),
     )
 
 
@@ -242,7 +250,10 @@ def _armhole_girth(shape: _Shape) -> float:
 
 def _shape_at(p: CoatParameters, counts: _Counts | None, depth: float) -> _Shape:
     c = counts or _Counts(60, 30, 60, 30, 60, 60, 60, 10)
-    half_gap, opening = 0.5 * _GAP_RATIO * p.armhole_girth / p.chest, 0.5 * _FRONT_GAP / p.chest
+    half_gap, opening = (
+        0.5 * _GAP_RATIO * p.armhole_girth / p.chest,
+        0.5 * p.front_opening / p.chest,
+    )
     u = np.concatenate(
         [
             np.linspace(opening, 0.25 - half_gap, c.front + 1),
@@ -258,14 +269,12 @@ def _shape_at(p: CoatParameters, counts: _Counts | None, depth: float) -> _Shape
     tip = np.array([0.0, 0.5 * p.shoulder_width, 0.0])
     neck = np.array([0.0, 0.5 * p.neck_width, p.shoulder_slope])
     front, back = ring[0], ring[-1]
-    throat = np.array([0.62 * front[0], front[1], p.shoulder_slope - 0.45 * depth])
     nape = np.array([-0.25 * p.neck_width, 0.0, p.shoulder_slope - 0.01])
     return _Shape(
         depth=depth,
         ring=ring,
-        front_edge=_resample(_bend(front, throat), c.upper),
+        front_edge=_resample(_bend(front, neck), c.upper),
         front_armhole=_resample(_arch(ring[c.front], tip), c.upper),
-        front_neck=_resample(_scoop(throat, neck), c.front - c.seam),
         seam=neck + np.linspace(0.0, 1.0, c.seam + 1)[:, None] * (tip - neck),
         back_armhole=_resample(_arch(ring[c.front + c.gap], tip), c.upper),
         back_middle=_resample(_bend(back, nape), c.upper),
@@ -384,7 +393,7 @@ def _build(p: CoatParameters, shape: _Shape, c: _Counts, source: str) -> Garment
     front[0] = ring[: c.front + 1]
     patch = _coons(
         shape.ring[: c.front + 1],
-        np.concatenate([shape.front_neck, shape.seam[1:]]),
+        shape.seam,
         shape.front_edge,
         shape.front_armhole,
     )
@@ -400,7 +409,7 @@ def _build(p: CoatParameters, shape: _Shape, c: _Counts, source: str) -> Garment
         shape.back_middle,
     )
     back[1:-1] = half.add(patch[1:-1])
-    back[-1, : c.seam + 1] = front[-1, : c.front - c.seam - 1 : -1]
+    back[-1, : c.seam + 1] = front[-1, ::-1]
     back[-1, c.seam + 1 :] = half.add(patch[-1, c.seam + 1 :])
     half.grid(back)
     body_count = half.count
@@ -410,7 +419,7 @@ def _build(p: CoatParameters, shape: _Shape, c: _Counts, source: str) -> Garment
     )
     cuff = _sleeve(half, p, armhole, c)
     sleeve_end = half.count
-    neckline = np.concatenate([front[-1, : c.front - c.seam + 1], back[-1, c.seam + 1 :]])
+    neckline = np.concatenate([front[-1, :1], back[-1, c.seam + 1 :]])
     _collar(half, p, neckline, c)
 
     region = np.zeros(half.count, dtype=np.int8)

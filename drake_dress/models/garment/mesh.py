@@ -155,7 +155,9 @@ def check_manifold(faces: npt.NDArray[np.integer], n: int, source: str = "mesh")
 
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
     """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
-    return np.unique(np.sort(_half_edges(faces), axis=1), axis=0).astype(np.int32)
+    n = int(faces.max()) + 1
+    key = np.unique(np.sort(_half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
+    return np.stack([key // n, key % n], axis=1).astype(np.int32)
 
 
 def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
@@ -202,10 +204,11 @@ def loop_length(position: FloatArray, loop: npt.NDArray[np.integer]) -> float:
     return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
 
 
-def mean_edge_length(position: FloatArray, faces: npt.NDArray[np.integer]) -> float:
-    """Returns the mean length over all edges, m: the spacing of the mesh."""
+def edge_lengths(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatArray:
+    """Returns (E,) lengths of `unique_edges`, m; their mean is the spacing of the mesh."""
     edges = unique_edges(faces)
-    return float(np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1).mean())
+    chord = position[edges[:, 0]] - position[edges[:, 1]]
+    return np.asarray(np.linalg.norm(chord, axis=1), dtype=np.float64)
 
 
 def _half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:

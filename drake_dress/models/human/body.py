@@ -6,17 +6,23 @@ shoulder joint at the origin, the forearm from its elbow joint at the origin. Th
 its origin on the floor below the shoulders' midpoint.
 
 Angles of an arm, zero when it hangs straight down: abduction opens it sideways, extension moves
-the hand backward, rotation turns it about its own axis (elbow crease inward positive), elbow
-flexion brings the forearm forward.
+the hand backward, rotation turns it about its own axis (outward positive: the hand of a bent arm
+moves away from the body), elbow flexion brings the forearm forward. They apply in this order from
+the torso outward; both sides use the same signs, so equal angles give mirrored arms.
+
+Limitation: at zero abduction an upper arm sinks into the side of the chest by as much as half the
+chest's width and the arm's radius exceed half the shoulder width (2.5 cm as preset).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+
+from drake_dress.errors import UserError
 
 FloatArray = npt.NDArray[np.float64]
 Posture = Literal["standing", "sitting"]
@@ -26,7 +32,18 @@ SIDES: tuple[Side, Side] = ("left", "right")
 
 @dataclass(frozen=True)
 class BodyMeasures:
-    """Sizes of a person, m, and masses, kg. The shoulder height is that of the joints, standing."""
+    """Sizes of a person, m, and masses, kg.
+
+    Attributes:
+        shoulder_height: of the shoulder joints above the floor, standing.
+        shoulder_width: from joint to joint.
+        forearm_length: from the elbow to the middle of the hand.
+        forearm_mass: hand included.
+
+    Raises:
+        UserError: a value is not a positive finite number, or the trunk does not fit: it reaches
+            below the floor, or is deeper than wide.
+    """
 
     shoulder_height: float = 1.40
     shoulder_width: float = 0.36
@@ -46,15 +63,49 @@ class BodyMeasures:
     upper_arm_mass: float = 1.6
     forearm_mass: float = 1.2
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and np.isfinite(value) and value > 0.0):
+                unit = "kg" if field.name.endswith("mass") else "m"
+                raise UserError(
+                    "person", field.name, f"is {value!r}, expected a positive number of {unit}"
+                )
+        if self.torso_length >= self.shoulder_height - 0.5 * self.leg_length:
+            raise UserError(
+                "person",
+                "torso_length",
+                f"is {self.torso_length} m, expected less than shoulder_height less half of "
+                f"leg_length, {self.shoulder_height - 0.5 * self.leg_length:g} m",
+            )
+        if self.chest_depth > self.chest_width:
+            raise UserError(
+                "person",
+                "chest_depth",
+                f"is {self.chest_depth} m, expected at most chest_width, {self.chest_width} m",
+            )
+
 
 @dataclass(frozen=True)
 class ArmPose:
-    """Angles of an arm, rad."""
+    """Angles of an arm, rad; signs and order as in the module's text.
+
+    Raises:
+        UserError: an angle is not a finite number.
+    """
 
     abduction: float = 0.0
     extension: float = 0.0
     rotation: float = 0.0
     elbow_flexion: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and np.isfinite(value)):
+                raise UserError("arm", field.name, f"is {value!r}, expected an angle in rad")
 
 
 @dataclass(frozen=True)
@@ -68,7 +119,15 @@ class Capsule:
 
 
 def shoulder_height(measures: BodyMeasures, posture: Posture) -> float:
-    """Returns the height of the shoulder joints above the floor, m."""
+    """Returns the height of the shoulder joints above the floor, m.
+
+    Raises:
+        UserError: `posture` is neither standing nor sitting.
+    """
+    if posture not in get_args(Posture):
+        raise UserError(
+            "person", "posture", f"is {posture!r}, expected one of {', '.join(get_args(Posture))}"
+        )
     if posture == "standing":
         return measures.shoulder_height
     # the seat is at knee height, half a leg; the trunk stays as long as it is
@@ -135,13 +194,33 @@ def arm_rotations(side: Side, pose: ArmPose) -> tuple[FloatArray, FloatArray]:
     return upper, upper @ _about("y", -pose.elbow_flexion)
 
 
-def arm_points(measures: BodyMeasures, posture: Posture, side: Side, pose: ArmPose) -> FloatArray:
-    """Returns shoulder, elbow and hand (3,3) in the torso's frame, m."""
+def arm_points(
+    measures: BodyMeasures,
+    posture: Posture,
+    side: Side,
+    pose: ArmPose,
+    X_WTorso: tuple[FloatArray, FloatArray] | None = None,  # noqa: N803
+) -> FloatArray:
+    """Returns shoulder, elbow and hand (3,3), m, in the torso's frame or in the world.
+
+    Args:
+        measures: sizes.
+        posture: standing or sitting.
+        side: left or right.
+        pose: angles of that arm.
+        X_WTorso: rotation (3,3) and origin (3,) of the torso's frame in the world, m; None leaves
+            the points in the torso's frame.
+    """
     upper, fore = arm_rotations(side, pose)
     shoulder = shoulder_joint(measures, posture, side)
     elbow = shoulder + upper @ np.array([0.0, 0.0, -measures.upper_arm_length])
     hand = elbow + fore @ np.array([0.0, 0.0, -measures.forearm_length])
-    return np.stack([shoulder, elbow, hand])
+    points = np.stack([shoulder, elbow, hand])
+    if X_WTorso is None:
+        return points
+    rotation, origin = X_WTorso
+    in_world: FloatArray = points @ rotation.T + origin
+    return in_world
 
 
 def _about(axis: str, angle: float) -> FloatArray:

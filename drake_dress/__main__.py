@@ -1,0 +1,136 @@
+"""The command line."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from drake_dress import __version__
+from drake_dress.errors import UserError
+
+UNUSABLE, INTERRUPTED = 2, 130
+
+_EXAMPLES = """examples:
+  drake-dress run scenarios/dummy_standing.yaml
+  drake-dress run scenarios/dummy_varied.yaml --seed 3 --out out/try
+  drake-dress run scenarios/dummy_standing.yaml --set plant.material.friction=0.5 --no-meshcat
+  drake-dress replay out/dummy_standing-seed0/run.h5
+
+exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(UNUSABLE, f"drake-dress: {message}; see drake-dress --help\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command line; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        _check_libraries()
+        status: int = options.command(options)
+        return status
+    except UserError as error:
+        print(f"drake-dress: {error}", file=sys.stderr)
+        return UNUSABLE
+    except KeyboardInterrupt:
+        print("drake-dress: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="drake-dress",
+        description="Two arms put a coat on a person, in simulation.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"drake-dress {__version__}")
+    verbs = parser.add_subparsers(title="commands", dest="verb", required=True, metavar="COMMAND")
+
+    run = verbs.add_parser("run", help="simulate a scenario and write log, report and replay")
+    run.add_argument("scenario", metavar="SCENARIO.yaml")
+    run.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>")
+    run.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="change a value of the scenario by its dotted key; may be given again",
+    )
+    run.add_argument("--seed", type=int, metavar="N", help="in place of the scenario's seed")
+    run.add_argument(
+        "--meshcat",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="show the run live on a page of this machine",
+    )
+    run.add_argument(
+        "--realtime-rate",
+        type=_rate,
+        default=0.0,
+        metavar="R",
+        help="at most R simulated seconds per second; 0: as fast as it goes (default)",
+    )
+    run.set_defaults(command=_run)
+
+    replay = verbs.add_parser("replay", help="show a log in Meshcat, with a slider")
+    replay.add_argument("log", metavar="run.h5")
+    replay.add_argument("--port", type=int, metavar="PORT", help="default: a free one")
+    replay.set_defaults(command=_replay)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from drake_dress.diagrams.run import run_scenario
+    from drake_dress.diagrams.scenario import load_scenario
+
+    scenario = load_scenario(options.scenario, options.set, options.seed)
+    source = Path(options.scenario)
+    out = Path(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
+    if out.exists() and not out.is_dir():
+        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    return run_scenario(scenario, source, out, options.meshcat, options.realtime_rate)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from drake_dress.report.replay import show_replay
+
+    return show_replay(options.log, options.port)
+
+
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
+    return value
+
+
+def _check_libraries() -> None:
+    """Tells in one line when a system library that Drake loads is missing."""
+    try:
+        importlib.import_module("pydrake.common")
+    except ImportError as error:
+        missing = re.search(r"(lib[\w.+-]+\.so[\d.]*)", str(error))
+        name = missing.group(1) if missing else str(error)
+        raise UserError(
+            "pydrake",
+            "",
+            f"cannot be loaded: {name} is missing, expected the system libraries that the README "
+            "names",
+        ) from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""From a scenario's values to the parts of the dressing diagram."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import Meshcat
+
+from drake_dress.diagrams import scenario as schema
+from drake_dress.diagrams.dressing import Rates
+from drake_dress.diagrams.person import JointParameters, Person
+from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.global_mpc import Weights
+from drake_dress.models.control.policy import DressingPolicy, PersonModel, PolicyParameters
+from drake_dress.models.dressing.stages import StageParameters
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import SIDES, ArmPose, BodyMeasures, Posture, shoulder_joint
+
+
+def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat | None) -> Station:
+    """Returns the simulated station with the scenario's person and garment."""
+    person, start = scenario.person, scenario.station.start
+    return make_simulated_station(
+        StationParameters(
+            mesh=mesh,
+            material=material(scenario.plant.material),
+            time_step=scenario.plant.time_step,
+            measures=measures(person),
+            posture=posture(person),
+            arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},
+            joints=JointParameters(**vars(person.joints)),
+            gripper_max_speed=scenario.station.gripper.max_speed,
+            gripper_max_acceleration=scenario.station.gripper.max_acceleration,
+            distance_behind=start.distance_behind,
+            height_offset=start.height_offset,
+            lateral_offset=start.lateral_offset,
+        ),
+        meshcat,
+    )
+
+
+def controller_policy(
+    scenario: schema.Scenario, mesh: GarmentMesh, person: Person
+) -> DressingPolicy:
+    """Returns the global controller's policy on its own garment `mesh`."""
+    c, m = scenario.controller, measures(scenario.person)
+    g = c.global_mpc
+    shape = PersonModel(
+        capsules=person.capsules,
+        shoulders=np.stack([shoulder_joint(m, posture(scenario.person), side) for side in SIDES]),
+        radius=(m.upper_arm_radius, m.forearm_radius, m.hand_radius),
+    )
+    parameters = PolicyParameters(
+        time_step=g.time_step,
+        horizon=g.horizon,
+        max_iterations=g.max_iterations,
+        inner_iterations=g.inner_iterations,
+        max_speed=g.max_speed,
+        weights=Weights(**vars(g.weights)),
+        progress_step=g.progress_step,
+        approach_distance=g.approach_distance,
+        stages=StageParameters(waiting_progress=g.waiting_progress),
+    )
+    return DressingPolicy(mesh, material(c.material), shape, parameters)
+
+
+def rates(scenario: schema.Scenario) -> Rates:
+    """Returns periods and delays of controllers and log."""
+    c = scenario.controller
+    return Rates(
+        global_period=c.global_mpc.period,
+        global_delay=c.global_mpc.delay,
+        command_period=1.0 / c.command_rate,
+        log_period=1.0 / scenario.log.rate,
+        force_limit=c.global_mpc.force_limit,
+    )
+
+
+def material(values: schema.Material) -> Material:
+    """Returns the fabric."""
+    return Material(**vars(values))
+
+
+def measures(person: schema.Person) -> BodyMeasures:
+    """Returns the body's sizes."""
+    return BodyMeasures(**vars(person.measures))
+
+
+def posture(person: schema.Person) -> Posture:
+    """Returns the posture; the scenario has been held against the two there are."""
+    return "sitting" if person.posture == "sitting" else "standing"
+
+
+def arm(values: schema.Arm) -> ArmPose:
+    """Returns an arm's pose; degrees become radians."""
+    return ArmPose(
+        *np.deg2rad(
+            [values.abduction_deg, values.extension_deg, values.rotation_deg, values.elbow_deg]
+        )
+    )

@@ -1,0 +1,142 @@
+"""The dressing diagram: station, what is seen of it, controllers, and what is shown and logged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import Multiplexer
+
+from drake_dress.diagrams.station import Station
+from drake_dress.models.control.policy import DressingPolicy
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.report.log import RunLogWriter
+from drake_dress.systems.garment_oracle import GarmentOracle
+from drake_dress.systems.garment_visualizer import GarmentVisualizer
+from drake_dress.systems.global_mpc import GlobalMpc
+from drake_dress.systems.human_predictor import HumanPredictor
+from drake_dress.systems.joint_oracle import JointOracle
+from drake_dress.systems.plan_follower import PlanFollower
+from drake_dress.systems.run_recorder import RunRecorder
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Periods and delays of the controllers; s, and N for the force limit."""
+
+    global_period: float = 0.5
+    global_delay: float = 0.25
+    command_period: float = 0.01
+    log_period: float = 1.0 / 30.0
+    force_limit: float = 30.0
+
+
+@dataclass(frozen=True)
+class Dressing:
+    """The whole diagram, and the systems that a run asks for results."""
+
+    diagram: Diagram
+    station: Station
+    mpc: GlobalMpc
+
+
+def make_dressing(
+    station: Station,
+    mesh: GarmentMesh,
+    policy: DressingPolicy,
+    transfer: sp.csr_array,
+    rates: Rates,
+    writer: RunLogWriter | None = None,
+    meshcat: Meshcat | None = None,
+) -> Dressing:
+    """Returns station and controllers wired together.
+
+    Args:
+        station: simulated or hardware; only its exported ports are used.
+        mesh: the plant's garment.
+        policy: of the global controller, with the controller's garment.
+        transfer: (m,n) from the plant's nodes to the controller's.
+        rates: of controllers and log.
+        writer: open log, if one is kept.
+        meshcat: where the run is shown, if it is.
+    """
+    builder = DiagramBuilder()
+    lab = builder.AddNamedSystem("station", station.diagram)
+    garment = builder.AddNamedSystem("garment_oracle", GarmentOracle(transfer))
+    joints = builder.AddNamedSystem("joint_oracle", JointOracle(station.person.joint_points))
+    predictor = builder.AddNamedSystem("human_predictor", HumanPredictor(policy.parameters.horizon))
+    mpc = builder.AddNamedSystem(
+        "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
+    )
+    follower = builder.AddNamedSystem(
+        "plan_follower",
+        PlanFollower(station.start_grippers, rates.command_period, rates.force_limit),
+    )
+
+    def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]
+        builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
+
+    connect(lab, "cheat_garment_position", garment, "garment_position")
+    connect(lab, "cheat_garment_velocity", garment, "garment_velocity")
+    connect(lab, "cheat_body_poses", joints, "body_poses")
+    connect(joints, "joint_position", predictor, "joint_position")
+    connect(garment, "estimated_position", mpc, "garment_position")
+    connect(garment, "estimated_velocity", mpc, "garment_velocity")
+    connect(predictor, "predicted_joint_position", mpc, "predicted_joint_position")
+    connect(mpc, "plan", follower, "plan")
+    for side in SIDES:
+        for quantity in ("position", "force"):
+            connect(
+                lab, f"{side}_gripper.{quantity}_measured", follower, f"{side}_gripper_{quantity}"
+            )
+        connect(follower, f"{side}_position_command", lab, f"{side}_gripper.position_command")
+
+    if writer is not None:
+        capsules = [(int(station.person.body_indices[c.body]), c) for c in station.person.capsules]
+        recorder = builder.AddNamedSystem(
+            "run_recorder",
+            RunRecorder(writer, mesh, len(policy.mesh.rest_position), capsules, rates.log_period),
+        )
+        connect(lab, "cheat_garment_position", recorder, "garment_position")
+        connect(lab, "cheat_contact", recorder, "contact")
+        connect(lab, "cheat_contact_force", recorder, "contact_force")
+        connect(lab, "cheat_body_poses", recorder, "body_poses")
+        connect(joints, "joint_position", recorder, "joint_position")
+        connect(joints, "joint_position", recorder, "estimated_joint_position")
+        connect(garment, "estimated_position", recorder, "estimated_position")
+        connect(mpc, "stage", recorder, "stage")
+        connect(mpc, "solve_time", recorder, "solve_time")
+        for side in SIDES:
+            for quantity in ("position", "force"):
+                connect(
+                    lab,
+                    f"{side}_gripper.{quantity}_measured",
+                    recorder,
+                    f"{side}_gripper_{quantity}",
+                )
+    if meshcat is not None:
+        shown = builder.AddNamedSystem(
+            "garment_visualizer", GarmentVisualizer(meshcat, mesh.faces, len(mesh.rest_position))
+        )
+        grippers = builder.AddSystem(Multiplexer([3, 3]))
+        for i, side in enumerate(SIDES):
+            builder.Connect(
+                lab.GetOutputPort(f"{side}_gripper.position_measured"), grippers.get_input_port(i)
+            )
+        builder.Connect(grippers.get_output_port(), shown.GetInputPort("gripper_position"))
+        connect(lab, "cheat_garment_position", shown, "garment_position")
+        connect(mpc, "target", shown, "targets")
+        connect(mpc, "stage", shown, "stage")
+    diagram = builder.Build()
+    diagram.set_name("dressing")
+    return Dressing(diagram, station, mpc)
+
+
+def is_finished(stage: np.ndarray) -> bool:
+    """Returns whether both sleeves are done."""
+    return bool(np.all(stage >= 2))

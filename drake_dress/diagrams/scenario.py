@@ -1,0 +1,491 @@
+"""Scenarios: what a YAML file may say, and how it is read.
+
+Drake's `yaml_load_typed` fills plain dataclasses. Before that the file is held against their types
+so that a mistake is told with its dotted key, and after it against the ranges in `_RANGES`.
+"""
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+
+from drake_dress.errors import UserError
+
+
+@dataclass
+class Coat:
+    """A parametric coat: a preset, scaled, with single measures replaced; m."""
+
+    preset: str = "overcoat"
+    scale: float = 1.0  # on all lengths
+    body_length: float | None = None  # shoulder tips to hem
+    chest: float | None = None  # girth
+    shoulder_width: float | None = None  # tip to tip
+    sleeve_length: float | None = None  # shoulder tip to cuff
+    armhole_girth: float | None = None
+    cuff_girth: float | None = None
+    collar_height: float | None = None
+
+
+@dataclass
+class Mesh:
+    """A garment of the user's own, instead of the coat."""
+
+    file: str = ""  # OBJ, PLY or STL, relative to the scenario
+    unit: str = "m"  # of its coordinates
+    loops: dict[str, list[int]] = field(default_factory=dict)  # nodes in order, by loop name
+    grasp: dict[str, list[int]] = field(default_factory=dict)  # nodes held, by side
+
+
+@dataclass
+class Garment:
+    """The garment's pattern; plant and controller mesh it each at its own spacing."""
+
+    coat: Coat = field(default_factory=Coat)
+    mesh: Mesh | None = None
+
+
+@dataclass
+class Material:
+    """A fabric, SI units; see models/cloth/material.py."""
+
+    surface_density: float = 0.3  # kg/m²
+    stretch_stiffness: float = 100.0  # N/m
+    bending_stiffness: float = 5e-4  # N·m
+    damping: float = 0.003  # s, of the plant's integrator
+    friction: float = 0.3
+    margin: float = 0.003  # m, kept between node and skin
+
+
+@dataclass
+class Measures:
+    """Body sizes, m, and masses, kg."""
+
+    shoulder_height: float = 1.40  # of the joints, standing
+    shoulder_width: float = 0.36  # joint to joint
+    upper_arm_length: float = 0.29
+    forearm_length: float = 0.32  # elbow to middle of the hand
+    upper_arm_radius: float = 0.045
+    forearm_radius: float = 0.038
+    hand_radius: float = 0.040
+    chest_width: float = 0.32
+    chest_depth: float = 0.20
+    torso_length: float = 0.52
+    hip_width: float = 0.32
+    neck_radius: float = 0.055
+    head_radius: float = 0.095
+    leg_length: float = 0.85
+    thigh_radius: float = 0.075
+    upper_arm_mass: float = 1.6
+    forearm_mass: float = 1.2
+
+
+@dataclass
+class Arm:
+    """Rest pose of an arm, degrees; all zero hangs straight down."""
+
+    abduction_deg: float = 38.0  # sideways
+    extension_deg: float = 42.0  # backward
+    rotation_deg: float = 0.0  # about its own axis
+    elbow_deg: float = 10.0  # flexion
+
+
+@dataclass
+class Joints:
+    """How the arms yield: N·m/rad and N·m·s/rad."""
+
+    shoulder_stiffness: float = 5.0
+    shoulder_damping: float = 2.5
+    elbow_stiffness: float = 3.0
+    elbow_damping: float = 1.0
+
+
+@dataclass
+class Person:
+    """The person, or a dummy: a person without will."""
+
+    posture: str = "standing"
+    measures: Measures = field(default_factory=Measures)
+    left_arm: Arm = field(default_factory=Arm)
+    right_arm: Arm = field(default_factory=Arm)
+    joints: Joints = field(default_factory=Joints)
+
+
+@dataclass
+class Plant:
+    """The simulated truth."""
+
+    spacing: float = 0.02  # of the garment's mesh, m
+    time_step: float = 0.004  # s
+    material: Material = field(default_factory=lambda: Material(stretch_stiffness=1000.0))
+
+
+@dataclass
+class Weights:
+    """Of the global controller's costs; see models/control/global_mpc.py."""
+
+    position: float = 1.0
+    direction: float = 0.01
+    speed: float = 0.5
+    safety: float = 3e-4
+    free_force: float = 5.0  # N
+    separation: float = 10.0
+
+
+@dataclass
+class GlobalMpc:
+    """The global controller."""
+
+    period: float = 0.5  # between solves, s
+    delay: float = 0.25  # from what is seen to the use of the plan, s
+    time_step: float = 0.1  # of the prediction, s
+    horizon: int = 6  # steps
+    max_iterations: int = 3  # gradient steps per solve
+    inner_iterations: int = 8  # of the garment's linear solve; 1 is the paper's scheme
+    max_speed: float = 0.12  # of a gripper, m/s
+    weights: Weights = field(default_factory=Weights)
+    progress_step: float = 0.04  # advance of s asked for per step (k)
+    approach_distance: float = 0.18  # cap of l_h, m
+    waiting_progress: float = 0.5  # least s of a waiting sleeve
+    force_limit: float = 30.0  # beyond it grippers give way, N
+
+
+@dataclass
+class Controller:
+    """What the controllers believe and how they act."""
+
+    spacing: float = 0.028  # of the believed garment's mesh, m
+    material: Material = field(default_factory=Material)
+    global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
+    command_rate: float = 100.0  # Hz
+
+
+@dataclass
+class Gripper:
+    """Limits of a floating gripper: m/s, m/s²."""
+
+    max_speed: float = 0.25
+    max_acceleration: float = 2.0
+
+
+@dataclass
+class Start:
+    """Where the coat hangs at first, from the shoulders' middle, m."""
+
+    distance_behind: float = 0.75
+    height_offset: float = 0.0
+    lateral_offset: float = 0.0
+
+
+@dataclass
+class Station:
+    """Robots, or what stands in for them."""
+
+    kind: str = "simulated"
+    gripper: Gripper = field(default_factory=Gripper)
+    start: Start = field(default_factory=Start)
+
+
+@dataclass
+class Variation:
+    """What the seed draws, uniformly within ± these."""
+
+    arm_angle_deg: float = 0.0  # on each arm's abduction, extension and elbow
+    coat_scale: float = 0.0  # relative
+    plant_stiffness: float = 0.0  # relative, on stretch and bending
+    plant_friction: float = 0.0  # relative
+    start_offset: float = 0.0  # m, on each of the three
+
+
+@dataclass
+class Log:
+    """What is written while the run goes on."""
+
+    rate: float = 30.0  # Hz
+
+
+@dataclass
+class Scenario:
+    """One run."""
+
+    seed: int = 0
+    duration: float = 90.0  # at most, s
+    garment: Garment = field(default_factory=Garment)
+    person: Person = field(default_factory=Person)
+    plant: Plant = field(default_factory=Plant)
+    controller: Controller = field(default_factory=Controller)
+    station: Station = field(default_factory=Station)
+    variation: Variation = field(default_factory=Variation)
+    log: Log = field(default_factory=Log)
+
+
+# Words that a text may be (Drake's loader has no literal types).
+_CHOICES = {
+    "garment.coat.preset": ("overcoat", "jacket"),
+    "garment.mesh.unit": ("m", "cm", "mm"),
+    "person.posture": ("standing", "sitting"),
+    "station.kind": ("simulated",),
+}
+
+# Ranges by the end of the dotted key, both ends allowed; all other numbers must be finite.
+_RANGES: dict[str, tuple[float, float]] = {
+    "seed": (0, 2**63 - 1),
+    "duration": (0.1, 600.0),
+    "coat.scale": (0.7, 1.4),
+    "material.surface_density": (0.01, 5.0),
+    "material.stretch_stiffness": (1.0, 1e5),
+    "material.bending_stiffness": (0.0, 1.0),
+    "material.damping": (0.0, 1.0),
+    "material.friction": (0.0, 2.0),
+    "material.margin": (0.0, 0.02),
+    "plant.spacing": (0.01, 0.06),
+    "controller.spacing": (0.01, 0.06),
+    "plant.time_step": (1e-4, 0.05),
+    "shoulder_stiffness": (0.0, 1000.0),
+    "shoulder_damping": (0.0, 1000.0),
+    "elbow_stiffness": (0.0, 1000.0),
+    "elbow_damping": (0.0, 1000.0),
+    "abduction_deg": (-30.0, 150.0),
+    "extension_deg": (-150.0, 70.0),
+    "rotation_deg": (-70.0, 70.0),
+    "elbow_deg": (0.0, 140.0),
+    "global_mpc.period": (0.05, 10.0),
+    "global_mpc.delay": (0.001, 10.0),
+    "global_mpc.time_step": (0.005, 2.0),
+    "global_mpc.horizon": (1, 100),
+    "global_mpc.max_iterations": (1, 1000),
+    "global_mpc.inner_iterations": (1, 1000),
+    "global_mpc.max_speed": (0.001, 1.0),
+    "global_mpc.progress_step": (0.001, 1.0),
+    "global_mpc.approach_distance": (0.0, 1.0),
+    "global_mpc.waiting_progress": (0.05, 2.0),
+    "global_mpc.force_limit": (1.0, 200.0),
+    "weights.position": (0.0, 1e6),
+    "weights.direction": (0.0, 1e6),
+    "weights.speed": (0.0, 1e6),
+    "weights.safety": (0.0, 1e6),
+    "weights.free_force": (0.0, 1e3),
+    "weights.separation": (0.0, 1e6),
+    "command_rate": (10.0, 1000.0),
+    "gripper.max_speed": (0.001, 2.0),
+    "gripper.max_acceleration": (0.01, 50.0),
+    "start.distance_behind": (0.1, 2.0),
+    "start.height_offset": (-1.0, 1.0),
+    "start.lateral_offset": (-1.0, 1.0),
+    "variation.arm_angle_deg": (0.0, 45.0),
+    "variation.coat_scale": (0.0, 0.3),
+    "variation.plant_stiffness": (0.0, 0.9),
+    "variation.plant_friction": (0.0, 0.9),
+    "variation.start_offset": (0.0, 0.3),
+    "log.rate": (1.0, 250.0),
+}
+_MEASURE_RANGE = (0.005, 3.0)
+
+
+def load_scenario(
+    path: str | Path, overrides: Sequence[str] = (), seed: int | None = None
+) -> Scenario:
+    """Returns the scenario in `path`, with `KEY=VALUE` overrides and seed applied.
+
+    Raises:
+        UserError: file, key or value cannot be used.
+    """
+    source = str(path)
+    content = _read(Path(path))
+    for item in overrides:
+        key, separator, text = item.partition("=")
+        if not separator or not key:
+            raise UserError("--set", item, "expected KEY=VALUE, such as plant.spacing=0.015")
+        _override(content, key, text)
+    if seed is not None:
+        content["seed"] = seed
+    content = _check(source, "", content, Scenario)
+    try:
+        scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content))
+    except (RuntimeError, ValueError, TypeError) as error:
+        raise UserError(source, "", f"cannot be read: {error}") from error
+    _check_ranges(source, "", scenario)
+    mpc = scenario.controller.global_mpc
+    if mpc.delay >= mpc.period:
+        raise UserError(
+            source,
+            "controller.global_mpc.delay",
+            f"is {mpc.delay} s, expected less than the period, {mpc.period} s",
+        )
+    return scenario
+
+
+def resolved_yaml(scenario: Scenario) -> str:
+    """Returns the whole scenario as YAML that loads to the same."""
+    text: str = yaml_dump_typed(scenario)
+    return text
+
+
+def apply_variation(scenario: Scenario) -> Scenario:
+    """Returns the scenario with what its seed draws written in and no variation left."""
+    drawn: Scenario = yaml_load_typed(schema=Scenario, data=resolved_yaml(scenario))
+    v, rng = scenario.variation, np.random.default_rng(scenario.seed)
+
+    def draw(width: float) -> float:
+        return float(width * rng.uniform(-1.0, 1.0))
+
+    for arm in (drawn.person.left_arm, drawn.person.right_arm):
+        arm.abduction_deg += draw(v.arm_angle_deg)
+        arm.extension_deg += draw(v.arm_angle_deg)
+        arm.elbow_deg = max(0.0, arm.elbow_deg + draw(v.arm_angle_deg))
+    drawn.garment.coat.scale *= 1.0 + draw(v.coat_scale)
+    stiffness = 1.0 + draw(v.plant_stiffness)
+    drawn.plant.material.stretch_stiffness *= stiffness
+    drawn.plant.material.bending_stiffness *= stiffness
+    drawn.plant.material.friction *= 1.0 + draw(v.plant_friction)
+    drawn.station.start.distance_behind += draw(v.start_offset)
+    drawn.station.start.height_offset += draw(v.start_offset)
+    drawn.station.start.lateral_offset += draw(v.start_offset)
+    drawn.variation = Variation()
+    return drawn
+
+
+def _read(path: Path) -> dict[str, Any]:
+    source = str(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UserError(source, "", "no such file, expected a scenario in YAML") from None
+    except IsADirectoryError:
+        raise UserError(source, "", "is a directory, expected a scenario in YAML") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(source, "", f"cannot be read as text: {error}") from error
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "not YAML"
+        raise UserError(source, where, f"{problem}, expected YAML") from error
+    if content is None:
+        raise UserError(source, "", "is empty, expected a scenario in YAML")
+    if not isinstance(content, dict):
+        raise UserError(source, "", f"holds {_kind(content)}, expected keys with values")
+    return content
+
+
+def _override(content: dict[str, Any], key: str, text: str) -> None:
+    """Writes the YAML value `text` at the dotted `key`."""
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise UserError("--set", key, f"{text!r} is not a YAML value") from None
+    *parents, last = key.split(".")
+    schema: Any = Scenario
+    place = content
+    for depth, name in enumerate(parents):
+        schema = _field_type("--set", ".".join(parents[:depth]), name, schema)
+        if place.get(name) is None:
+            place[name] = {}
+        place = place[name]
+        if not isinstance(place, dict):
+            raise UserError("--set", key, f"{name} holds a value, expected keys below it")
+    hint = _field_type("--set", ".".join(parents), last, schema)
+    place[last] = _check("--set", key, value, hint)
+
+
+def _field_type(source: str, key: str, name: Any, schema: Any) -> Any:
+    """Returns the type of a dataclass's field, or says which names there are."""
+    schema = _without_none(schema)
+    dotted = f"{key}.{name}" if key else str(name)
+    if not dataclasses.is_dataclass(schema):
+        raise UserError(source, dotted, "unknown key, expected none below a value")
+    hints = typing.get_type_hints(schema)
+    if name not in hints:
+        near = difflib.get_close_matches(str(name), hints, n=1)
+        expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(hints)}"
+        raise UserError(source, dotted, f"unknown key, {expected}")
+    return hints[name]
+
+
+def _check(source: str, key: str, value: Any, schema: Any) -> Any:
+    """Holds a value read from YAML against a type; returns it, numbers as numbers."""
+    origin = typing.get_origin(schema)
+    if origin in (typing.Union, types.UnionType):
+        if value is None:
+            return None
+        schema = _without_none(schema)
+        origin = typing.get_origin(schema)
+    if dataclasses.is_dataclass(schema):
+        if not isinstance(value, dict):
+            raise UserError(source, key, f"is {_kind(value)}, expected keys with values")
+        inner = {name: _field_type(source, key, name, schema) for name in value}
+        return {
+            name: _check(source, f"{key}.{name}" if key else str(name), item, inner[name])
+            for name, item in value.items()
+        }
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise UserError(source, key, f"is {_kind(value)}, expected names with lists")
+        below = typing.get_args(schema)[1]
+        return {name: _check(source, f"{key}.{name}", v, below) for name, v in value.items()}
+    if origin is list:
+        if not isinstance(value, list):
+            raise UserError(source, key, f"is {_kind(value)}, expected a list")
+        below = typing.get_args(schema)[0]
+        return [_check(source, f"{key}[{i}]", item, below) for i, item in enumerate(value)]
+    if schema is float:
+        if isinstance(value, str):
+            # YAML 1.1 takes 1e9 for text
+            try:
+                return float(value)
+            except ValueError:
+                pass
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UserError(source, key, f"is {_kind(value)}, expected a number")
+    elif schema is int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise UserError(source, key, f"is {_kind(value)}, expected a whole number")
+    elif schema is str:
+        choices = _CHOICES.get(key)
+        if choices is not None and value not in choices:
+            raise UserError(source, key, f"is {_kind(value)}, expected {' or '.join(choices)}")
+        if not isinstance(value, str):
+            raise UserError(source, key, f"is {_kind(value)}, expected text")
+    return value
+
+
+def _check_ranges(source: str, key: str, value: Any) -> None:
+    if dataclasses.is_dataclass(value):
+        for entry in dataclasses.fields(value):
+            inner = f"{key}.{entry.name}" if key else entry.name
+            _check_ranges(source, inner, getattr(value, entry.name))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise UserError(source, key, f"is {value}, expected a finite number")
+        bounds = next(
+            (r for end, r in _RANGES.items() if key == end or key.endswith("." + end)),
+            _MEASURE_RANGE if ".measures." in key else None,
+        )
+        if bounds is not None and not bounds[0] <= value <= bounds[1]:
+            raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
+
+
+def _without_none(schema: Any) -> Any:
+    if typing.get_origin(schema) in (typing.Union, types.UnionType):
+        return next(t for t in typing.get_args(schema) if t is not type(None))
+    return schema
+
+
+def _kind(value: Any) -> str:
+    if value is None:
+        return "empty"
+    if isinstance(value, dict):
+        return "a group of keys"
+    if isinstance(value, list):
+        return "a list"
+    return repr(value)

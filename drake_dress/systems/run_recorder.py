@@ -1,0 +1,114 @@
+"""Writes the run log while the diagram runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, LeafSystem
+
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import Capsule
+from drake_dress.report.log import RunLogWriter, Sample
+
+SIDES = ("left", "right")
+
+
+class RunRecorder(LeafSystem):
+    """Appends a sample to the log at a fixed rate.
+
+    .. pydrake_system::
+
+        name: RunRecorder
+        input_ports:
+        - garment_position
+        - contact
+        - contact_force
+        - body_poses
+        - joint_position
+        - left_gripper_position
+        - left_gripper_force
+        - right_gripper_position
+        - right_gripper_force
+        - stage
+        - solve_time
+        - estimated_position
+        - estimated_joint_position
+
+    Sizes and units as at the ports of station and controllers.
+
+    Args:
+        writer: the open log.
+        mesh: the plant's garment.
+        estimate_count: nodes of the controller's garment.
+        capsules: of the person, with the index of the body each is fixed in.
+        period: between samples, s.
+    """
+
+    def __init__(
+        self,
+        writer: RunLogWriter,
+        mesh: GarmentMesh,
+        estimate_count: int,
+        capsules: Sequence[tuple[int, Capsule]],
+        period: float,
+    ) -> None:
+        super().__init__()
+        self._writer = writer
+        self._mesh = mesh
+        self._capsules = list(capsules)
+        self._signs = [loop_orientation(mesh, side) for side in SIDES]
+        self._solves = 0.0
+        n = len(mesh.rest_position)
+        self.DeclareVectorInputPort("garment_position", 3 * n)
+        self.DeclareVectorInputPort("contact", n)
+        self.DeclareVectorInputPort("contact_force", 3 * n)
+        self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+        self.DeclareVectorInputPort("joint_position", 18)
+        for side in SIDES:
+            self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
+            self.DeclareVectorInputPort(f"{side}_gripper_force", 3)
+        self.DeclareVectorInputPort("stage", 2)
+        self.DeclareVectorInputPort("solve_time", 2)
+        self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
+        self.DeclareVectorInputPort("estimated_joint_position", 18)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
+
+    def _append(self, context: Context) -> None:
+        def value(name: str) -> np.ndarray:
+            return self.GetInputPort(name).Eval(context)
+
+        x = value("garment_position").reshape(-1, 3)
+        joints = value("joint_position").reshape(6, 3)
+        poses = self.GetInputPort("body_poses").Eval(context)
+        dressing = {}
+        for i, side in enumerate(SIDES):
+            axis = ArmAxis(hand=joints[3 * i + 2], elbow=joints[3 * i + 1], shoulder=joints[3 * i])
+            sleeve = sleeve_state(x, self._mesh.loops[f"{side}_armhole"], self._signs[i])
+            s, l, theta = axis.coordinates(sleeve.p_c)
+            dressing[side] = (s, l, theta)
+        solve_time, solves = value("solve_time")
+        ended = solves > self._solves
+        self._solves = float(solves)
+        self._writer.append(
+            Sample(
+                time=context.get_time(),
+                garment_position=x,
+                contact=value("contact"),
+                contact_force=value("contact_force").reshape(-1, 3),
+                joint_position=joints,
+                gripper_position={side: value(f"{side}_gripper_position") for side in SIDES},
+                gripper_force={side: value(f"{side}_gripper_force") for side in SIDES},
+                dressing=dressing,
+                stage=value("stage"),
+                global_solve_time=float(solve_time) if ended else np.nan,
+                estimate_garment_position=value("estimated_position").reshape(-1, 3),
+                estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
+                capsule_a=np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
+                capsule_b=np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
+            )
+        )

@@ -1,0 +1,81 @@
+from pathlib import Path
+
+import pytest
+
+from drake_dress.diagrams.scenario import (
+    Scenario,
+    Variation,
+    apply_variation,
+    load_scenario,
+    resolved_yaml,
+)
+
+SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.yaml"))
+
+ONE_OF_EVERYTHING = """
+seed: 4
+duration: 12.5
+garment:
+  coat: {preset: jacket, scale: 1.1, chest: 1.2}
+  mesh: {file: a.obj, unit: cm, loops: {left_cuff: [1, 2, 3]}, grasp: {left: [4]}}
+person:
+  posture: sitting
+  measures: {shoulder_width: 0.4}
+  left_arm: {abduction_deg: 20.0}
+  joints: {shoulder_stiffness: 3.0}
+plant: {spacing: 0.03, time_step: 0.005, material: {friction: 0.5}}
+controller:
+  spacing: 0.04
+  material: {stretch_stiffness: 80}
+  global_mpc: {period: 1.0, delay: 0.5, horizon: 4, weights: {direction: 0.1}}
+  command_rate: 200.0
+station: {kind: simulated, gripper: {max_speed: 0.1}, start: {height_offset: 0.1}}
+variation: {arm_angle_deg: 5.0}
+log: {rate: 10.0}
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "scenario.yaml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_every_scenario_loads_and_says_what_it_shows(path: Path) -> None:
+    assert isinstance(load_scenario(path), Scenario)
+    assert path.read_text().startswith("# ")
+
+
+@pytest.mark.parametrize("text", ["seed: 0", ONE_OF_EVERYTHING], ids=["defaults", "everything"])
+def test_resolved_scenario_loads_to_the_same(tmp_path: Path, text: str) -> None:
+    scenario = load_scenario(write(tmp_path, text))
+    again = load_scenario(write(tmp_path, resolved_yaml(scenario)))
+    assert again == scenario
+
+
+def test_overrides_reach_every_depth(tmp_path: Path) -> None:
+    path = write(tmp_path, "seed: 0")
+    scenario = load_scenario(
+        path, ["plant.material.friction=0.7", "duration=3", "garment.mesh.file=x.obj"], seed=5
+    )
+    assert scenario.plant.material.friction == 0.7
+    assert scenario.duration == 3.0
+    assert scenario.garment.mesh is not None and scenario.garment.mesh.file == "x.obj"
+    assert scenario.seed == 5
+
+
+def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:
+    text = "variation: {arm_angle_deg: 10, coat_scale: 0.05, plant_friction: 0.3}"
+    path = write(tmp_path, text)
+    first = apply_variation(load_scenario(path, seed=1))
+    assert first == apply_variation(load_scenario(path, seed=1))
+    assert first != apply_variation(load_scenario(path, seed=2))
+    assert first.variation == Variation()
+    assert abs(first.person.left_arm.abduction_deg - 38.0) <= 10.0
+    assert 0.95 <= first.garment.coat.scale <= 1.05
+
+
+def test_no_variation_changes_nothing(tmp_path: Path) -> None:
+    scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING.replace("5.0}\nlog", "0.0}\nlog")))
+    assert apply_variation(scenario) == scenario

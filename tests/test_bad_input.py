@@ -1,0 +1,115 @@
+"""What cannot be used is told in one line, with status 2, and leaves nothing behind."""
+
+from pathlib import Path
+
+import pytest
+
+from drake_dress.__main__ import main
+
+# scenario text, then words that the line must hold
+BAD_YAML = {
+    "unknown key": ("sede: 3", ["sede", "seed"]),
+    "unknown nested key": ("plant: {materiel: {}}", ["plant.materiel", "material"]),
+    "unknown deep key": (
+        "controller: {global_mpc: {weights: {positon: 1}}}",
+        ["controller.global_mpc.weights.positon", "position"],
+    ),
+    "text for a number": ("duration: long", ["duration", "number"]),
+    "list for a number": ("plant: {spacing: [1, 2]}", ["plant.spacing", "number"]),
+    "fraction for a whole number": ("seed: 1.5", ["seed", "whole number"]),
+    "bool for a number": ("duration: true", ["duration", "number"]),
+    "value for a group": ("plant: 3", ["plant", "keys"]),
+    "empty group": ("plant:", ["plant", "keys"]),
+    "number for text": ("person: {posture: 3}", ["person.posture", "standing"]),
+    "unknown posture": ("person: {posture: lying}", ["person.posture", "standing or sitting"]),
+    "unknown preset": ("garment: {coat: {preset: cape}}", ["garment.coat.preset", "jacket"]),
+    "unknown station": ("station: {kind: moon}", ["station.kind", "simulated"]),
+    "too long": ("duration: 1e9", ["duration", "600"]),
+    "no time": ("duration: 0", ["duration", "0.1"]),
+    "negative seed": ("seed: -1", ["seed", "0"]),
+    "not a number": ("plant: {time_step: .nan}", ["plant.time_step", "finite"]),
+    "infinite": ("person: {measures: {chest_width: .inf}}", ["chest_width", "finite"]),
+    "negative friction": ("plant: {material: {friction: -0.1}}", ["plant.material.friction"]),
+    "too fine": ("plant: {spacing: 0.001}", ["plant.spacing", "0.01"]),
+    "too coarse": ("controller: {spacing: 0.2}", ["controller.spacing", "0.06"]),
+    "delay beyond period": (
+        "controller: {global_mpc: {period: 0.5, delay: 0.6}}",
+        ["controller.global_mpc.delay", "period"],
+    ),
+    "broken syntax": ("plant: {spacing: 0.02", ["line"]),
+    "tab": ("plant:\n\tspacing: 1", ["line 2"]),
+    "empty file": ("", ["empty"]),
+    "a list": ("- 1\n- 2", ["list"]),
+    "coat that cannot be": (
+        "garment: {coat: {cuff_girth: 0.59, armhole_girth: 0.4}}",
+        ["cuff_girth"],
+    ),
+    "coat measure out of range": ("garment: {coat: {chest: 9}}", ["chest"]),
+    "missing mesh": ("garment: {mesh: {file: nowhere.obj}}", ["nowhere.obj"]),
+    "unknown unit": ("garment: {mesh: {file: a.obj, unit: inch}}", ["garment.mesh.unit", "mm"]),
+    "loop of words": (
+        "garment: {mesh: {file: a.obj, loops: {left_cuff: [a]}}}",
+        ["garment.mesh.loops.left_cuff[0]"],
+    ),
+}
+
+
+def refused(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
+    """Runs the command line, checks that it refuses by the rules, and returns its line."""
+    try:
+        status = main(arguments)
+    except SystemExit as error:
+        status = int(error.code or 0)
+    captured = capsys.readouterr()
+    assert status == 2
+    assert captured.out == ""
+    lines = captured.err.splitlines()
+    assert len(lines) == 1, captured.err
+    assert lines[0].startswith("drake-dress: ")
+    assert "Traceback" not in lines[0]
+    return lines[0]
+
+
+@pytest.mark.parametrize("name", BAD_YAML)
+def test_bad_scenario(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, words = BAD_YAML[name]
+    path, out = tmp_path / "scenario.yaml", tmp_path / "out"
+    path.write_text(text)
+    line = refused(capsys, ["run", str(path), "--out", str(out), "--no-meshcat"])
+    for word in words:
+        assert word in line, line
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run"], ["SCENARIO.yaml"]),
+        (["dance"], ["dance"]),
+        ([], ["COMMAND"]),
+        (["run", "no/such.yaml"], ["no/such.yaml", "no such file"]),
+        (["run", "."], ["directory"]),
+        (["run", "S", "--set", "plant.spacing"], ["--set", "KEY=VALUE"]),
+        (["run", "S", "--set", "plant.spacng=0.02"], ["plant.spacng", "spacing"]),
+        (["run", "S", "--set", "plant.spacing=wide"], ["plant.spacing", "number"]),
+        (["run", "S", "--set", "seed.more=1"], ["seed.more"]),
+        (["run", "S", "--seed", "x"], ["--seed"]),
+        (["run", "S", "--realtime-rate", "-1"], ["--realtime-rate"]),
+        (["replay", "no.h5"], ["no.h5"]),
+    ],
+    ids=lambda value: " ".join(value) if value and isinstance(value, list) else "",
+)
+def test_bad_command_line(
+    arguments: list[str], words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_text("seed: 0")
+    line = refused(capsys, [str(path) if a == "S" else a for a in arguments])
+    for word in words:
+        assert word in line, line
+
+
+def test_binary_file_is_no_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_bytes(bytes([0xFF, 0xFE, 0x00, 0x81]) * 50)
+    assert "scenario.yaml" in refused(capsys, ["run", str(path)])
