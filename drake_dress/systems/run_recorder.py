@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 
 from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.linking import arm_linking_number
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
@@ -85,12 +86,19 @@ class RunRecorder(LeafSystem):
         x = value("garment_position").reshape(-1, 3)
         joints = value("joint_position").reshape(6, 3)
         poses = self.GetInputPort("body_poses").Eval(context)
+        interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
         dressing = {}
         for i, side in enumerate(SIDES):
             axis = ArmAxis(hand=joints[3 * i + 2], elbow=joints[3 * i + 1], shoulder=joints[3 * i])
             sleeve = sleeve_state(x, self._mesh.loops[f"{side}_armhole"], self._signs[i])
             s, l, theta = axis.coordinates(sleeve.p_c)
-            dressing[side] = (s, l, theta)
+            inside = arm_linking_number(
+                x[self._mesh.loops[f"{side}_armhole"]],
+                *joints[3 * i : 3 * i + 3],
+                interior=interior,
+            )
+            # a sleeve that does not cover its arm has no progress, wherever its centre is
+            dressing[side] = (s if inside else 0.0, l, theta)
         solve_time, solves = value("solve_time")
         ended = solves > self._solves
         self._solves = float(solves)

@@ -17,6 +17,7 @@ from drake_dress.models.garment.mesh import (
     FloatArray,
     GarmentMesh,
     IntArray,
+    check_loop,
     check_manifold,
     check_positions,
 )
@@ -79,6 +80,8 @@ def load_garment(
         side: _mapped(nodes, became, source, f"grasp.{side}")
         for side, nodes in (grasp or {}).items()
     }
+    for name, loop in named.items():
+        check_loop(loop, faces, len(position), source, f"loops.{name}")
     if not all(f"{side}_cuff" in named for side in SIDES):
         named = {**find_cuffs(position, faces, source), **named}
     for side in SIDES:
@@ -133,14 +136,17 @@ def _read(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         mesh = trimesh.load(
             path, process=False, force="mesh", maintain_order=True, group_material=False
         )
-        position = np.array(mesh.vertices, dtype=np.float64)
-        faces = np.array(mesh.faces, dtype=np.int64)
+    # an OBJ in no plain encoding: trimesh looks for an optional package that guesses it
+    except ImportError as error:
+        raise UserError(source, "", "is not text, expected an OBJ in UTF-8") from error
     # trimesh's readers raise whatever their parsing stumbles on
     except Exception as error:  # noqa: BLE001
         reason = str(error) or type(error).__name__
         raise UserError(source, "", f"cannot be read as {path.suffix[1:]}: {reason}") from error
-    if len(faces) == 0 or len(position) == 0:
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
+    position = np.array(mesh.vertices, dtype=np.float64)
+    faces = np.array(mesh.faces, dtype=np.int64)
     if faces.min() < 0 or faces.max() >= len(position):
         raise UserError(
             source,

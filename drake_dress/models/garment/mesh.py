@@ -153,6 +153,35 @@ def check_manifold(faces: npt.NDArray[np.integer], n: int, source: str = "mesh")
     _check_fans(faces, n, source)
 
 
+def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -> None:
+    """Checks that nodes form a closed chain of edges of the mesh.
+
+    Args:
+        loop: node indices in order, the first not repeated.
+        faces: (F,3) node indices.
+        n: number of nodes.
+        source: file or name put in front of the message.
+        key: of the loop in the source, for the message.
+
+    Raises:
+        UserError: indices out of range or repeated, fewer than three, or no edge joins neighbours.
+    """
+    _check_indices(loop, n, source, key)
+    if len(loop) < 3:
+        raise UserError(source, key, f"has {len(loop)} nodes, expected at least 3")
+    edges = unique_edges(faces).astype(np.int64) @ np.array([n, 1])
+    pairs = np.sort(np.stack([loop, np.roll(loop, -1)], axis=1), axis=1).astype(np.int64)
+    broken = np.flatnonzero(~np.isin(pairs @ np.array([n, 1]), edges))
+    if len(broken):
+        at = broken[0]
+        raise UserError(
+            source,
+            key,
+            f"is not a closed chain of mesh edges: no edge joins nodes {loop[at]} and "
+            f"{loop[(at + 1) % len(loop)]}",
+        )
+
+
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
     """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
     n = int(faces.max()) + 1
@@ -271,22 +300,8 @@ def _check_loops(loops: dict[str, IntArray], faces: IntArray, n: int, source: st
     missing = [name for name in LOOP_NAMES if name not in loops]
     if missing:
         raise UserError(source, "loops", f"{', '.join(missing)} missing, expected {LOOP_NAMES}")
-    edges = unique_edges(faces).astype(np.int64) @ np.array([n, 1])
     for name, loop in loops.items():
-        key = f"loops.{name}"
-        _check_indices(loop, n, source, key)
-        if len(loop) < 3:
-            raise UserError(source, key, f"has {len(loop)} nodes, expected at least 3")
-        pairs = np.sort(np.stack([loop, np.roll(loop, -1)], axis=1), axis=1).astype(np.int64)
-        broken = np.flatnonzero(~np.isin(pairs @ np.array([n, 1]), edges))
-        if len(broken):
-            at = broken[0]
-            raise UserError(
-                source,
-                key,
-                f"is not a closed chain of mesh edges: no edge joins nodes {loop[at]} and "
-                f"{loop[(at + 1) % len(loop)]}",
-            )
+        check_loop(loop, faces, n, source, f"loops.{name}")
 
 
 def _check_indices(indices: IntArray | None, n: int, source: str, key: str) -> None:

@@ -177,19 +177,24 @@ class _Merging:
             if with_a and with_b and (b not in chain[a] or len(chain) <= _LEAST_LOOP):
                 return None
         if any(on_a) and any(on_b) and on_a != on_b:
-            # on different chains, or one at a crossing: stay away unless one has all the other has
-            if all(p or not q for p, q in zip(on_a, on_b, strict=True)):
-                return self.x[a].copy() if self._touch(on_a, on_b) else None
-            return None
-        if any(on_a) and not any(on_b):
+            return None  # different chains, or a crossing of two
+        # a chain's nodes stay where they are, its corners first: midpoints would shrink every girth
+        if any(on_a) and any(on_b):
+            keep_a = all(
+                self._loss(chain, a) >= self._loss(chain, b) for chain in self.chain if a in chain
+            )
+            return np.asarray(self.x[a if keep_a else b].copy())
+        if any(on_a):
             return np.asarray(self.x[a].copy())
-        if any(on_b) and not any(on_a):
+        if any(on_b):
             return np.asarray(self.x[b].copy())
         return np.asarray(0.5 * (self.x[a] + self.x[b]))
 
-    @staticmethod
-    def _touch(on_a: list[bool], on_b: list[bool]) -> bool:
-        return any(p and q for p, q in zip(on_a, on_b, strict=True))
+    def _loss(self, chain: dict[int, set[int]], node: int) -> float:
+        """By how much a chain becomes shorter without a node, m."""
+        before, after = (self.x[q] for q in chain[node])
+        around = np.linalg.norm(self.x[node] - before) + np.linalg.norm(after - self.x[node])
+        return float(around - np.linalg.norm(after - before))
 
     def _stays_sound(self, a: int, b: int, target: FloatArray, others: set[int]) -> bool:
         faces = np.array([self.face[f] for f in others])
@@ -205,7 +210,7 @@ class _Merging:
         size = np.linalg.norm(new, axis=1)
         if ((old * new).sum(axis=1) < 0.3 * np.linalg.norm(old, axis=1) * size).any():
             return False
-        # twice the area by the longest side squared: 1.7 for an equilateral triangle, 0 for a needle
+        # twice the area by the longest side squared: 0.87 for an equilateral triangle, 0: a needle
         sides = np.linalg.norm(after - np.roll(after, -1, axis=1), axis=2).max(axis=1)
         return bool((size > 0.15 * sides**2).all())
 

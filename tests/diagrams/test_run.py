@@ -1,0 +1,52 @@
+"""A short, coarse run from YAML to report."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from drake_dress.__main__ import main
+
+SCENARIO = """# a second of it, coarse
+duration: 1.0
+plant: {spacing: 0.05, time_step: 0.01}
+controller: {spacing: 0.06, global_mpc: {horizon: 3, max_iterations: 2}}
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path]:
+    folder = tmp_path_factory.mktemp("run")
+    path = folder / "short.yaml"
+    path.write_text(SCENARIO)
+    return main(["run", str(path), "--out", str(folder / "out"), "--no-meshcat"]), folder
+
+
+def test_run_that_ends_too_early_says_so(run: tuple[int, Path]) -> None:
+    status, folder = run
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    assert status == 1
+    assert summary["success"] is False
+    assert "sleeve not on" in summary["reason"]
+    for name in ("run.h5", "report.html", "replay.html"):
+        assert (folder / "out" / name).stat().st_size > 1000
+
+
+def test_same_seed_gives_the_same_numbers(run: tuple[int, Path]) -> None:
+    _, folder = run
+    main(["run", str(folder / "short.yaml"), "--out", str(folder / "again"), "--no-meshcat"])
+    with h5py.File(folder / "out" / "run.h5") as a, h5py.File(folder / "again" / "run.h5") as b:
+        for name in ("garment/position", "gripper/left/force", "human/joint_position"):
+            np.testing.assert_array_equal(a[name][()], b[name][()])
+
+
+def test_grippers_carry_the_coat_and_controller_moves_them(run: tuple[int, Path]) -> None:
+    _, folder = run
+    with h5py.File(folder / "out" / "run.h5") as log:
+        left, right = (log[f"gripper/{side}/force"][()] for side in ("left", "right"))
+        start, end = log["gripper/left/position"][0], log["gripper/left/position"][-1]
+        weight = -(left + right)[:, 2].mean()
+    assert 2.0 < weight < 8.0
+    assert np.linalg.norm(end - start) > 0.01

@@ -1,0 +1,63 @@
+from drake_dress.models.dressing.stages import (
+    SleeveFacts,
+    Stage,
+    StageParameters,
+    StageState,
+    Task,
+    advance_stages,
+)
+
+P = StageParameters(reach=0.45, waiting_progress=0.5)
+FAR, NEAR = 0.9, 0.3
+
+
+def facts(
+    linked: bool = False, s: float = 0.0, hand: float = 0.5, error: float = 0.5
+) -> SleeveFacts:
+    return SleeveFacts(linked, s, hand, error, passed=0.0)
+
+
+def test_nearer_sleeve_goes_first_while_the_garment_reaches_one_hand_only() -> None:
+    _, tasks = advance_stages(StageState(), (facts(hand=0.6), facts(hand=0.3)), P, FAR, 0.0)
+    assert tasks == (Task.REST, Task.PREPARE)
+
+
+def test_both_sleeves_are_prepared_when_the_garment_reaches_both_hands() -> None:
+    _, tasks = advance_stages(StageState(), (facts(), facts()), P, NEAR, 0.0)
+    assert tasks == (Task.PREPARE, Task.PREPARE)
+
+
+def test_first_sleeve_waits_on_its_arm_for_the_second() -> None:
+    state, tasks = advance_stages(StageState(), (facts(linked=True, s=0.5), facts()), P, FAR, 1.0)
+    assert state.stage == (Stage.DRESS, Stage.PREPARE)
+    assert tasks == (Task.WAIT, Task.PREPARE)
+
+
+def test_second_sleeve_rests_until_the_first_is_far_enough_on() -> None:
+    _, tasks = advance_stages(StageState(), (facts(linked=True, s=0.1), facts()), P, FAR, 1.0)
+    assert tasks == (Task.WAIT, Task.REST)
+
+
+def test_both_are_drawn_up_together_once_both_arms_are_in() -> None:
+    _, tasks = advance_stages(
+        StageState(), (facts(linked=True, s=0.6), facts(linked=True, s=0.2)), P, FAR, 1.0
+    )
+    assert tasks == (Task.DRESS, Task.DRESS)
+
+
+def test_progress_without_the_arm_inside_is_no_progress() -> None:
+    """The armhole has slid up beside the arm: the sleeve is taken back, not called done."""
+    started = StageState(stage=(Stage.DRESS, Stage.PREPARE), first=0)
+    beside = SleeveFacts(linked=False, s=0.0, hand_distance=0.5, prepared_error=0.5, passed=0.5)
+    state, _ = advance_stages(started, (beside, facts()), P, FAR, 1.0)
+    assert state.stage[0] == Stage.PREPARE
+    assert state.attempts[0] == 1
+
+
+def test_a_sleeve_at_the_shoulder_is_done_and_stays_so() -> None:
+    state, _ = advance_stages(StageState(), (facts(linked=True, s=1.97), facts()), P, FAR, 1.0)
+    assert state.stage[0] == Stage.DONE
+    state, _ = advance_stages(state, (facts(linked=True, s=1.9), facts()), P, FAR, 2.0)
+    assert state.stage[0] == Stage.DONE
+    state, _ = advance_stages(state, (facts(linked=False), facts()), P, FAR, 3.0)
+    assert state.stage[0] == Stage.PREPARE
