@@ -113,3 +113,36 @@ def test_binary_file_is_no_scenario(tmp_path: Path, capsys: pytest.CaptureFixtur
     path = tmp_path / "scenario.yaml"
     path.write_bytes(bytes([0xFF, 0xFE, 0x00, 0x81]) * 50)
     assert "scenario.yaml" in refused(capsys, ["run", str(path)])
+
+
+def _obj(vertices: list[str], faces: list[str]) -> str:
+    return "\n".join([f"v {v}" for v in vertices] + [f"f {f}" for f in faces]) + "\n"
+
+
+SQUARE = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
+BAD_MESHES = {
+    "no faces": ("a.obj", "# nothing\n", "m", ["a.obj"]),
+    "not a mesh at all": ("a.obj", "\x00\x01 nonsense", "m", ["a.obj"]),
+    "unknown extension": ("a.xyz", "1 2 3", "m", ["a.xyz"]),
+    "not a number": ("a.obj", _obj(["nan 0 0", *SQUARE[1:]], ["1 2 3", "1 3 4"]), "m", ["a.obj"]),
+    "three faces at an edge": (
+        "a.obj",
+        _obj([*SQUARE, "0.5 0.5 1"], ["1 2 3", "1 3 4", "1 3 5"]),
+        "m",
+        ["a.obj", "manifold"],
+    ),
+    "wrong unit": ("a.obj", _obj(SQUARE, ["1 2 3", "1 3 4"]), "mm", ["a.obj", "unit"]),
+    "no sleeves": ("a.obj", _obj(SQUARE, ["1 2 3", "1 3 4"]), "m", ["a.obj", "loop"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_MESHES)
+def test_bad_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, content, unit, words = BAD_MESHES[name]
+    (tmp_path / file).write_text(content)
+    path, out = tmp_path / "scenario.yaml", tmp_path / "out"
+    path.write_text(f"garment: {{mesh: {{file: {file}, unit: {unit}}}}}")
+    line = refused(capsys, ["run", str(path), "--out", str(out), "--no-meshcat"])
+    for word in words:
+        assert word in line, line
+    assert not out.exists()

@@ -93,8 +93,8 @@ class Measures:
 class Arm:
     """Rest pose of an arm, degrees; all zero hangs straight down."""
 
-    abduction_deg: float = 38.0  # sideways
-    extension_deg: float = 42.0  # backward
+    abduction_deg: float = 32.0  # sideways
+    extension_deg: float = 46.0  # backward
     rotation_deg: float = 0.0  # about its own axis
     elbow_deg: float = 10.0  # flexion
 
@@ -103,10 +103,10 @@ class Arm:
 class Joints:
     """How the arms yield: N·m/rad and N·m·s/rad."""
 
-    shoulder_stiffness: float = 5.0
-    shoulder_damping: float = 2.5
-    elbow_stiffness: float = 3.0
-    elbow_damping: float = 1.0
+    shoulder_stiffness: float = 6.0
+    shoulder_damping: float = 3.0
+    elbow_stiffness: float = 3.6
+    elbow_damping: float = 1.2
 
 
 @dataclass
@@ -126,7 +126,7 @@ class Plant:
 
     spacing: float = 0.02  # of the garment's mesh, m
     time_step: float = 0.004  # s
-    material: Material = field(default_factory=lambda: Material(stretch_stiffness=1000.0))
+    material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
 @dataclass
@@ -155,7 +155,7 @@ class GlobalMpc:
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.18  # cap of l_h, m
-    waiting_progress: float = 0.5  # least s of a waiting sleeve
+    waiting_progress: float = 0.4  # least s of a waiting sleeve
     force_limit: float = 30.0  # beyond it grippers give way, N
 
 

@@ -94,8 +94,10 @@ class RunRecorder(LeafSystem):
             s, l, theta = axis.coordinates(sleeve.p_c)
             inside = arm_linking_number(
                 x[self._mesh.loops[f"{side}_armhole"]],
-                *joints[3 * i : 3 * i + 3],
-                interior=interior,
+                joints[3 * i],
+                joints[3 * i + 1],
+                joints[3 * i + 2],
+                interior,
             )
             # a sleeve that does not cover its arm has no progress, wherever its centre is
             dressing[side] = (s if inside else 0.0, l, theta)

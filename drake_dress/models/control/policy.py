@@ -70,9 +70,8 @@ class PolicyParameters:
     aside_free: float = 0.02
     overshoot: float = 0.06
     forearm_share: float = 0.2
-    tethered_forearm_share: float = 0.4
-    tethered_approach_distance: float = 0.12
-    tethered_inward: float = 1.0
+    tethered_forearm_share: float = 0.5
+    tethered_approach_distance: float = 0.18
     stages: StageParameters = field(default_factory=StageParameters)
 
 
@@ -239,9 +238,7 @@ class DressingPolicy:
         p = self.parameters
         hand = axis.G(0.0)
         inward = LEFTWARD * (-1.0 if side == 0 else 1.0)
-        opening = inward
-        if tethered:
-            opening = p.tethered_inward * inward + (1.0 - p.tethered_inward) * sleeve.v_c
+        opening = sleeve.v_c if tethered else inward
         share = p.tethered_forearm_share if tethered else p.forearm_share
         direction = (1.0 - share) * opening + share * axis.D(0.0)
         direction = direction / np.linalg.norm(direction)

@@ -1,0 +1,74 @@
+"""The garment as a system: what it does to grippers and person adds up."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from drake_dress.diagrams.person import JointParameters
+from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.body import ArmPose, BodyMeasures
+
+H = 0.005
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    """A coat that hangs close behind the person, so that it drapes over the arms."""
+    pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
+    return make_simulated_station(
+        StationParameters(
+            mesh=make_coat(CoatParameters(), 0.05),
+            material=Material(stretch_stiffness=300.0),
+            time_step=H,
+            measures=BodyMeasures(),
+            posture="standing",
+            arms={"left": pose, "right": pose},
+            joints=JointParameters(),
+            distance_behind=0.35,
+        )
+    )
+
+
+def test_forces_on_grippers_and_person_are_what_moves_the_garment(station: Station) -> None:
+    simulator = Simulator(station.diagram)
+    context = simulator.get_mutable_context()
+    for i, side in enumerate(("left", "right")):
+        port = station.diagram.GetInputPort(f"{side}_gripper.position_command")
+        port.FixValue(context, station.start_grippers[i] + np.array([0.2, 0.0, -0.1]))
+    cloth = station.cloth
+    here = cloth.GetMyContextFromRoot(context)
+    mass = cloth.cloth.mass
+    simulator.Initialize()
+    touched, missing = 0.0, np.zeros(3)
+    for k in range(1, 241):
+        before = mass @ cloth.GetOutputPort("garment_velocity").Eval(here).reshape(-1, 3)
+        simulator.AdvanceTo(k * H + 1e-9)
+        after = mass @ cloth.GetOutputPort("garment_velocity").Eval(here).reshape(-1, 3)
+        on_grippers = sum(
+            cloth.GetOutputPort(f"{side}_gripper_force").Eval(here) for side in ("left", "right")
+        )
+        applied = cloth.GetOutputPort("person_forces").Eval(here)
+        on_person = sum((f.F_Bq_W.translational() for f in applied), np.zeros(3))
+        touched = max(touched, float(np.linalg.norm(on_person)))
+        weight = mass.sum() * cloth.cloth.gravity
+        missing += (after - before) - H * (weight - on_grippers - on_person)
+        contact = cloth.GetOutputPort("contact_force").Eval(here).reshape(-1, 3).sum(axis=0)
+        np.testing.assert_allclose(contact, -on_person, atol=1e-9)
+    assert touched > 0.5
+    # Conjugate gradients stop at a relative residual: what they leave must not pile up.
+    assert np.linalg.norm(missing) < 0.01 * np.linalg.norm(weight) * 240 * H
+
+
+def test_garment_moves_the_arms(station: Station) -> None:
+    simulator = Simulator(station.diagram)
+    context = simulator.get_mutable_context()
+    for i, side in enumerate(("left", "right")):
+        port = station.diagram.GetInputPort(f"{side}_gripper.position_command")
+        port.FixValue(context, station.start_grippers[i] + np.array([0.2, 0.0, -0.1]))
+    plant = station.plant
+    here = plant.GetMyContextFromRoot(context)
+    start = plant.GetPositions(here).copy()
+    simulator.AdvanceTo(1.5)
+    assert np.abs(plant.GetPositions(here) - start).max() > 0.005
