@@ -133,7 +133,7 @@ def _advance(
     new = stage
     if fact.linked:
         new = Stage.DONE if fact.s >= p.done_progress else Stage.DRESS
-        if stage == Stage.DONE and fact.s >= p.done_progress - 0.1:
+        if stage == Stage.DONE and fact.s >= p.done_progress - 0.04:
             new = Stage.DONE
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance:

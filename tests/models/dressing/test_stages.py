@@ -57,7 +57,7 @@ def test_progress_without_the_arm_inside_is_no_progress() -> None:
 def test_a_sleeve_at_the_shoulder_is_done_and_stays_so() -> None:
     state, _ = advance_stages(StageState(), (facts(linked=True, s=1.97), facts()), P, FAR, 1.0)
     assert state.stage[0] == Stage.DONE
-    state, _ = advance_stages(state, (facts(linked=True, s=1.9), facts()), P, FAR, 2.0)
+    state, _ = advance_stages(state, (facts(linked=True, s=1.92), facts()), P, FAR, 2.0)
     assert state.stage[0] == Stage.DONE
     state, _ = advance_stages(state, (facts(linked=False), facts()), P, FAR, 3.0)
     assert state.stage[0] == Stage.PREPARE
