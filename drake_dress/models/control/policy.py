@@ -47,7 +47,10 @@ class PolicyParameters:
         progress_step: advance of s asked for in one step of the prediction (k).
         approach_distance: cap of l_h, m.
         tethered_forearm_share: the same for the second sleeve, from the opening's own normal (0).
+        tethered_inward: how much the second sleeve's approach is inward (1) rather than along its
+            opening's own normal (0).
         tethered_approach_distance: cap of l_h for the second sleeve, m.
+        tethered_behind_distance: the same as behind_distance for the second sleeve, m.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
         aside_free: distance beside that does not count, m.
@@ -70,8 +73,10 @@ class PolicyParameters:
     aside_free: float = 0.02
     overshoot: float = 0.06
     forearm_share: float = 0.2
-    tethered_forearm_share: float = 0.5
-    tethered_approach_distance: float = 0.18
+    tethered_forearm_share: float = 0.3
+    tethered_approach_distance: float = 0.15
+    tethered_inward: float = 0.7
+    tethered_behind_distance: float = 0.0
     stages: StageParameters = field(default_factory=StageParameters)
 
 
@@ -238,7 +243,8 @@ class DressingPolicy:
         p = self.parameters
         hand = axis.G(0.0)
         inward = LEFTWARD * (-1.0 if side == 0 else 1.0)
-        opening = sleeve.v_c if tethered else inward
+        inward_share = p.tethered_inward if tethered else 1.0
+        opening = inward_share * inward + (1.0 - inward_share) * sleeve.v_c
         share = p.tethered_forearm_share if tethered else p.forearm_share
         direction = (1.0 - share) * opening + share * axis.D(0.0)
         direction = direction / np.linalg.norm(direction)
@@ -247,11 +253,12 @@ class DressingPolicy:
         cap = p.tethered_approach_distance if tethered else p.approach_distance
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
         goal = hand - (distance - p.overshoot) * direction
-        if distance == cap and not tethered:
+        behind = p.tethered_behind_distance if tethered else p.behind_distance
+        if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
             error = error - FRONT * (FRONT @ error)
             wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
-            goal = hand - cap * direction - min(wait, p.behind_distance) * FRONT
+            goal = hand - cap * direction - min(wait, behind) * FRONT
         return goal, direction
 
     def _target(
