@@ -1,4 +1,4 @@
-"""Makes the README's picture from a log: python docs/make_picture.py run.h5 docs/images/dressing.png [TIME …]."""
+"""Makes the README picture from a log: python docs/make_picture.py run.h5 OUT.png [TIME …]."""
 
 from __future__ import annotations
 

@@ -34,6 +34,7 @@ class Coat:
     armhole_girth: float | None = None
     cuff_girth: float | None = None
     collar_height: float | None = None
+    front_opening: float | None = None  # between the front edges, part of the chest girth
 
 
 @dataclass
@@ -155,7 +156,7 @@ class GlobalMpc:
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.18  # cap of l_h, m
-    waiting_progress: float = 0.4  # least s of a waiting sleeve
+    waiting_progress: float = 0.25  # least s of a waiting sleeve
     force_limit: float = 30.0  # beyond it grippers give way, N
 
 

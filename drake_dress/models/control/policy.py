@@ -26,6 +26,7 @@ from drake_dress.models.dressing.stages import (
     StageState,
     Task,
     advance_stages,
+    retreats,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
@@ -53,6 +54,7 @@ class PolicyParameters:
         tethered_behind_distance: the same as behind_distance for the second sleeve, m.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
+        retreat_distance: how much further back a sleeve goes that missed the hand, m.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
         forearm_share: direction of approach, between inward across the body (0) and the
@@ -70,6 +72,7 @@ class PolicyParameters:
     approach_distance: float = 0.18
     behind_distance: float = 0.30
     approach_slope: float = 3.0
+    retreat_distance: float = 0.15
     aside_free: float = 0.02
     overshoot: float = 0.06
     forearm_share: float = 0.2
@@ -202,7 +205,10 @@ class DressingPolicy:
                 goals[i] = axes[i][0].G(min(2.0, facts[i].s + p.progress_step))
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(state.stages, facts, p.stages, distance, time)
-        targets = [self._target(x, tasks, i, axes, facts, sleeves) for i in (0, 1)]
+        targets = [
+            self._target(tasks, i, axes, facts, sleeves, retreats(stages, i, p.stages, time))
+            for i in (0, 1)
+        ]
         obstacles = self._obstacles(joints)
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
@@ -230,7 +236,12 @@ class DressingPolicy:
         )
 
     def _prepared(
-        self, axis: ArmAxis, sleeve: SleeveState, side: int, tethered: bool
+        self,
+        axis: ArmAxis,
+        sleeve: SleeveState,
+        side: int,
+        tethered: bool,
+        retreat: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """Returns position and direction of a prepared sleeve (Eq. Jpi).
 
@@ -252,6 +263,8 @@ class DressingPolicy:
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
         cap = p.tethered_approach_distance if tethered else p.approach_distance
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
+        if retreat:
+            return hand - cap * direction - p.retreat_distance * FRONT, direction
         goal = hand - (distance - p.overshoot) * direction
         behind = p.tethered_behind_distance if tethered else p.behind_distance
         if distance == cap:
@@ -263,12 +276,12 @@ class DressingPolicy:
 
     def _target(
         self,
-        x: FloatArray,
         tasks: tuple[Task, Task],
         side: int,
         axes: Sequence[Sequence[ArmAxis]],
         facts: Sequence[SleeveFacts],
         sleeves: Sequence[SleeveState],
+        retreat: bool,
     ) -> SleeveTarget:
         p, n = self.parameters, self.parameters.horizon
         task = tasks[side]
@@ -277,7 +290,7 @@ class DressingPolicy:
             axis = axes[side][j + 1]
             if task in (Task.PREPARE, Task.REST) or not facts[side].linked:
                 position[j], direction[j] = self._prepared(
-                    axis, sleeves[side], side, facts[1 - side].linked
+                    axis, sleeves[side], side, facts[1 - side].linked, retreat
                 )
                 continue
             if task == Task.DRESS:

@@ -65,14 +65,16 @@ class StageParameters:
         done_progress: s from which a sleeve is done.
         reach: distance two armholes can be apart, m (φ_c).
         insertion_timeout: time after which a dressing without insertion is taken back, s.
+        retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
     """
 
     prepared_distance: float = 0.03
     missed_distance: float = 0.08
-    waiting_progress: float = 0.5
+    waiting_progress: float = 0.25
     done_progress: float = 1.95
     reach: float = 0.45
     insertion_timeout: float = 8.0
+    retreat_time: float = 2.5
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,8 @@ def _advance(
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance:
             new = Stage.DRESS
+        elif fact.hand_distance < p.reach and time - state.since[side] > 2.0 * p.insertion_timeout:
+            return _again(state, side, time)
     elif (
         fact.passed > p.missed_distance
         or time - state.since[side] > p.insertion_timeout
@@ -146,10 +150,24 @@ def _advance(
         new = Stage.PREPARE
     if new == stage:
         return state
-    stages, since, attempts = list(state.stage), list(state.since), list(state.attempts)
+    stages, since = list(state.stage), list(state.since)
     stages[side], since[side] = new, time
-    if new == Stage.PREPARE:
-        attempts[side] += 1
-    return StageState(
-        (stages[0], stages[1]), state.first, (since[0], since[1]), (attempts[0], attempts[1])
+    state = replace(state, stage=(stages[0], stages[1]), since=(since[0], since[1]))
+    return _again(state, side, time) if new == Stage.PREPARE else state
+
+
+def _again(state: StageState, side: int, time: float) -> StageState:
+    """Returns the state in which a sleeve that missed the hand begins anew."""
+    since, attempts = list(state.since), list(state.attempts)
+    since[side] = time
+    attempts[side] += 1
+    return replace(state, since=(since[0], since[1]), attempts=(attempts[0], attempts[1]))
+
+
+def retreats(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
+    """Returns whether a sleeve has missed the hand a moment ago and shall keep away from it."""
+    return (
+        state.attempts[side] > 0
+        and state.stage[side] == Stage.PREPARE
+        and time - state.since[side] < parameters.retreat_time
     )

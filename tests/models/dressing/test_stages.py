@@ -5,6 +5,7 @@ from drake_dress.models.dressing.stages import (
     StageState,
     Task,
     advance_stages,
+    retreats,
 )
 
 P = StageParameters(reach=0.45, waiting_progress=0.5)
@@ -61,3 +62,15 @@ def test_a_sleeve_at_the_shoulder_is_done_and_stays_so() -> None:
     assert state.stage[0] == Stage.DONE
     state, _ = advance_stages(state, (facts(linked=False), facts()), P, FAR, 3.0)
     assert state.stage[0] == Stage.PREPARE
+
+
+def test_a_sleeve_that_misses_the_hand_keeps_away_before_it_tries_again() -> None:
+    near = facts(hand=0.1)
+    state, _ = advance_stages(StageState(), (near, facts()), P, FAR, 0.0)
+    assert not retreats(state, 0, P, 0.0)
+    late = 2.0 * P.insertion_timeout + 0.1
+    state, _ = advance_stages(state, (near, facts()), P, FAR, late)
+    assert state.stage[0] == Stage.PREPARE
+    assert state.attempts == (1, 0)
+    assert retreats(state, 0, P, late + 1.0)
+    assert not retreats(state, 0, P, late + P.retreat_time + 0.1)
