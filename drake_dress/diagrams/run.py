@@ -17,6 +17,7 @@ from drake_dress.diagrams.build import controller_policy, plant_station, rates
 from drake_dress.diagrams.dressing import Dressing, is_finished, make_dressing
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
+from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog, RunLogWriter
 from drake_dress.report.measures import measure
@@ -103,33 +104,33 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> bool
     terminal = sys.stderr.isatty()
     console = Console(stderr=True)
     done_since, told = np.inf, 0.0
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not terminal,
-    ) as progress:
+    with (
+        caught_interrupt() as interrupt,
+        Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            disable=not terminal,
+        ) as progress,
+    ):
         task = progress.add_task("dressing", total=duration)
         now = 0.0
-        try:
-            while now < duration:
-                now = min(duration, now + _CHUNK)
-                simulator.AdvanceTo(now)
-                stage = stage_port.Eval(context)
-                names = [("prepare", "dress", "done")[int(s)] for s in stage]
-                progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")
-                if not terminal and now - told >= 5.0 - 1e-9:
-                    told = now
-                    print(f"{now:5.1f} s  left {names[0]}, right {names[1]}", file=sys.stderr)
-                done_since = min(done_since, now) if is_finished(stage) else np.inf
-                if now - done_since >= _STAY:
-                    break
-        except KeyboardInterrupt:
-            return True
-    return False
+        while now < duration and not interrupt.is_set():
+            now = min(duration, now + _CHUNK)
+            simulator.AdvanceTo(now)
+            stage = stage_port.Eval(context)
+            names = [("prepare", "dress", "done")[int(s)] for s in stage]
+            progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")
+            if not terminal and now - told >= 5.0 - 1e-9:
+                told = now
+                print(f"{now:5.1f} s  left {names[0]}, right {names[1]}", file=sys.stderr)
+            done_since = min(done_since, now) if is_finished(stage) else np.inf
+            if now - done_since >= _STAY:
+                break
+        return interrupt.is_set()
 
 
 def _conclude(out: Path, wall_time: float) -> tuple[bool, str | None]:

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.geometry import Capsule, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
+from drake_dress.interrupt import caught_interrupt
 from drake_dress.report.log import SIDES, RunLog
 from drake_dress.systems.garment_visualizer import DressingScene
 
@@ -31,16 +32,13 @@ def show_replay(path: str | Path, port: int | None = None) -> int:
         if not len(log):
             print(f"{path}: nothing was logged", flush=True)
             return 0
-        try:
+        with caught_interrupt() as interrupt:
             meshcat = Meshcat(MeshcatParams(host="localhost", port=port))
             url = meshcat.web_url()
             print(f"{path}: {log.time[-1]:.1f} s at {url} (Stop or Ctrl-C ends)", flush=True)
             replay = MeshcatReplay(meshcat, log)
-            while not replay.stopped:
+            while not (replay.stopped or interrupt.wait(_POLL_PERIOD)):
                 replay.update()
-                clock.sleep(_POLL_PERIOD)
-        except KeyboardInterrupt:
-            pass
     return 0
 
 

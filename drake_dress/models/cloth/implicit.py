@@ -26,6 +26,7 @@ from drake_dress.models.cloth.filtered_cg import (
     STICK,
     filtered_cg,
     matrix_product,
+    project,
 )
 from drake_dress.models.cloth.forces import filtered_product, internal_force, prepare_filtered
 from drake_dress.models.cloth.material import Material
@@ -195,21 +196,14 @@ class ImplicitCloth:
         friction = np.zeros_like(x)
         _initial_friction(state.reaction, near.normal, m.friction * h, mode, friction)
 
-        velocity = v + h * self.gravity
-        velocity[self.held] = held_velocity
+        velocity = self._start(v, held_velocity, mode, near.normal, rhs)
         total, residual, passes, changed = 0, 0.0, 0, 1
         refactored = self._renew_factor(mode)
-        impulse = np.empty_like(x)
         while True:
             _prescribe(mode, near.normal, near.surface_velocity, push, velocity)
             iterations, residual = self._solve(mode, near.normal, rhs + friction, velocity)
             total += iterations
-            matrix_product(
-                self._linear.indptr, self._linear.indices, self._linear.data, velocity, impulse
-            )
-            filtered_product(
-                velocity, e.triangle, e.triangle_gradient, self._block, self._scale, impulse
-            )
+            impulse = self._product(velocity)
             impulse -= rhs
             passes += 1
             if passes >= self._max_passes:
@@ -243,6 +237,37 @@ class ImplicitCloth:
             np.where(touching, near.owner, -1).astype(np.int32),
         )
         return after, StepInfo(passes, total, residual, refactored)
+
+    def _start(
+        self,
+        v: FloatArray,
+        held_velocity: FloatArray,
+        mode: IntArray,
+        normal: FloatArray,
+        rhs: FloatArray,
+    ) -> FloatArray:
+        """Returns where conjugate gradients start: at rest in motion or in free fall.
+
+        A hanging garment keeps its velocity, a falling one gains h g; whichever leaves the smaller
+        residual. Starting a hanging coat from free fall doubled the iterations.
+        """
+        best, least = v, np.inf
+        for start in (v.copy(), v + self.time_step * self.gravity):
+            start[self.held] = held_velocity
+            residual = self._product(start) - rhs
+            project(residual, mode, normal)
+            size = float(np.sum(residual**2))
+            if size < least:
+                best, least = start, size
+        return best
+
+    def _product(self, velocity: FloatArray) -> FloatArray:
+        """Returns the system matrix times `velocity` (n,3)."""
+        out = np.empty_like(velocity)
+        matrix_product(self._linear.indptr, self._linear.indices, self._linear.data, velocity, out)
+        e = self.elements
+        filtered_product(velocity, e.triangle, e.triangle_gradient, self._block, self._scale, out)
+        return out
 
     def _renew_factor(self, mode: IntArray) -> bool:
         """Makes a factor of P without the sticking nodes when the last one has become stale."""

@@ -74,7 +74,7 @@ class PolicyParameters:
     approach_slope: float = 3.0
     retreat_distance: float = 0.15
     aside_free: float = 0.02
-    overshoot: float = 0.06
+    overshoot: float = 0.10
     forearm_share: float = 0.2
     tethered_forearm_share: float = 0.3
     tethered_approach_distance: float = 0.15
