@@ -45,6 +45,8 @@ _LARGEST_PUSH = 0.2
 # Tangential speed above which a node lands sliding, m/s.
 _LANDING_SLIP_SPEED = 5e-3
 _REFACTOR_AFTER = 40
+# The passes before the last only find the modes: their tolerance is this much coarser.
+_COARSER = 6.0
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
 
@@ -111,7 +113,7 @@ class ImplicitCloth:
         time_step: float,
         held: IntArray,
         gravity: FloatArray = GRAVITY,
-        tolerance: float = 1e-3,
+        tolerance: float = 5e-3,
         max_iterations: int = 40,
         max_passes: int = 2,
         sample_elements: bool = True,
@@ -201,12 +203,16 @@ class ImplicitCloth:
         refactored = self._renew_factor(mode)
         while True:
             _prescribe(mode, near.normal, near.surface_velocity, push, velocity)
-            iterations, residual = self._solve(mode, near.normal, rhs + friction, velocity)
+            last = passes + 1 >= self._max_passes
+            tolerance = self._tolerance if last else _COARSER * self._tolerance
+            iterations, residual = self._solve(
+                mode, near.normal, rhs + friction, velocity, tolerance
+            )
             total += iterations
             impulse = self._product(velocity)
             impulse -= rhs
             passes += 1
-            if passes >= self._max_passes:
+            if last:
                 break
             changed = _update_modes(
                 near.gap,
@@ -219,7 +225,10 @@ class ImplicitCloth:
                 mode,
                 friction,
             )
-            if changed <= _TOLERATED_CHANGES * np.count_nonzero(mode):
+            if (
+                changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
+                and residual <= self._tolerance
+            ):
                 break
         if residual > 0.1:
             self._factor = None
@@ -286,7 +295,12 @@ class ImplicitCloth:
         return stale
 
     def _solve(
-        self, mode: IntArray, normal: FloatArray, rhs: FloatArray, velocity: FloatArray
+        self,
+        mode: IntArray,
+        normal: FloatArray,
+        rhs: FloatArray,
+        velocity: FloatArray,
+        tolerance: float,
     ) -> tuple[int, float]:
         f, e = self._factor, self.elements
         assert f is not None
@@ -310,7 +324,7 @@ class ImplicitCloth:
             normal,
             rhs,
             velocity,
-            self._tolerance,
+            tolerance,
             self._max_iterations,
         )
 
