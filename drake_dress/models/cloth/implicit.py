@@ -45,6 +45,8 @@ _LARGEST_PUSH = 0.2
 # Tangential speed above which a node lands sliding, m/s.
 _LANDING_SLIP_SPEED = 5e-3
 _REFACTOR_AFTER = 40
+# Gap within which a node may land during a step, m.
+_NEAR = 0.05
 # The passes before the last only find the modes: their tolerance is this much coarser.
 _COARSER = 6.0
 # Share of the nodes in contact whose mode may still change without another pass.
@@ -201,9 +203,10 @@ class ImplicitCloth:
         velocity = self._start(v, held_velocity, mode, near.normal, rhs)
         total, residual, passes, changed = 0, 0.0, 0, 1
         refactored = self._renew_factor(mode)
+        max_passes = self._max_passes if np.any(near.gap < _NEAR) else 1
         while True:
             _prescribe(mode, near.normal, near.surface_velocity, push, velocity)
-            last = passes + 1 >= self._max_passes
+            last = passes + 1 >= max_passes
             tolerance = self._tolerance if last else _COARSER * self._tolerance
             iterations, residual = self._solve(
                 mode, near.normal, rhs + friction, velocity, tolerance
@@ -416,7 +419,7 @@ def _update_modes(  # type: ignore[no-untyped-def]
             for c in range(3):
                 along += normal[i, c] * (velocity[i, c] - surface_velocity[i, c])
                 friction[i, c] = 0.0
-            if gap[i] < 0.05 and along < push[i] - 1e-6 and (gap[i] > 0.0 or along < -1e-6):
+            if gap[i] < _NEAR and along < push[i] - 1e-6 and (gap[i] > 0.0 or along < -1e-6):
                 mode[i] = _landing_mode(velocity, surface_velocity, normal, i)
                 changed += 1
             continue
