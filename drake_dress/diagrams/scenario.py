@@ -94,7 +94,7 @@ class Measures:
 class Arm:
     """Rest pose of an arm, degrees; all zero hangs straight down."""
 
-    abduction_deg: float = 32.0  # sideways
+    abduction_deg: float = 20.0  # sideways
     extension_deg: float = 46.0  # backward
     rotation_deg: float = 0.0  # about its own axis
     elbow_deg: float = 10.0  # flexion
@@ -135,11 +135,13 @@ class Weights:
     """Of the global controller's costs; see models/control/global_mpc.py."""
 
     position: float = 1.0
-    direction: float = 0.01
+    direction: float = 0.05
     speed: float = 0.5
     safety: float = 3e-4
     free_force: float = 5.0  # N
     separation: float = 10.0
+    clearance: float = 10.0
+    free_clearance: float = 0.05  # m
 
 
 @dataclass
@@ -155,7 +157,7 @@ class GlobalMpc:
     max_speed: float = 0.12  # of a gripper, m/s
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04  # advance of s asked for per step (k)
-    approach_distance: float = 0.18  # cap of l_h, m
+    approach_distance: float = 0.20  # cap of l_h, m
     waiting_progress: float = 0.25  # least s of a waiting sleeve
     force_limit: float = 30.0  # beyond it grippers give way, N
 
@@ -276,6 +278,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.safety": (0.0, 1e6),
     "weights.free_force": (0.0, 1e3),
     "weights.separation": (0.0, 1e6),
+    "weights.clearance": (0.0, 1e6),
+    "weights.free_clearance": (0.0, 1.0),
     "command_rate": (10.0, 1000.0),
     "gripper.max_speed": (0.001, 2.0),
     "gripper.max_acceleration": (0.01, 50.0),

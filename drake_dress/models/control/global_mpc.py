@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drake_dress.models.cloth.detection import find_proximity
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
 from drake_dress.models.cloth.obstacles import Obstacles
@@ -38,6 +39,8 @@ class Weights:
         free_force: gripper force that costs nothing, N.
         separation: on the distance of the grippers beyond what the garment between them spans at
             rest, 1/m²; it is what the force would say too late for a descent to hear.
+        clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
+        free_clearance: distance of a gripper to the person's skin that costs nothing, m.
     """
 
     position: float = 1.0
@@ -46,6 +49,8 @@ class Weights:
     safety: float = 1e-4
     free_force: float = 5.0
     separation: float = 10.0
+    clearance: float = 10.0
+    free_clearance: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -167,7 +172,7 @@ class GlobalController:
         scale = 1.0 / (2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed))
         length = 1.0
         while iterations < self.max_iterations:
-            gradient = self._gradient(now, velocity, targets)
+            gradient = self._gradient(now, velocity, targets, obstacles)
             descent = scale[:, None, None] * gradient
             accepted = False
             for _ in range(5):
@@ -234,6 +239,7 @@ class GlobalController:
             sleeves.append((pair[0], pair[1]))
             apart = self._apart(x)
             cost += w.separation * max(0.0, float(np.linalg.norm(apart)) - self._span) ** 2
+            cost += self._clearance(x, obstacles[j])[0]
         return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
 
     def _apart(self, x: FloatArray) -> FloatArray:
@@ -242,11 +248,22 @@ class GlobalController:
         apart: FloatArray = left - right
         return apart
 
+    def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
+        """Returns the cost of grippers close to the person, and its derivative by held nodes."""
+        w, count = self.weights, np.array([len(s) for s in self._split])[self._side]
+        if not len(obstacles.radius):
+            return 0.0, np.zeros((len(count), 3))
+        near = find_proximity(x[self.cloth.held], obstacles, w.free_clearance)
+        short = np.maximum(0.0, -near.gap)
+        cost = w.clearance * float(np.sum(short**2 / count))
+        return cost, (-2.0 * w.clearance * short / count)[:, None] * near.normal
+
     def _gradient(
         self,
         rollout: _Rollout,
         velocity: FloatArray,
         targets: tuple[SleeveTarget, SleeveTarget],
+        obstacles: Sequence[Obstacles],
     ) -> FloatArray:
         h, n, w = self.cloth.time_step, self.horizon, self.weights
         gradient = 2.0 * w.speed * h * h * velocity
@@ -288,6 +305,7 @@ class GlobalController:
                 for i, sign in ((0, 1.0), (1, -1.0)):
                     nodes = self.cloth.held[self._split[i]]
                     x_bar[nodes] += sign * pull / len(nodes)
+            x_bar[self.cloth.held] += self._clearance(rollout.states[j], obstacles[j])[1]
             back = self.cloth.vector_jacobian_product(rollout.tapes[j], x_bar, v_bar, held_bar)
             x_bar, v_bar = back.x, back.v
             for i in (0, 1):

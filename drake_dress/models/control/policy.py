@@ -47,18 +47,19 @@ class PolicyParameters:
         weights: of the costs.
         progress_step: advance of s asked for in one step of the prediction (k).
         approach_distance: cap of l_h, m.
-        tethered_forearm_share: the same for the second sleeve, from the opening's own normal (0).
-        tethered_inward: how much the second sleeve's approach is inward (1) rather than along its
-            opening's own normal (0).
-        tethered_approach_distance: cap of l_h for the second sleeve, m.
-        tethered_behind_distance: the same as behind_distance for the second sleeve, m.
-        behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
+        tethered_approach_distance: the same with the other sleeve on, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
+        approach_share: direction in which an armhole is drawn over the hand, between inward across
+            the body (0) and the forearm (1).
+        orientation_share: direction from the armhole to the garment's entry, likewise.
+        behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
+        tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
-        forearm_share: direction of approach, between inward across the body (0) and the
-            forearm (1).
+        dressing_direction: factor on Q while a sleeve is drawn up its arm.
+        waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
+            lets the other one use.
         stages: thresholds of the switching.
     """
 
@@ -69,17 +70,18 @@ class PolicyParameters:
     max_speed: float = 0.12
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04
-    approach_distance: float = 0.18
-    behind_distance: float = 0.30
+    approach_distance: float = 0.20
+    tethered_approach_distance: float = 0.15
     approach_slope: float = 3.0
+    approach_share: float = 0.25
+    orientation_share: float = 0.6
+    behind_distance: float = 0.30
+    tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     aside_free: float = 0.02
     overshoot: float = 0.10
-    forearm_share: float = 0.2
-    tethered_forearm_share: float = 0.3
-    tethered_approach_distance: float = 0.15
-    tethered_inward: float = 0.7
-    tethered_behind_distance: float = 0.0
+    dressing_direction: float = 0.1
+    waiting_reach: float = 0.9
     stages: StageParameters = field(default_factory=StageParameters)
 
 
@@ -149,7 +151,7 @@ class DressingPolicy:
         self._loops = tuple(np.asarray(mesh.loops[f"{side}_armhole"]) for side in SIDES)
         self._signs = tuple(float(loop_orientation(mesh, side)) for side in SIDES)
         left, right = (mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES)
-        span = float(np.linalg.norm(left - right))
+        self._span = span = float(np.linalg.norm(left - right))
         self._entry = find_entry(mesh)
         self.controller = GlobalController(
             cloth,
@@ -243,22 +245,16 @@ class DressingPolicy:
         tethered: bool,
         retreat: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
-        """Returns position and direction of a prepared sleeve (Eq. Jpi).
+        """Returns where a sleeve is prepared, and the direction in which it is entered (Eq. Jpi).
 
-        The opening is drawn over the hand along its own normal d, from outside inward. Before, it
-        is turned as it hangs, or, with the other sleeve on, as the garment's pull has turned it. It
-        waits a cap of l_h outside the hand, and further back (against v_f) until it is in line: so
-        the hand comes in by the open front. An arm that comes from anywhere else meets the outside
-        of the front panel, with the armhole's centre at the hand and the hand not in it.
+        The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
+        outside the hand, and further back (against v_f) until it is in line: so the hand comes in
+        by the open front. An arm that comes from anywhere else meets the outside of the front
+        panel, with the armhole's centre at the hand and the hand not in it.
         """
         p = self.parameters
         hand = axis.G(0.0)
-        inward = LEFTWARD * (-1.0 if side == 0 else 1.0)
-        inward_share = p.tethered_inward if tethered else 1.0
-        opening = inward_share * inward + (1.0 - inward_share) * sleeve.v_c
-        share = p.tethered_forearm_share if tethered else p.forearm_share
-        direction = (1.0 - share) * opening + share * axis.D(0.0)
-        direction = direction / np.linalg.norm(direction)
+        direction = _between(_inward(side), axis.D(0.0), p.approach_share)
         offset = hand - sleeve.p_c
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
         cap = p.tethered_approach_distance if tethered else p.approach_distance
@@ -286,24 +282,42 @@ class DressingPolicy:
         p, n = self.parameters, self.parameters.horizon
         task = tasks[side]
         position, direction = np.empty((n, 3)), np.empty((n, 3))
+        entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
             axis = axes[side][j + 1]
-            if task in (Task.PREPARE, Task.REST) or not facts[side].linked:
-                position[j], direction[j] = self._prepared(
+            if entering:
+                position[j], _ = self._prepared(
                     axis, sleeves[side], side, facts[1 - side].linked, retreat
                 )
+                direction[j] = _between(_inward(side), axis.D(0.0), p.orientation_share)
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * p.progress_step
             else:
-                other_hand = axes[1 - side][j + 1].G(0.0)
-                s, _, _ = axis.coordinates(other_hand)
-                s = max(float(s), p.stages.waiting_progress)
+                other, _ = self._prepared(axes[1 - side][j + 1], sleeves[1 - side], 1 - side, True)
+                s = self._waiting_progress(axis, other)
             s = min(2.0, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
-        return SleeveTarget(position, direction)
+        if entering:
+            return SleeveTarget(position, direction, entering=True)
+        return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
+
+    def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
+        """Returns the largest s from which the garment reaches `other` (3,), m (J_w).
+
+        Higher up than that the garment holds the other sleeve back; lower down it could slip off.
+        """
+        least = self.parameters.stages.waiting_progress
+        steps = np.linspace(2.0, least, 41)
+        for s in steps:
+            if (
+                np.linalg.norm(axis.G(float(s)) - other)
+                < self.parameters.waiting_reach * self._span
+            ):
+                return float(s)
+        return least
 
     def _obstacles(self, joints: FloatArray) -> list[Obstacles]:
         """Returns the predicted person at the start of each step."""
@@ -329,3 +343,15 @@ class DressingPolicy:
             omega = np.cross(axis, vb - va) / length2
             predicted.append(Obstacles(rows_a[j], rows_b[j], radius, va, omega))
         return predicted
+
+
+def _inward(side: int) -> FloatArray:
+    """Returns the unit vector from a side of the person to the other."""
+    return LEFTWARD * (-1.0 if side == 0 else 1.0)
+
+
+def _between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
+    """Returns the unit vector between unit vectors `a` (share 0) and `b` (share 1)."""
+    mixed = (1.0 - share) * a + share * b
+    unit: FloatArray = mixed / np.linalg.norm(mixed)
+    return unit

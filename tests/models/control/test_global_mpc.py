@@ -50,21 +50,33 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
     return controller, x, (targets[0], targets[1])
 
 
+def _beside(point: FloatArray) -> Obstacles:
+    """Returns a ball 3 cm from `point`, near enough for the clearance, too far to touch."""
+    center = np.atleast_2d(point + [0.02, 0.01, 0.05])
+    radius = np.array([np.linalg.norm([0.02, 0.01, 0.05]) - 0.03])
+    still = np.zeros((1, 3))
+    return Obstacles(center, center, radius, still, still)
+
+
+@pytest.mark.parametrize("beside", [False, True])
 def test_gradient_of_the_plan_matches_finite_differences(
-    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
+    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]], beside: bool
 ) -> None:
     controller, x, targets = setting
     rng = np.random.default_rng(0)
     velocity = 0.03 * rng.normal(size=(HORIZON, 2, 3))
-    nothing = [Obstacles.none()] * HORIZON
+    grip = x[controller.cloth.held[controller._split[0]]].mean(axis=0)
+    person = [_beside(grip) if beside else Obstacles.none()] * HORIZON
     rest = np.zeros_like(x)
-    rollout = controller._rollout(x, rest, velocity, targets, nothing)
-    gradient = controller._gradient(rollout, velocity, targets)
+    rollout = controller._rollout(x, rest, velocity, targets, person)
+    if beside:
+        assert controller._clearance(x, person[0])[0] > 0.0
+    gradient = controller._gradient(rollout, velocity, targets, person)
     for _ in range(5):
         d = rng.normal(size=velocity.shape)
         step = 1e-6
-        high = controller._rollout(x, rest, velocity + step * d, targets, nothing).cost
-        low = controller._rollout(x, rest, velocity - step * d, targets, nothing).cost
+        high = controller._rollout(x, rest, velocity + step * d, targets, person).cost
+        low = controller._rollout(x, rest, velocity - step * d, targets, person).cost
         assert np.sum(gradient * d) == pytest.approx((high - low) / (2 * step), rel=1e-4)
 
 
