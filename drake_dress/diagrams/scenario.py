@@ -94,8 +94,8 @@ class Measures:
 class Arm:
     """Rest pose of an arm, degrees; all zero hangs straight down."""
 
-    abduction_deg: float = 20.0  # sideways
-    extension_deg: float = 46.0  # backward
+    abduction_deg: float = 10.0  # sideways
+    extension_deg: float = 48.0  # backward
     rotation_deg: float = 0.0  # about its own axis
     elbow_deg: float = 10.0  # flexion
 
@@ -139,7 +139,8 @@ class Weights:
     speed: float = 0.5
     safety: float = 3e-4
     free_force: float = 5.0  # N
-    separation: float = 10.0
+    separation: float = 1.0
+    least_spread: float = 0.7  # share of the grippers' distance at rest
     clearance: float = 10.0
     free_clearance: float = 0.05  # m
 
@@ -278,6 +279,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.safety": (0.0, 1e6),
     "weights.free_force": (0.0, 1e3),
     "weights.separation": (0.0, 1e6),
+    "weights.least_spread": (0.0, 1.0),
     "weights.clearance": (0.0, 1e6),
     "weights.free_clearance": (0.0, 1.0),
     "command_rate": (10.0, 1000.0),

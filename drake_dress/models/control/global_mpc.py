@@ -38,7 +38,8 @@ class Weights:
         safety: w_s on the gripper force beyond `free_force`, 1/N².
         free_force: gripper force that costs nothing, N.
         separation: on the distance of the grippers beyond what the garment between them spans at
-            rest, 1/m²; it is what the force would say too late for a descent to hear.
+            rest, 1/m²; it is what the force would say too late for a descent to hear. Also on
+            what it is short of `least_spread` of that, where the garment collapses.
         clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
         free_clearance: distance of a gripper to the person's skin that costs nothing, m.
     """
@@ -49,6 +50,7 @@ class Weights:
     safety: float = 1e-4
     free_force: float = 5.0
     separation: float = 10.0
+    least_spread: float = 0.7
     clearance: float = 10.0
     free_clearance: float = 0.05
 
@@ -238,7 +240,7 @@ class GlobalController:
                 cost += w.safety * max(0.0, force[j, i] - w.free_force) ** 2
             sleeves.append((pair[0], pair[1]))
             apart = self._apart(x)
-            cost += w.separation * max(0.0, float(np.linalg.norm(apart)) - self._span) ** 2
+            cost += w.separation * self._spread_error(float(np.linalg.norm(apart))) ** 2
             cost += self._clearance(x, obstacles[j])[0]
         return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
 
@@ -247,6 +249,11 @@ class GlobalController:
         left, right = (x[self.cloth.held[self._split[i]]].mean(axis=0) for i in (0, 1))
         apart: FloatArray = left - right
         return apart
+
+    def _spread_error(self, distance: float) -> float:
+        """Returns how far, m, grippers are too far apart (positive) or too close (negative)."""
+        short = distance - self.weights.least_spread * self._span
+        return max(0.0, distance - self._span) + min(0.0, short)
 
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
         """Returns the cost of grippers close to the person, and its derivative by held nodes."""
@@ -300,8 +307,9 @@ class GlobalController:
                     )
             apart = self._apart(rollout.states[j])
             distance = float(np.linalg.norm(apart))
-            if distance > self._span:
-                pull = 2.0 * w.separation * (distance - self._span) * apart / distance
+            error = self._spread_error(distance)
+            if error != 0.0:
+                pull = 2.0 * w.separation * error * apart / distance
                 for i, sign in ((0, 1.0), (1, -1.0)):
                     nodes = self.cloth.held[self._split[i]]
                     x_bar[nodes] += sign * pull / len(nodes)

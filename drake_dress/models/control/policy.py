@@ -14,6 +14,7 @@ from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.control.global_mpc import GlobalController, Plan, SleeveTarget, Weights
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.sight import free_sight
 from drake_dress.models.dressing.sleeve import (
     SleeveState,
     find_entry,
@@ -55,11 +56,14 @@ class PolicyParameters:
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
+        widening: growth of the cap of l_h with each attempt that missed the hand.
+        least_sight: share of an opening that the hand has to see for it to be drawn over.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
+        inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
-            lets the other one use.
+            lets the other one use; the leading one of two that are on their arms likewise.
         stages: thresholds of the switching.
     """
 
@@ -78,8 +82,11 @@ class PolicyParameters:
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
+    widening: float = 0.15
+    least_sight: float = 0.5
     aside_free: float = 0.02
-    overshoot: float = 0.10
+    overshoot: float = 0.12
+    inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
     stages: StageParameters = field(default_factory=StageParameters)
@@ -151,7 +158,9 @@ class DressingPolicy:
         self._loops = tuple(np.asarray(mesh.loops[f"{side}_armhole"]) for side in SIDES)
         self._signs = tuple(float(loop_orientation(mesh, side)) for side in SIDES)
         left, right = (mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES)
-        self._span = span = float(np.linalg.norm(left - right))
+        centers = [mesh.rest_position[loop].mean(axis=0) for loop in self._loops]
+        self._reach = float(np.linalg.norm(centers[0] - centers[1]))
+        span = float(np.linalg.norm(left - right))
         self._entry = find_entry(mesh)
         self.controller = GlobalController(
             cloth,
@@ -201,14 +210,25 @@ class DressingPolicy:
             self._facts(x, joints[0], axes[0][0], sleeves[0], 0),
             self._facts(x, joints[0], axes[1][0], sleeves[1], 1),
         )
-        goals = [self._prepared(axes[i][0], sleeves[i], i, facts[1 - i].linked)[0] for i in (0, 1)]
+        goals = [
+            self._prepared(axes[i][0], sleeves[i], i, facts[1 - i].linked, facts[i].in_sight)[0]
+            for i in (0, 1)
+        ]
         for i in (0, 1):
             if facts[i].linked:
                 goals[i] = axes[i][0].G(min(2.0, facts[i].s + p.progress_step))
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(state.stages, facts, p.stages, distance, time)
         targets = [
-            self._target(tasks, i, axes, facts, sleeves, retreats(stages, i, p.stages, time))
+            self._target(
+                tasks,
+                i,
+                axes,
+                facts,
+                sleeves,
+                retreats(stages, i, p.stages, time),
+                stages.attempts,
+            )
             for i in (0, 1)
         ]
         obstacles = self._obstacles(joints)
@@ -226,11 +246,13 @@ class DressingPolicy:
         interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
         linked = abs(arm_linking_number(x[self._loops[side]], shoulder, elbow, hand, interior)) == 1
         s, _, _ = axis.coordinates(sleeve.p_c)
-        _, direction = self._prepared(axis, sleeve, side, False)
+        direction = _between(_inward(side), axis.D(0.0), self.parameters.approach_share)
         offset = hand - sleeve.p_c
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
+        sight = free_sight(x, self.mesh.faces, self._loops[side], hand)
         return SleeveFacts(
             linked=linked,
+            in_sight=sight >= self.parameters.least_sight,
             s=float(s) if linked else 0.0,
             hand_distance=float(np.linalg.norm(hand - sleeve.p_c)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
@@ -243,14 +265,17 @@ class DressingPolicy:
         sleeve: SleeveState,
         side: int,
         tethered: bool,
+        in_sight: bool,
         retreat: bool = False,
+        attempts: int = 0,
     ) -> tuple[FloatArray, FloatArray]:
         """Returns where a sleeve is prepared, and the direction in which it is entered (Eq. Jpi).
 
         The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
         outside the hand, and further back (against v_f) until it is in line: so the hand comes in
         by the open front. An arm that comes from anywhere else meets the outside of the front
-        panel, with the armhole's centre at the hand and the hand not in it.
+        panel, with the armhole's centre at the hand and the hand not in it; so an opening that the
+        hand does not see stays outside, further with each attempt.
         """
         p = self.parameters
         hand = axis.G(0.0)
@@ -258,10 +283,18 @@ class DressingPolicy:
         offset = hand - sleeve.p_c
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
         cap = p.tethered_approach_distance if tethered else p.approach_distance
+        cap *= 1.0 + p.widening * min(attempts, 3)
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
+        if not in_sight:
+            distance = cap
         if retreat:
             return hand - cap * direction - p.retreat_distance * FRONT, direction
-        goal = hand - (distance - p.overshoot) * direction
+        # Once the hand is in the opening, drawing further inward would pull the garment past it.
+        depth = float(offset @ -sleeve.v_c)
+        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
+        inside = min(1.0, max(0.0, (depth + 0.02) / 0.04)) if beside < p.inside_radius else 0.0
+        onward = (1.0 - inside) * direction + inside * axis.D(0.0)
+        goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
         if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
@@ -278,6 +311,7 @@ class DressingPolicy:
         facts: Sequence[SleeveFacts],
         sleeves: Sequence[SleeveState],
         retreat: bool,
+        attempts: tuple[int, int],
     ) -> SleeveTarget:
         p, n = self.parameters, self.parameters.horizon
         task = tasks[side]
@@ -287,14 +321,27 @@ class DressingPolicy:
             axis = axes[side][j + 1]
             if entering:
                 position[j], _ = self._prepared(
-                    axis, sleeves[side], side, facts[1 - side].linked, retreat
+                    axis,
+                    sleeves[side],
+                    side,
+                    facts[1 - side].linked,
+                    facts[side].in_sight,
+                    retreat,
+                    attempts[side],
                 )
                 direction[j] = _between(_inward(side), axis.D(0.0), p.orientation_share)
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * p.progress_step
+                k = 1 - side
+                if facts[k].linked and facts[k].s < facts[side].s:
+                    lagging = axes[k][j + 1].G(min(2.0, facts[k].s + (j + 1) * p.progress_step))
+                    s = min(s, self._waiting_progress(axis, lagging))
             else:
-                other, _ = self._prepared(axes[1 - side][j + 1], sleeves[1 - side], 1 - side, True)
+                k = 1 - side
+                other, _ = self._prepared(
+                    axes[k][j + 1], sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
+                )
                 s = self._waiting_progress(axis, other)
             s = min(2.0, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
@@ -314,7 +361,7 @@ class DressingPolicy:
         for s in steps:
             if (
                 np.linalg.norm(axis.G(float(s)) - other)
-                < self.parameters.waiting_reach * self._span
+                < self.parameters.waiting_reach * self._reach
             ):
                 return float(s)
         return least

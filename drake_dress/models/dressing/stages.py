@@ -44,6 +44,7 @@ class SleeveFacts:
         prepared_error: distance of the armhole centre to where preparing ends, m.
         passed: how far the armhole centre has gone past the hand toward the shoulder beside
             the arm, along the arm, m; 0 or less before the hand.
+        in_sight: nothing of the garment hangs between hand and armhole.
     """
 
     linked: bool
@@ -51,6 +52,7 @@ class SleeveFacts:
     hand_distance: float
     prepared_error: float
     passed: float
+    in_sight: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class StageParameters:
         done_progress: s from which a sleeve is done.
         reach: distance two armholes can be apart, m (φ_c).
         insertion_timeout: time after which a dressing without insertion is taken back, s.
+        barred_distance: an armhole this close to a hand that does not see it is barred, m.
+        barred_timeout: time after which a barred sleeve is taken back, s.
         retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
     """
 
@@ -74,6 +78,8 @@ class StageParameters:
     done_progress: float = 1.95
     reach: float = 0.45
     insertion_timeout: float = 8.0
+    barred_distance: float = 0.2
+    barred_timeout: float = 5.0
     retreat_time: float = 2.5
 
 
@@ -138,12 +144,13 @@ def _advance(
         if stage == Stage.DONE and fact.s >= p.done_progress - 0.04:
             new = Stage.DONE
     elif stage == Stage.PREPARE:
-        if fact.prepared_error < p.prepared_distance:
+        if fact.prepared_error < p.prepared_distance and fact.in_sight:
             new = Stage.DRESS
-        elif fact.hand_distance < p.reach and time - state.since[side] > 2.0 * p.insertion_timeout:
+        elif _stuck(fact, p, time - state.since[side]):
             return _again(state, side, time)
     elif (
         fact.passed > p.missed_distance
+        or not fact.in_sight
         or time - state.since[side] > p.insertion_timeout
         or stage == Stage.DONE
     ):
@@ -154,6 +161,14 @@ def _advance(
     stages[side], since[side] = new, time
     state = replace(state, stage=(stages[0], stages[1]), since=(since[0], since[1]))
     return _again(state, side, time) if new == Stage.PREPARE else state
+
+
+def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
+    """Returns whether a sleeve has been prepared for too long, near the hand or barred from it."""
+    barred = not fact.in_sight and fact.hand_distance < p.barred_distance
+    return (barred and duration > p.barred_timeout) or (
+        fact.hand_distance < p.reach and duration > 2.0 * p.insertion_timeout
+    )
 
 
 def _again(state: StageState, side: int, time: float) -> StageState:
