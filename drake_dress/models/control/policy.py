@@ -27,6 +27,7 @@ from drake_dress.models.dressing.stages import (
     StageState,
     Task,
     advance_stages,
+    eases,
     retreats,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -82,7 +83,7 @@ class PolicyParameters:
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
-    widening: float = 0.15
+    widening: float = 0.1
     least_sight: float = 0.5
     aside_free: float = 0.02
     overshoot: float = 0.12
@@ -210,13 +211,7 @@ class DressingPolicy:
             self._facts(x, joints[0], axes[0][0], sleeves[0], 0),
             self._facts(x, joints[0], axes[1][0], sleeves[1], 1),
         )
-        goals = [
-            self._prepared(axes[i][0], sleeves[i], i, facts[1 - i].linked, facts[i].in_sight)[0]
-            for i in (0, 1)
-        ]
-        for i in (0, 1):
-            if facts[i].linked:
-                goals[i] = axes[i][0].G(min(2.0, facts[i].s + p.progress_step))
+        goals = [self._waypoint(axes[i][0], facts[i], i) for i in (0, 1)]
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(state.stages, facts, p.stages, distance, time)
         targets = [
@@ -227,6 +222,7 @@ class DressingPolicy:
                 facts,
                 sleeves,
                 retreats(stages, i, p.stages, time),
+                eases(stages, i, p.stages, time),
                 stages.attempts,
             )
             for i in (0, 1)
@@ -238,6 +234,14 @@ class DressingPolicy:
         plan = self.controller.solve(x, v, (targets[0], targets[1]), obstacles, guess)
         decision = Decision(plan, tasks, facts, np.stack([targets[i].position[-1] for i in (0, 1)]))
         return replace(state, stages=stages, velocity=plan.velocity), decision
+
+    def _waypoint(self, axis: ArmAxis, fact: SleeveFacts, side: int) -> FloatArray:
+        """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
+        p = self.parameters
+        if fact.linked:
+            return axis.G(min(2.0, fact.s + p.progress_step))
+        direction = _between(_inward(side), axis.D(0.0), p.approach_share)
+        return axis.G(0.0) - p.approach_distance * direction
 
     def _facts(
         self, x: FloatArray, joints: FloatArray, axis: ArmAxis, sleeve: SleeveState, side: int
@@ -275,13 +279,20 @@ class DressingPolicy:
         outside the hand, and further back (against v_f) until it is in line: so the hand comes in
         by the open front. An arm that comes from anywhere else meets the outside of the front
         panel, with the armhole's centre at the hand and the hand not in it; so an opening that the
-        hand does not see stays outside, further with each attempt.
+        hand does not see stays outside. One that faces the hand is drawn along its own normal, and
+        along the forearm once the hand is in it: further inward it would be pulled past the hand.
         """
         p = self.parameters
         hand = axis.G(0.0)
         direction = _between(_inward(side), axis.D(0.0), p.approach_share)
         offset = hand - sleeve.p_c
+        # Depth of the hand behind the opening, and how far it is beside the opening's normal.
+        depth = float(offset @ -sleeve.v_c)
+        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
+        facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if in_sight else 0.0
+        inside = facing * _ramp(depth, -0.02, 0.02)
         aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
+        aside *= 1.0 - facing
         cap = p.tethered_approach_distance if tethered else p.approach_distance
         cap *= 1.0 + p.widening * min(attempts, 3)
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
@@ -289,11 +300,7 @@ class DressingPolicy:
             distance = cap
         if retreat:
             return hand - cap * direction - p.retreat_distance * FRONT, direction
-        # Once the hand is in the opening, drawing further inward would pull the garment past it.
-        depth = float(offset @ -sleeve.v_c)
-        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
-        inside = min(1.0, max(0.0, (depth + 0.02) / 0.04)) if beside < p.inside_radius else 0.0
-        onward = (1.0 - inside) * direction + inside * axis.D(0.0)
+        onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
         if distance == cap:
@@ -311,6 +318,7 @@ class DressingPolicy:
         facts: Sequence[SleeveFacts],
         sleeves: Sequence[SleeveState],
         retreat: bool,
+        ease: bool,
         attempts: tuple[int, int],
     ) -> SleeveTarget:
         p, n = self.parameters, self.parameters.horizon
@@ -332,7 +340,8 @@ class DressingPolicy:
                 direction[j] = _between(_inward(side), axis.D(0.0), p.orientation_share)
                 continue
             if task == Task.DRESS:
-                s = facts[side].s + (j + 1) * p.progress_step
+                step = -p.progress_step if ease else p.progress_step
+                s = facts[side].s + (j + 1) * step
                 k = 1 - side
                 if facts[k].linked and facts[k].s < facts[side].s:
                     lagging = axes[k][j + 1].G(min(2.0, facts[k].s + (j + 1) * p.progress_step))
@@ -395,6 +404,11 @@ class DressingPolicy:
 def _inward(side: int) -> FloatArray:
     """Returns the unit vector from a side of the person to the other."""
     return LEFTWARD * (-1.0 if side == 0 else 1.0)
+
+
+def _ramp(value: float, zero: float, one: float) -> float:
+    """Returns 0 beyond `zero`, 1 beyond `one`, linear between."""
+    return min(1.0, max(0.0, (value - zero) / (one - zero)))
 
 
 def _between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:

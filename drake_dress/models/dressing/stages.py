@@ -69,6 +69,9 @@ class StageParameters:
         insertion_timeout: time after which a dressing without insertion is taken back, s.
         barred_distance: an armhole this close to a hand that does not see it is barred, m.
         barred_timeout: time after which a barred sleeve is taken back, s.
+        stall_timeout: time without progress after which a sleeve gives way, s.
+        stall_progress: advance of s that counts as progress.
+        easing_time: for which it gives way, s.
         retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
     """
 
@@ -80,17 +83,29 @@ class StageParameters:
     insertion_timeout: float = 8.0
     barred_distance: float = 0.2
     barred_timeout: float = 5.0
+    stall_timeout: float = 3.0
+    stall_progress: float = 0.03
+    easing_time: float = 1.5
     retreat_time: float = 2.5
 
 
 @dataclass(frozen=True)
 class StageState:
-    """Stages of left and right sleeve, who goes first, and since when each stage lasts, s."""
+    """Stages of left and right sleeve, and what has to be remembered to switch them.
+
+    Attributes:
+        stage: of each sleeve; since: when it began, s.
+        first: sleeve that goes first, -1 before it is known.
+        attempts: how often each sleeve missed the hand.
+        best: greatest s since the last stall; best_time: when it was reached, s.
+    """
 
     stage: tuple[Stage, Stage] = (Stage.PREPARE, Stage.PREPARE)
     first: int = -1
     since: tuple[float, float] = (0.0, 0.0)
     attempts: tuple[int, int] = (0, 0)
+    best: tuple[float, float] = (0.0, 0.0)
+    best_time: tuple[float, float] = (0.0, 0.0)
 
 
 def advance_stages(
@@ -111,6 +126,7 @@ def advance_stages(
     """
     for side in (0, 1):
         state = _advance(state, side, facts[side], parameters, time)
+        state = _remember(state, side, facts, parameters, time)
     on_arm = [facts[i].linked and state.stage[i] != Stage.PREPARE for i in (0, 1)]
     if state.first < 0:
         nearer = 0 if facts[0].hand_distance <= facts[1].hand_distance else 1
@@ -161,6 +177,33 @@ def _advance(
     stages[side], since[side] = new, time
     state = replace(state, stage=(stages[0], stages[1]), since=(since[0], since[1]))
     return _again(state, side, time) if new == Stage.PREPARE else state
+
+
+def _remember(
+    state: StageState,
+    side: int,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    p: StageParameters,
+    time: float,
+) -> StageState:
+    """Returns the state with the progress of one sleeve; one that waits does not stall."""
+    fact, other = facts[side], facts[1 - side]
+    waits = other.s < fact.s
+    over = time - state.best_time[side] > p.stall_timeout + p.easing_time
+    if fact.linked and fact.s <= state.best[side] + p.stall_progress and not (waits or over):
+        return state
+    best, best_time = list(state.best), list(state.best_time)
+    best[side], best_time[side] = fact.s, time
+    return replace(state, best=(best[0], best[1]), best_time=(best_time[0], best_time[1]))
+
+
+def eases(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
+    """Returns whether a sleeve that stalled on its arm shall give way before it is drawn again."""
+    return (
+        state.stage[side] == Stage.DRESS
+        and state.best[side] < parameters.done_progress - 0.1
+        and time - state.best_time[side] > parameters.stall_timeout
+    )
 
 
 def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
