@@ -159,7 +159,7 @@ class GlobalMpc:
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.20  # cap of l_h, m
-    waiting_progress: float = 0.25  # least s of a waiting sleeve
+    waiting_progress: float = 0.3  # least s of a waiting sleeve
     force_limit: float = 30.0  # beyond it grippers give way, N
 
 

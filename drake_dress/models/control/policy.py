@@ -64,7 +64,8 @@ class PolicyParameters:
         inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
-            lets the other one use; the leading one of two that are on their arms likewise.
+            lets the other one use.
+        largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
     """
 
@@ -90,6 +91,7 @@ class PolicyParameters:
     inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
+    largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
 
 
@@ -342,10 +344,9 @@ class DressingPolicy:
             if task == Task.DRESS:
                 step = -p.progress_step if ease else p.progress_step
                 s = facts[side].s + (j + 1) * step
-                k = 1 - side
-                if facts[k].linked and facts[k].s < facts[side].s:
-                    lagging = axes[k][j + 1].G(min(2.0, facts[k].s + (j + 1) * p.progress_step))
-                    s = min(s, self._waiting_progress(axis, lagging))
+                other_fact = facts[1 - side]
+                if other_fact.linked:
+                    s = min(s, max(facts[side].s, other_fact.s + p.largest_lead))
             else:
                 k = 1 - side
                 other, _ = self._prepared(

@@ -77,11 +77,11 @@ class StageParameters:
 
     prepared_distance: float = 0.03
     missed_distance: float = 0.08
-    waiting_progress: float = 0.25
+    waiting_progress: float = 0.3
     done_progress: float = 1.95
     reach: float = 0.45
     insertion_timeout: float = 8.0
-    barred_distance: float = 0.2
+    barred_distance: float = 0.4
     barred_timeout: float = 5.0
     stall_timeout: float = 3.0
     stall_progress: float = 0.03
