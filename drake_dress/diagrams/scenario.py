@@ -160,7 +160,7 @@ class GlobalMpc:
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.20  # cap of l_h, m
     waiting_progress: float = 0.3  # least s of a waiting sleeve
-    force_limit: float = 30.0  # beyond it grippers give way, N
+    force_limit: float = 26.0  # beyond it grippers give way, N
 
 
 @dataclass

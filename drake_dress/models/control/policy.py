@@ -65,6 +65,8 @@ class PolicyParameters:
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
+        final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
+            armpit, and both sleeves would pull against each other.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
     """
@@ -91,6 +93,7 @@ class PolicyParameters:
     inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
+    final_progress: float = 1.97
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
 
@@ -353,7 +356,7 @@ class DressingPolicy:
                     axes[k][j + 1], sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
                 )
                 s = self._waiting_progress(axis, other)
-            s = min(2.0, max(0.0, s))
+            s = min(p.final_progress, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
