@@ -1,6 +1,9 @@
 """A short, coarse run from YAML to report."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -40,6 +43,28 @@ def test_same_seed_gives_the_same_numbers(run: tuple[int, Path]) -> None:
     with h5py.File(folder / "out" / "run.h5") as a, h5py.File(folder / "again" / "run.h5") as b:
         for name in ("garment/position", "gripper/left/force", "human/joint_position"):
             np.testing.assert_array_equal(a[name][()], b[name][()])
+
+
+def test_interrupt_leaves_a_log_of_what_had_run(tmp_path: Path) -> None:
+    path = tmp_path / "long.yaml"
+    path.write_text(SCENARIO.replace("1.0", "600.0"))
+    command = [sys.executable, "-m", "drake_dress", "run", str(path), "--no-meshcat"]
+    process = subprocess.Popen(
+        [*command, "--out", str(tmp_path / "out")],
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    assert "5.0 s" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in output
+    with h5py.File(tmp_path / "out" / "run.h5") as log:
+        assert log["time"][-1] >= 4.9
+        assert len(log["garment/position"]) == len(log["time"])
 
 
 def test_grippers_carry_the_coat_and_controller_moves_them(run: tuple[int, Path]) -> None:

@@ -5,6 +5,7 @@ from drake_dress.models.dressing.stages import (
     StageState,
     Task,
     advance_stages,
+    eases,
     retreats,
 )
 
@@ -74,3 +75,46 @@ def test_a_sleeve_that_misses_the_hand_keeps_away_before_it_tries_again() -> Non
     assert state.attempts == (1, 0)
     assert retreats(state, 0, P, late + 1.0)
     assert not retreats(state, 0, P, late + P.retreat_time + 0.1)
+
+
+def test_an_opening_that_the_hand_does_not_see_is_not_dressed() -> None:
+    seen = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0)
+    barred = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0, in_sight=False)
+    state, _ = advance_stages(StageState(), (barred, facts()), P, FAR, 0.0)
+    assert state.stage[0] == Stage.PREPARE
+    state, _ = advance_stages(state, (seen, facts()), P, FAR, 0.5)
+    assert state.stage[0] == Stage.DRESS
+    state, _ = advance_stages(state, (barred, facts()), P, FAR, 1.0)
+    assert state.stage[0] == Stage.PREPARE
+    assert state.attempts == (1, 0)
+
+
+def test_a_sleeve_that_is_barred_for_long_is_taken_back() -> None:
+    barred = SleeveFacts(False, 0.0, 0.2, 0.2, passed=0.0, in_sight=False)
+    state, _ = advance_stages(StageState(), (barred, facts()), P, FAR, 0.0)
+    assert state.attempts == (0, 0)
+    state, _ = advance_stages(state, (barred, facts()), P, FAR, P.barred_timeout + 0.1)
+    assert state.attempts == (1, 0)
+
+
+def test_a_stalled_sleeve_gives_way_and_is_drawn_again() -> None:
+    state = StageState()
+    stalled = (facts(linked=True, s=0.3), facts(linked=True, s=0.9))
+    for time in (0.0, 0.5, P.stall_timeout):
+        state, _ = advance_stages(state, stalled, P, FAR, time)
+        assert not eases(state, 0, P, time)
+    late = P.stall_timeout + 0.5
+    state, _ = advance_stages(state, stalled, P, FAR, late)
+    assert eases(state, 0, P, late)
+    assert not eases(state, 1, P, late)  # the leading sleeve waits, it does not stall
+    over = P.stall_timeout + P.easing_time + 0.5
+    state, _ = advance_stages(state, stalled, P, FAR, over)
+    assert not eases(state, 0, P, over)
+
+
+def test_progress_is_no_stall() -> None:
+    state = StageState()
+    for k in range(20):
+        pair = (facts(linked=True, s=0.2 + 0.05 * k), facts(linked=True, s=1.9))
+        state, _ = advance_stages(state, pair, P, FAR, float(k))
+        assert not eases(state, 0, P, float(k))
