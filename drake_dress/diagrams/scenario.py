@@ -94,8 +94,8 @@ class Measures:
 class Arm:
     """Rest pose of an arm, degrees; all zero hangs straight down."""
 
-    abduction_deg: float = 10.0  # sideways
-    extension_deg: float = 48.0  # backward
+    abduction_deg: float = 13.0  # sideways
+    extension_deg: float = 46.0  # backward
     rotation_deg: float = 0.0  # about its own axis
     elbow_deg: float = 10.0  # flexion
 
@@ -142,7 +142,7 @@ class Weights:
     separation: float = 1.0
     least_spread: float = 0.7  # share of the grippers' distance at rest
     clearance: float = 10.0
-    free_clearance: float = 0.05  # m
+    free_clearance: float = 0.03  # m
 
 
 @dataclass

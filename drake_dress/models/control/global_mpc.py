@@ -52,7 +52,7 @@ class Weights:
     separation: float = 10.0
     least_spread: float = 0.7
     clearance: float = 10.0
-    free_clearance: float = 0.05
+    free_clearance: float = 0.03
 
 
 @dataclass(frozen=True)
