@@ -140,7 +140,7 @@ class Weights:
     safety: float = 3e-4
     free_force: float = 5.0  # N
     separation: float = 1.0
-    least_spread: float = 0.7  # share of the grippers' distance at rest
+    least_spread: float = 0.5  # share of the grippers' distance at rest
     clearance: float = 10.0
     free_clearance: float = 0.03  # m
 

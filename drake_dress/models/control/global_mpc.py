@@ -50,7 +50,7 @@ class Weights:
     safety: float = 1e-4
     free_force: float = 5.0
     separation: float = 10.0
-    least_spread: float = 0.7
+    least_spread: float = 0.5
     clearance: float = 10.0
     free_clearance: float = 0.03
 
