@@ -32,6 +32,10 @@ BAD_YAML = {
     "negative friction": ("plant: {material: {friction: -0.1}}", ["plant.material.friction"]),
     "too fine": ("plant: {spacing: 0.001}", ["plant.spacing", "0.01"]),
     "too coarse": ("controller: {spacing: 0.2}", ["controller.spacing", "0.06"]),
+    "delay between steps": (
+        "controller: {global_mpc: {delay: 0.25}}",
+        ["controller.global_mpc.delay", "multiple of time_step"],
+    ),
     "delay beyond period": (
         "controller: {global_mpc: {period: 0.5, delay: 0.6}}",
         ["controller.global_mpc.delay", "period"],

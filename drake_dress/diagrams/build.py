@@ -55,6 +55,7 @@ def controller_policy(
         horizon=g.horizon,
         max_iterations=g.max_iterations,
         inner_iterations=g.inner_iterations,
+        committed_steps=round(g.delay / g.time_step),
         max_speed=g.max_speed,
         weights=Weights(**vars(g.weights)),
         progress_step=g.progress_step,

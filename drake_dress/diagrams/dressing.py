@@ -30,7 +30,7 @@ class Rates:
     """Periods and delays of the controllers; s, and N for the force limit."""
 
     global_period: float = 0.5
-    global_delay: float = 0.25
+    global_delay: float = 0.2
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
     force_limit: float = 30.0

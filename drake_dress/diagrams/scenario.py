@@ -142,7 +142,7 @@ class Weights:
     separation: float = 1.0
     least_spread: float = 0.5  # share of the grippers' distance at rest
     clearance: float = 10.0
-    free_clearance: float = 0.03  # m
+    free_clearance: float = 0.05  # m
 
 
 @dataclass
@@ -150,9 +150,9 @@ class GlobalMpc:
     """The global controller."""
 
     period: float = 0.5  # between solves, s
-    delay: float = 0.25  # from what is seen to the use of the plan, s
+    delay: float = 0.2  # from what is seen to the use of the plan, s; a multiple of time_step
     time_step: float = 0.1  # of the prediction, s
-    horizon: int = 6  # steps
+    horizon: int = 7  # steps
     max_iterations: int = 3  # gradient steps per solve
     inner_iterations: int = 8  # of the garment's linear solve; 1 is the paper's scheme
     max_speed: float = 0.12  # of a gripper, m/s
@@ -327,6 +327,14 @@ def load_scenario(
             source,
             "controller.global_mpc.delay",
             f"is {mpc.delay} s, expected less than the period, {mpc.period} s",
+        )
+    steps = mpc.delay / mpc.time_step
+    if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:
+        raise UserError(
+            source,
+            "controller.global_mpc.delay",
+            f"is {mpc.delay} s, expected a multiple of time_step, {mpc.time_step} s, "
+            "within the horizon",
         )
     return scenario
 

@@ -52,18 +52,23 @@ class GlobalMpc(LeafSystem):
 
     A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
     however long it really took: the run is the same on any machine. It runs on a thread of its
-    own meanwhile, beside the simulated garment.
+    own meanwhile, beside the simulated garment. What the plan before it does until then is part of
+    the prediction and not changed.
 
     Args:
         policy: does the work.
         period: between solves, s.
-        delay: from what is seen to the use of the plan, s, less than the period.
+        delay: from what is seen to the use of the plan, s, less than the period and as long as
+            the policy's committed steps.
     """
 
     def __init__(self, policy: DressingPolicy, period: float, delay: float) -> None:
         super().__init__()
         if not 0.0 < delay < period:
             raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
+        committed = policy.parameters.committed_steps * policy.parameters.time_step
+        if abs(committed - delay) > 1e-9:
+            raise ValueError(f"delay is {delay} s, expected that of the committed steps")
         self._policy = policy
         self._delay = delay
         self._period = period
@@ -119,8 +124,9 @@ class GlobalMpc(LeafSystem):
         finished = self._pending.result()
         self._pending = None
         decision = finished.decision
+        p = self._policy.parameters
         plan = TimedPlan(
-            context.get_time(), self._policy.parameters.time_step, decision.plan.velocity
+            context.get_time(), p.time_step, decision.plan.velocity[p.committed_steps :]
         )
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)

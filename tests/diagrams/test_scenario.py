@@ -28,7 +28,7 @@ plant: {spacing: 0.03, time_step: 0.005, material: {friction: 0.5}}
 controller:
   spacing: 0.04
   material: {stretch_stiffness: 80}
-  global_mpc: {period: 1.0, delay: 0.5, horizon: 4, weights: {direction: 0.1}}
+  global_mpc: {period: 1.0, delay: 0.3, horizon: 4, weights: {direction: 0.1}}
   command_rate: 200.0
 station: {kind: simulated, gripper: {max_speed: 0.1}, start: {height_offset: 0.1}}
 variation: {arm_angle_deg: 5.0}

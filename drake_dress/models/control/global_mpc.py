@@ -52,7 +52,7 @@ class Weights:
     separation: float = 10.0
     least_spread: float = 0.5
     clearance: float = 10.0
-    free_clearance: float = 0.03
+    free_clearance: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,7 @@ class GlobalController:
         targets: tuple[SleeveTarget, SleeveTarget],
         obstacles: Sequence[Obstacles],
         guess: FloatArray,
+        committed_steps: int = 0,
     ) -> Plan:
         """Returns the plan that gradient descent reaches from `guess`.
 
@@ -164,6 +165,7 @@ class GlobalController:
             targets: of left and right sleeve.
             obstacles: the predicted person at the start of each of the N steps.
             guess: (N,2,3) velocities to start from, m/s.
+            committed_steps: the first steps of `guess` that are on their way already and stay.
         """
         h, n = self.cloth.time_step, self.horizon
         velocity = _limited(guess, self.max_speed)
@@ -175,6 +177,7 @@ class GlobalController:
         length = 1.0
         while iterations < self.max_iterations:
             gradient = self._gradient(now, velocity, targets, obstacles)
+            gradient[:committed_steps] = 0.0
             descent = scale[:, None, None] * gradient
             accepted = False
             for _ in range(5):

@@ -45,6 +45,7 @@ class PolicyParameters:
     Attributes:
         time_step: of the prediction, s. horizon: N. max_iterations: gradient steps per solve.
         inner_iterations: of the garment's linear solve; 1 is the paper's one-step scheme.
+        committed_steps: of a plan, which run before it can be used.
         max_speed: of a gripper, m/s.
         weights: of the costs.
         progress_step: advance of s asked for in one step of the prediction (k).
@@ -75,6 +76,7 @@ class PolicyParameters:
     horizon: int = 8
     max_iterations: int = 4
     inner_iterations: int = 10
+    committed_steps: int = 2
     max_speed: float = 0.12
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.04
@@ -236,7 +238,9 @@ class DressingPolicy:
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
-        plan = self.controller.solve(x, v, (targets[0], targets[1]), obstacles, guess)
+        plan = self.controller.solve(
+            x, v, (targets[0], targets[1]), obstacles, guess, p.committed_steps
+        )
         decision = Decision(plan, tasks, facts, np.stack([targets[i].position[-1] for i in (0, 1)]))
         return replace(state, stages=stages, velocity=plan.velocity), decision
 
