@@ -95,7 +95,7 @@ class PolicyParameters:
     inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
-    final_progress: float = 1.97
+    final_progress: float = 1.99
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
 

@@ -78,7 +78,7 @@ class StageParameters:
     prepared_distance: float = 0.03
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
-    done_progress: float = 1.91
+    done_progress: float = 1.925
     reach: float = 0.45
     insertion_timeout: float = 8.0
     barred_distance: float = 0.4
@@ -157,7 +157,7 @@ def _advance(
     new = stage
     if fact.linked:
         new = Stage.DONE if fact.s >= p.done_progress else Stage.DRESS
-        if stage == Stage.DONE and fact.s >= p.done_progress - 0.005:
+        if stage == Stage.DONE and fact.s >= p.done_progress - 0.015:
             new = Stage.DONE
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance and fact.in_sight:
