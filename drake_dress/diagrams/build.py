@@ -14,7 +14,8 @@ from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.policy import DressingPolicy, PersonModel, PolicyParameters
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.body import SIDES, ArmPose, BodyMeasures, Posture, shoulder_joint
+from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_joint
+from drake_dress.models.sides import SIDES
 
 
 def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat | None) -> Station:

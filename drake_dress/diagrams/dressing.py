@@ -13,6 +13,7 @@ from pydrake.systems.primitives import Multiplexer
 from drake_dress.diagrams.station import Station
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
 from drake_dress.systems.garment_oracle import GarmentOracle
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
@@ -21,8 +22,6 @@ from drake_dress.systems.human_predictor import HumanPredictor
 from drake_dress.systems.joint_oracle import JointOracle
 from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
-
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)

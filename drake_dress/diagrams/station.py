@@ -27,12 +27,12 @@ from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, Side, shoulder_height
+from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_height
+from drake_dress.models.sides import SIDES, Side
 from drake_dress.systems.cloth_plant import ClothPlant
 from drake_dress.systems.floating_gripper import FloatingGripper
 
 FloatArray = np.ndarray
-SIDES = ("left", "right")
 # Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
 _SETTLING_TIME = 1.6
 _SETTLING_DAMPING = 0.03

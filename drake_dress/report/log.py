@@ -9,7 +9,7 @@ in memory between flushes, so that the file on disk is consistent at all times b
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,11 +22,11 @@ import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES, Side
 
 FloatArray = npt.NDArray[np.float64]
 
 SCHEMA = "drake_dress.log/1"
-SIDES = ("left", "right")
 LOOPS = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
 JOINT_NAMES = (
     "left_shoulder",
@@ -69,7 +69,7 @@ class Sample:
     joint_position: npt.ArrayLike
     gripper_position: dict[str, npt.ArrayLike]
     gripper_force: dict[str, npt.ArrayLike]
-    dressing: dict[str, tuple[float, float, float]]
+    dressing: Mapping[Side, tuple[float, float, float]]
     stage: npt.ArrayLike
     global_solve_time: float = np.nan
     local_solve_time: float = np.nan

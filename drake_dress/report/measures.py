@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from drake_dress.models.cloth.obstacles import nearest_obstacle
 from drake_dress.models.dressing.linking import arm_linking_number
-from drake_dress.report.log import SIDES, RunLog
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
 
 FloatArray = npt.NDArray[np.float64]
 

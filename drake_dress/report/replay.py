@@ -10,7 +10,8 @@ from pydrake.geometry import Capsule, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.interrupt import caught_interrupt
-from drake_dress.report.log import SIDES, RunLog
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
 from drake_dress.systems.garment_visualizer import DressingScene
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.report.log import SIDES, STAGE_NAMES, RunLog
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.stills import floor_height
 
 MAX_BYTES = 25_000_000

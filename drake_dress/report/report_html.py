@@ -18,7 +18,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from drake_dress.errors import UserError
-from drake_dress.report.log import SIDES, STAGE_NAMES, RunLog
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.stills import CameraPose, render_still
 from drake_dress.report.summary import SuccessRules

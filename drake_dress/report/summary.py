@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.report.log import SIDES, RunLog
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
 
 

@@ -10,6 +10,8 @@ from pydrake.geometry import Box, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from drake_dress.models.sides import SIDES
+
 STAGE_NAMES = ("prepare", "dress", "done")
 OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
 LINING = Rgba(0.87, 0.62, 0.28, 1.0)
@@ -18,7 +20,6 @@ _TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1
 _TEXT = Rgba(0.1, 0.12, 0.15, 1.0)
 _TEXT_HEIGHT = 0.07  # m
 _TEXT_ABOVE = 0.5  # m above the garment, clear of a head
-_SIDES = ("left", "right")
 
 
 class GarmentVisualizer(LeafSystem):
@@ -113,12 +114,12 @@ class DressingScene:
 
     def show_grippers(self, position: npt.NDArray[np.float64]) -> None:
         """Draws the grippers (2,3), m."""
-        for side, p in zip(_SIDES, position, strict=True):
+        for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/gripper/{side}", Box(0.05, 0.05, 0.05), _GRIPPER, p)
 
     def show_targets(self, position: npt.NDArray[np.float64]) -> None:
         """Draws where the armholes should go (2,3), m; NaN hides one."""
-        for side, p in zip(_SIDES, position, strict=True):
+        for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
 
     def show_stage(self, stage: npt.ArrayLike) -> None:

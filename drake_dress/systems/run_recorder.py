@@ -14,9 +14,8 @@ from drake_dress.models.dressing.linking import arm_linking_number
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
+from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter, Sample
-
-SIDES = ("left", "right")
 
 
 class RunRecorder(LeafSystem):

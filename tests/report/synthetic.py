@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.report.log import SIDES, RunLogWriter, Sample
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLogWriter, Sample
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from drake_dress.errors import UserError
-from drake_dress.report.log import JOINT_NAMES, SIDES, RunLog, RunLogWriter
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import JOINT_NAMES, RunLog, RunLogWriter
 from tests.report import synthetic
 
 

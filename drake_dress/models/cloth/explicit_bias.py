@@ -37,11 +37,9 @@ from drake_dress.models.cloth.filtered_cg import (
     HELD,
     SLIP,
     STICK,
-    filtered_cg,
-    matrix_product,
+    SystemMatrix,
 )
 from drake_dress.models.cloth.forces import (
-    filtered_product,
     internal_force,
     prepare_filtered,
     stiffness_product,
@@ -58,8 +56,6 @@ from drake_dress.models.cloth.matrices import (
 from drake_dress.models.cloth.obstacles import Obstacles
 
 _MAX_ITERATIONS = 200
-_NO_TRIANGLE = np.zeros((0, 3), dtype=np.int32)
-_NO_GRADIENT = np.zeros((0, 3, 2))
 _NO_BLOCK = np.zeros((0, 14))
 
 
@@ -126,20 +122,17 @@ class ExplicitBiasCloth:
         self.mass = lumped_mass(elements, material)
         stiffness = stretch_matrix(elements, material) + bending_bound(elements, material)
         p = sp.csc_matrix(sp.diags(self.mass) + time_step**2 * stiffness)
-        self._p = Csr.of(p)
         self._symbolic = SymbolicFactor(p)
         self._tolerance = tolerance
         self._accelerated = iterations > 1
         self._max_iterations = iterations if iterations > 1 else _MAX_ITERATIONS
+        inverse_diagonal = 1.0 / p.diagonal()
         if self._accelerated:
             bending = bending_matrix(elements, material)
-            self._linear = Csr.of(sp.diags(self.mass) + time_step**2 * bending)
-            self._triangle, self._gradient = elements.triangle, elements.triangle_gradient
-            self._scale = time_step**2
+            linear = Csr.of(sp.diags(self.mass) + time_step**2 * bending)
+            self._system = SystemMatrix(linear, inverse_diagonal, elements, time_step**2)
         else:
-            self._linear = self._p
-            self._triangle, self._gradient, self._scale = _NO_TRIANGLE, _NO_GRADIENT, 0.0
-        self._inverse_diagonal = 1.0 / p.diagonal()
+            self._system = SystemMatrix(Csr.of(p), inverse_diagonal)
         masked = np.zeros(elements.node_count, dtype=np.bool_)
         masked[self.held] = True
         self._held_mask = masked
@@ -200,7 +193,7 @@ class ExplicitBiasCloth:
             motion = self._reduced(
                 bound, g + 0.5 * h * h * friction, prescribed, stick_motion, mode, near, block
             )
-        residual = self._product(motion, block) - g
+        residual = self._system.product(motion, block) - g
         reaction = np.where(bound_mask[:, None], (2.0 / h**2) * residual, 0.0)
 
         rate = h * force - 0.5 * h * h * self._stiffness(x, v)
@@ -252,7 +245,9 @@ class ExplicitBiasCloth:
 
         # velocities
         rate_in = self._free_solve(t.bound, v_bar, bound_mask, t.block)
-        change_in = np.where(bound_mask[:, None], v_bar - self._product(rate_in, t.block), 0.0)
+        change_in = np.where(
+            bound_mask[:, None], v_bar - self._system.product(rate_in, t.block), 0.0
+        )
         motion_in += change_in / h
         v_in -= change_in
         force_in += h * rate_in
@@ -264,7 +259,7 @@ class ExplicitBiasCloth:
         # reaction of the held nodes: (2/h²) (P Δx − g)
         seed = np.zeros((n, 3))
         seed[self.held] = (2.0 / h**2) * held_reaction_bar
-        motion_in += self._product(seed, t.block)
+        motion_in += self._system.product(seed, t.block)
         g_in -= seed
 
         # the reduced system
@@ -275,7 +270,7 @@ class ExplicitBiasCloth:
         else:
             solved = self._free_solve(t.bound, motion_in, bound_mask, t.block)
         x_in += self._operator_derivative(t.x, t.motion, seed - solved)
-        left = motion_in - self._product(solved, t.block)
+        left = motion_in - self._system.product(solved, t.block)
         g_in += solved
         full = (mode == STICK) | (mode == HELD)
         prescribed_in[full] += left[full]
@@ -307,13 +302,13 @@ class ExplicitBiasCloth:
                 pressure_in[:, None] * r - pressure[:, None] * t_in - t_normal[:, None] * r
             )
             reaction_in *= 2.0 / h**2
-            stick_in = self._product(reaction_in, t.block)
+            stick_in = self._system.product(reaction_in, t.block)
             g_in -= reaction_in
             masked = self._held_mask | t.gap_prescribed
             solved = self._free_solve(t.stick_all, stick_in, masked, t.block)
             g_in += solved
             x_in += self._operator_derivative(t.x, t.stick_motion, reaction_in - solved)
-            back = stick_in - self._product(solved, t.block)
+            back = stick_in - self._system.product(solved, t.block)
             prescribed_in[masked] += back[masked]
 
         # prescribed motions: grippers, and surfaces that move and whose gap is closed
@@ -333,42 +328,14 @@ class ExplicitBiasCloth:
         return Gradient(x_in, v_in, held_in)
 
     def _force(self, x: FloatArray) -> FloatArray:
-        e, m = self.elements, self.material
-        force = np.empty_like(x)
-        internal_force(
-            x,
-            e.triangle,
-            e.triangle_gradient,
-            e.triangle_area,
-            m.stretch_stiffness,
-            e.hinge,
-            e.hinge_coefficient,
-            e.hinge_weight,
-            e.hinge_rest,
-            m.bending_stiffness,
-            force,
-        )
+        m = self.material
+        force = internal_force(self.elements, m.stretch_stiffness, m.bending_stiffness, x)
         force += self.mass[:, None] * self.gravity
         return force
 
     def _stiffness(self, x: FloatArray, z: FloatArray) -> FloatArray:
-        e, m = self.elements, self.material
-        out = np.empty_like(x)
-        stiffness_product(
-            x,
-            z,
-            e.triangle,
-            e.triangle_gradient,
-            e.triangle_area,
-            m.stretch_stiffness,
-            e.hinge,
-            e.hinge_coefficient,
-            e.hinge_weight,
-            e.hinge_rest,
-            m.bending_stiffness,
-            out,
-        )
-        return out
+        m = self.material
+        return stiffness_product(self.elements, m.stretch_stiffness, m.bending_stiffness, x, z)
 
     def _stiffness_derivative(self, x: FloatArray, v: FloatArray, z: FloatArray) -> FloatArray:
         """Returns ∂(zᵀ K(x) v)/∂x by a central difference of K along v (K is a gradient)."""
@@ -400,13 +367,6 @@ class ExplicitBiasCloth:
         )
         return block
 
-    def _product(self, z: FloatArray, block: FloatArray) -> FloatArray:
-        out = np.empty_like(z)
-        matrix_product(self._linear.indptr, self._linear.indices, self._linear.data, z, out)
-        if self._accelerated:
-            filtered_product(z, self._triangle, self._gradient, block, self._scale, out)
-        return out
-
     def _free_solve(
         self, factor: Factor, rhs: FloatArray, masked: BoolArray, block: FloatArray
     ) -> FloatArray:
@@ -428,9 +388,9 @@ class ExplicitBiasCloth:
     ) -> tuple[FloatArray, FloatArray]:
         """Returns the solution with `prescribed` motions in masked rows, and A z − rhs."""
         fixed = np.where(masked[:, None], prescribed, 0.0)
-        solution = self._free_solve(factor, rhs - self._product(fixed, block), masked, block)
+        solution = self._free_solve(factor, rhs - self._system.product(fixed, block), masked, block)
         solution = solution + fixed
-        return solution, self._product(solution, block) - rhs
+        return solution, self._system.product(solution, block) - rhs
 
     def _cg(
         self,
@@ -441,28 +401,8 @@ class ExplicitBiasCloth:
         z: FloatArray,
         block: FloatArray,
     ) -> None:
-        filtered_cg(
-            self._linear.indptr,
-            self._linear.indices,
-            self._linear.data,
-            self._triangle,
-            self._gradient,
-            block,
-            self._scale,
-            factor.column_start,
-            factor.column_end,
-            factor.row,
-            factor.value,
-            factor.inverse_diagonal,
-            factor.permutation,
-            factor.masked,
-            self._inverse_diagonal,
-            mode,
-            normal,
-            rhs,
-            z,
-            self._tolerance,
-            self._max_iterations,
+        self._system.solve(
+            factor, block, mode, normal, rhs, z, self._tolerance, self._max_iterations
         )
 
     def _reduced(

@@ -13,11 +13,87 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
-from drake_dress.models.cloth.factor import solve_into
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.factor import Factor, solve_into
 from drake_dress.models.cloth.forces import filtered_product
+from drake_dress.models.cloth.matrices import Csr
 
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
+
+
+class SystemMatrix:
+    """The matrix A of a step, linear ⊗ I₃ + scale · filtered stretch, and its solver.
+
+    Args:
+        linear: the scalar part.
+        inverse_diagonal: (n,) of P, for nodes that the factor leaves out but contact does not.
+        elements: the rest shape, or None if A has no filtered stretch.
+        scale: of the filtered stretch, s².
+    """
+
+    def __init__(
+        self,
+        linear: Csr,
+        inverse_diagonal: FloatArray,
+        elements: Elements | None = None,
+        scale: float = 0.0,
+    ) -> None:
+        if elements is None:
+            triangle, gradient, scale = np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3, 2)), 0.0
+        else:
+            triangle, gradient = elements.triangle, elements.triangle_gradient
+        self._operator = (linear.indptr, linear.indices, linear.data, triangle, gradient)
+        self._scale = scale
+        self._inverse_diagonal = inverse_diagonal
+
+    def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
+        """Returns A z (n,3); `block` (F,14) is what `prepare_filtered` wrote for this state."""
+        out = np.empty_like(z)
+        _apply((*self._operator, block, self._scale), z, out)
+        return out
+
+    def solve(
+        self,
+        factor: Factor,
+        block: FloatArray,
+        mode: IntArray,
+        normal: FloatArray,
+        rhs: FloatArray,
+        z: FloatArray,
+        tolerance: float,
+        max_iterations: int,
+    ) -> tuple[int, float]:
+        """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
+
+        `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
+        stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
+        that `factor` leaves out and that are free here are preconditioned by the diagonal.
+
+        Returns:
+            Iterations done, and the last relative residual.
+        """
+        f = factor
+        return _filtered_cg(
+            (*self._operator, block, self._scale),
+            (f.column_start, f.column_end, f.row, f.value, f.inverse_diagonal, f.permutation),
+            f.masked,
+            self._inverse_diagonal,
+            mode,
+            normal,
+            rhs,
+            z,
+            tolerance,
+            max_iterations,
+        )
+
+
+@nb.njit(cache=True, nogil=True)
+def _apply(operator, z, out):  # type: ignore[no-untyped-def]
+    """Writes A z (n,3) into `out`."""
+    indptr, indices, data, triangle, gradient, block, scale = operator
+    matrix_product(indptr, indices, data, z, out)
+    if scale != 0.0:
+        filtered_product(z, triangle, gradient, block, scale, out)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -65,94 +141,32 @@ def _dot(a: FloatArray, b: FloatArray) -> float:
 
 
 @nb.njit(cache=True, nogil=True)
-def filtered_cg(
-    indptr: IntArray,
-    indices: IntArray,
-    data: FloatArray,
-    triangle: IntArray,
-    gradient: FloatArray,
-    block: FloatArray,
-    scale: float,
-    column_start: IntArray,
-    column_end: IntArray,
-    row: IntArray,
-    value: FloatArray,
-    inverse_diagonal: FloatArray,
-    permutation: IntArray,
-    masked: BoolArray,
-    masked_scale: FloatArray,
-    mode: IntArray,
-    normal: FloatArray,
-    rhs: FloatArray,
-    z: FloatArray,
-    tolerance: float,
-    max_iterations: int,
-) -> tuple[int, float]:
-    """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
-
-    `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
-    stick, normal of those that slip) is kept, and enters the right-hand side through A. Masked
-    nodes of the factor that are free here are preconditioned by `masked_scale` (n,), the inverse
-    diagonal. With `scale` = 0 the elements are not used.
-
-    Returns:
-        Iterations done, and the last relative residual.
-    """
+def _filtered_cg(  # type: ignore[no-untyped-def]
+    operator, factor, masked, masked_scale, mode, normal, rhs, z, tolerance, max_iterations
+):
     n = rhs.shape[0]
-    residual = np.empty((n, 3))
-    matrix_product(indptr, indices, data, z, residual)
-    if scale != 0.0:
-        filtered_product(z, triangle, gradient, block, scale, residual)
-    reference = rhs.copy()
-    for i in range(n):
-        for c in range(3):
-            residual[i, c] = rhs[i, c] - residual[i, c]
-    project(residual, mode, normal)
-    project(reference, mode, normal)
     work = np.empty((n, 3))
     direction = np.empty((n, 3))
     product = np.empty((n, 3))
     preconditioned = np.empty((n, 3))
+    preconditioner = (factor, masked, masked_scale, mode, normal, work)
 
-    _precondition(
-        column_start,
-        column_end,
-        row,
-        value,
-        inverse_diagonal,
-        permutation,
-        masked,
-        masked_scale,
-        mode,
-        normal,
-        reference,
-        preconditioned,
-        work,
-    )
-    floor = _dot(reference, preconditioned)
-    _precondition(
-        column_start,
-        column_end,
-        row,
-        value,
-        inverse_diagonal,
-        permutation,
-        masked,
-        masked_scale,
-        mode,
-        normal,
-        residual,
-        preconditioned,
-        work,
-    )
+    residual = rhs.copy()
+    project(residual, mode, normal)
+    _precondition(preconditioner, residual, preconditioned)
+    floor = max(_dot(residual, preconditioned), 1e-300)
+
+    _apply(operator, z, residual)
+    for i in range(n):
+        for c in range(3):
+            residual[i, c] = rhs[i, c] - residual[i, c]
+    project(residual, mode, normal)
+    _precondition(preconditioner, residual, preconditioned)
     rho = _dot(residual, preconditioned)
-    floor = max(floor, 1e-300)
     direction[:] = preconditioned
     iterations = 0
     while iterations < max_iterations and rho > tolerance * tolerance * floor:
-        matrix_product(indptr, indices, data, direction, product)
-        if scale != 0.0:
-            filtered_product(direction, triangle, gradient, block, scale, product)
+        _apply(operator, direction, product)
         project(product, mode, normal)
         curvature = _dot(direction, product)
         if curvature <= 0.0:
@@ -162,21 +176,7 @@ def filtered_cg(
             for c in range(3):
                 z[i, c] += alpha * direction[i, c]
                 residual[i, c] -= alpha * product[i, c]
-        _precondition(
-            column_start,
-            column_end,
-            row,
-            value,
-            inverse_diagonal,
-            permutation,
-            masked,
-            masked_scale,
-            mode,
-            normal,
-            residual,
-            preconditioned,
-            work,
-        )
+        _precondition(preconditioner, residual, preconditioned)
         new = _dot(residual, preconditioned)
         beta = new / rho
         rho = new
@@ -188,21 +188,9 @@ def filtered_cg(
 
 
 @nb.njit(cache=True, nogil=True)
-def _precondition(  # type: ignore[no-untyped-def]
-    column_start,
-    column_end,
-    row,
-    value,
-    inverse_diagonal,
-    permutation,
-    masked,
-    masked_scale,
-    mode,
-    normal,
-    residual,
-    out,
-    work,
-):
+def _precondition(preconditioner, residual, out):  # type: ignore[no-untyped-def]
+    factor, masked, masked_scale, mode, normal, work = preconditioner
+    column_start, column_end, row, value, inverse_diagonal, permutation = factor
     solve_into(
         column_start,
         column_end,

@@ -14,10 +14,58 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 
 # Smallest value a singular value of S is divided by: a triangle crushed to a line has no normal.
 _SMALLEST_STRETCH = 1e-3
+
+
+def internal_force(elements: Elements, stretch: float, bending: float, x: FloatArray) -> FloatArray:
+    """Returns the internal force (n,3), N, of positions `x` (n,3), m.
+
+    Args:
+        elements: the rest shape.
+        stretch: k, N/m.
+        bending: B, N m.
+        x: (n,3) positions, m.
+    """
+    e, force = elements, np.empty_like(x)
+    _internal_force(
+        x,
+        e.triangle,
+        e.triangle_gradient,
+        e.triangle_area,
+        stretch,
+        e.hinge,
+        e.hinge_coefficient,
+        e.hinge_weight,
+        e.hinge_rest,
+        bending,
+        force,
+    )
+    return force
+
+
+def stiffness_product(
+    elements: Elements, stretch: float, bending: float, x: FloatArray, z: FloatArray
+) -> FloatArray:
+    """Returns K(x) z (n,3), K = −∂f/∂x the exact (symmetric) stiffness; see `internal_force`."""
+    e, product = elements, np.empty_like(x)
+    _stiffness_product(
+        x,
+        z,
+        e.triangle,
+        e.triangle_gradient,
+        e.triangle_area,
+        stretch,
+        e.hinge,
+        e.hinge_coefficient,
+        e.hinge_weight,
+        e.hinge_rest,
+        bending,
+        product,
+    )
+    return product
 
 
 @nb.njit(cache=True, nogil=True, fastmath=False)
@@ -55,7 +103,7 @@ def _polar(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def internal_force(
+def _internal_force(
     x: FloatArray,
     triangle: IntArray,
     gradient: FloatArray,
@@ -68,7 +116,6 @@ def internal_force(
     bending: float,
     force: FloatArray,
 ) -> None:
-    """Writes the internal force (n,3), N, of positions `x` (n,3), m, into `force`."""
     force[:] = 0.0
     for e in range(triangle.shape[0]):
         i, j, k = triangle[e, 0], triangle[e, 1], triangle[e, 2]
@@ -117,7 +164,7 @@ def internal_force(
 
 
 @nb.njit(cache=True, nogil=True)
-def stiffness_product(
+def _stiffness_product(
     x: FloatArray,
     z: FloatArray,
     triangle: IntArray,
@@ -131,7 +178,6 @@ def stiffness_product(
     bending: float,
     product: FloatArray,
 ) -> None:
-    """Writes K(x) z (n,3), K = −∂f_int/∂x the exact (symmetric) stiffness, into `product`."""
     product[:] = 0.0
     for e in range(triangle.shape[0]):
         i, j, k = triangle[e, 0], triangle[e, 1], triangle[e, 2]

@@ -24,11 +24,10 @@ from drake_dress.models.cloth.filtered_cg import (
     HELD,
     SLIP,
     STICK,
-    filtered_cg,
-    matrix_product,
+    SystemMatrix,
     project,
 )
-from drake_dress.models.cloth.forces import filtered_product, internal_force, prepare_filtered
+from drake_dress.models.cloth.forces import internal_force, prepare_filtered
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -132,16 +131,15 @@ class ImplicitCloth:
         self._edge = elements.edge if sample_elements else None
         self._triangle = elements.triangle if sample_elements else None
 
-        self._scale = time_step * (time_step + material.damping)
+        scale = time_step * (time_step + material.damping)
         bending = bending_matrix(elements, material)
         mass = sp.diags(self.mass)
-        self._linear = Csr.of(mass + self._scale * bending)
-        p = sp.csc_matrix(
-            mass
-            + self._scale * (stretch_matrix(elements, material) + bending_bound(elements, material))
-        )
+        stiffness_bound = stretch_matrix(elements, material) + bending_bound(elements, material)
+        p = sp.csc_matrix(mass + scale * stiffness_bound)
         self._symbolic = SymbolicFactor(p)
-        self._inverse_diagonal = 1.0 / p.diagonal()
+        self._system = SystemMatrix(
+            Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale
+        )
         self._block = np.empty((len(elements.triangle), 14))
         self._factor: Factor | None = None
         self._steps_since_factor = 0
@@ -158,20 +156,7 @@ class ImplicitCloth:
         """
         e, m, h = self.elements, self.material, self.time_step
         x, v = state.x, state.v
-        force = np.empty_like(x)
-        internal_force(
-            x,
-            e.triangle,
-            e.triangle_gradient,
-            e.triangle_area,
-            m.stretch_stiffness,
-            e.hinge,
-            e.hinge_coefficient,
-            e.hinge_weight,
-            e.hinge_rest,
-            m.bending_stiffness,
-            force,
-        )
+        force = internal_force(e, m.stretch_stiffness, m.bending_stiffness, x)
         prepare_filtered(
             x, e.triangle, e.triangle_gradient, e.triangle_area, m.stretch_stiffness, self._block
         )
@@ -208,11 +193,19 @@ class ImplicitCloth:
             _prescribe(mode, near.normal, near.surface_velocity, push, velocity)
             last = passes + 1 >= max_passes
             tolerance = self._tolerance if last else _COARSER * self._tolerance
-            iterations, residual = self._solve(
-                mode, near.normal, rhs + friction, velocity, tolerance
+            assert self._factor is not None
+            iterations, residual = self._system.solve(
+                self._factor,
+                self._block,
+                mode,
+                near.normal,
+                rhs + friction,
+                velocity,
+                tolerance,
+                self._max_iterations,
             )
             total += iterations
-            impulse = self._product(velocity)
+            impulse = self._system.product(velocity, self._block)
             impulse -= rhs
             passes += 1
             if last:
@@ -266,20 +259,12 @@ class ImplicitCloth:
         best, least = v, np.inf
         for start in (v.copy(), v + self.time_step * self.gravity):
             start[self.held] = held_velocity
-            residual = self._product(start) - rhs
+            residual = self._system.product(start, self._block) - rhs
             project(residual, mode, normal)
             size = float(np.sum(residual**2))
             if size < least:
                 best, least = start, size
         return best
-
-    def _product(self, velocity: FloatArray) -> FloatArray:
-        """Returns the system matrix times `velocity` (n,3)."""
-        out = np.empty_like(velocity)
-        matrix_product(self._linear.indptr, self._linear.indices, self._linear.data, velocity, out)
-        e = self.elements
-        filtered_product(velocity, e.triangle, e.triangle_gradient, self._block, self._scale, out)
-        return out
 
     def _renew_factor(self, mode: IntArray) -> bool:
         """Makes a factor of P without the sticking nodes when the last one has become stale."""
@@ -296,40 +281,6 @@ class ImplicitCloth:
             self._factor = self._symbolic.factorize(masked)
             self._steps_since_factor = 0
         return stale
-
-    def _solve(
-        self,
-        mode: IntArray,
-        normal: FloatArray,
-        rhs: FloatArray,
-        velocity: FloatArray,
-        tolerance: float,
-    ) -> tuple[int, float]:
-        f, e = self._factor, self.elements
-        assert f is not None
-        return filtered_cg(
-            self._linear.indptr,
-            self._linear.indices,
-            self._linear.data,
-            e.triangle,
-            e.triangle_gradient,
-            self._block,
-            self._scale,
-            f.column_start,
-            f.column_end,
-            f.row,
-            f.value,
-            f.inverse_diagonal,
-            f.permutation,
-            f.masked,
-            self._inverse_diagonal,
-            mode,
-            normal,
-            rhs,
-            velocity,
-            tolerance,
-            self._max_iterations,
-        )
 
 
 def with_position(state: ClothState, x: FloatArray) -> ClothState:

@@ -32,10 +32,10 @@ from drake_dress.models.dressing.stages import (
 )
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
+from drake_dress.models.sides import SIDES
 
 LEFTWARD = np.array([0.0, 1.0, 0.0])
 FRONT = np.array([1.0, 0.0, 0.0])
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -244,13 +244,16 @@ class DressingPolicy:
         decision = Decision(plan, tasks, facts, np.stack([targets[i].position[-1] for i in (0, 1)]))
         return replace(state, stages=stages, velocity=plan.velocity), decision
 
+    def _approach_direction(self, axis: ArmAxis, side: int) -> FloatArray:
+        """Returns the unit vector along which an armhole is drawn over the hand."""
+        return _between(_inward(side), axis.D(0.0), self.parameters.approach_share)
+
     def _waypoint(self, axis: ArmAxis, fact: SleeveFacts, side: int) -> FloatArray:
         """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + p.progress_step))
-        direction = _between(_inward(side), axis.D(0.0), p.approach_share)
-        return axis.G(0.0) - p.approach_distance * direction
+        return axis.G(0.0) - p.approach_distance * self._approach_direction(axis, side)
 
     def _facts(
         self, x: FloatArray, joints: FloatArray, axis: ArmAxis, sleeve: SleeveState, side: int
@@ -259,15 +262,14 @@ class DressingPolicy:
         interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
         linked = abs(arm_linking_number(x[self._loops[side]], shoulder, elbow, hand, interior)) == 1
         s, _, _ = axis.coordinates(sleeve.p_c)
-        direction = _between(_inward(side), axis.D(0.0), self.parameters.approach_share)
         offset = hand - sleeve.p_c
-        aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
+        aside = _aside(offset, self._approach_direction(axis, side))
         sight = free_sight(x, self.mesh.faces, self._loops[side], hand)
         return SleeveFacts(
             linked=linked,
             in_sight=sight >= self.parameters.least_sight,
             s=float(s) if linked else 0.0,
-            hand_distance=float(np.linalg.norm(hand - sleeve.p_c)),
+            hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
         )
@@ -281,8 +283,8 @@ class DressingPolicy:
         in_sight: bool,
         retreat: bool = False,
         attempts: int = 0,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Returns where a sleeve is prepared, and the direction in which it is entered (Eq. Jpi).
+    ) -> FloatArray:
+        """Returns where a sleeve is prepared (Eq. Jpi).
 
         The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
         outside the hand, and further back (against v_f) until it is in line: so the hand comes in
@@ -293,22 +295,21 @@ class DressingPolicy:
         """
         p = self.parameters
         hand = axis.G(0.0)
-        direction = _between(_inward(side), axis.D(0.0), p.approach_share)
+        direction = self._approach_direction(axis, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
         beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
         facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if in_sight else 0.0
         inside = facing * _ramp(depth, -0.02, 0.02)
-        aside = float(np.linalg.norm(offset - direction * (direction @ offset)))
-        aside *= 1.0 - facing
+        aside = (1.0 - facing) * _aside(offset, direction)
         cap = p.tethered_approach_distance if tethered else p.approach_distance
         cap *= 1.0 + p.widening * min(attempts, 3)
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
         if not in_sight:
             distance = cap
         if retreat:
-            return hand - cap * direction - p.retreat_distance * FRONT, direction
+            return hand - cap * direction - p.retreat_distance * FRONT
         onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
@@ -317,7 +318,7 @@ class DressingPolicy:
             error = error - FRONT * (FRONT @ error)
             wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
             goal = hand - cap * direction - min(wait, behind) * FRONT
-        return goal, direction
+        return goal
 
     def _target(
         self,
@@ -337,7 +338,7 @@ class DressingPolicy:
         for j in range(n):
             axis = axes[side][j + 1]
             if entering:
-                position[j], _ = self._prepared(
+                position[j] = self._prepared(
                     axis,
                     sleeves[side],
                     side,
@@ -356,7 +357,7 @@ class DressingPolicy:
                     s = min(s, max(facts[side].s, other_fact.s + p.largest_lead))
             else:
                 k = 1 - side
-                other, _ = self._prepared(
+                other = self._prepared(
                     axes[k][j + 1], sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
                 )
                 s = self._waiting_progress(axis, other)
@@ -412,6 +413,11 @@ class DressingPolicy:
 def _inward(side: int) -> FloatArray:
     """Returns the unit vector from a side of the person to the other."""
     return LEFTWARD * (-1.0 if side == 0 else 1.0)
+
+
+def _aside(offset: FloatArray, direction: FloatArray) -> float:
+    """Returns the length of `offset` across the unit vector `direction`."""
+    return float(np.linalg.norm(offset - direction * (direction @ offset)))
 
 
 def _ramp(value: float, zero: float, one: float) -> float:

@@ -10,13 +10,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from drake_dress.errors import UserError
+from drake_dress.models.sides import SIDES
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
-SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)

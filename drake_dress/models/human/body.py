@@ -23,11 +23,10 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.sides import SIDES, Side
 
 FloatArray = npt.NDArray[np.float64]
 Posture = Literal["standing", "sitting"]
-Side = Literal["left", "right"]
-SIDES: tuple[Side, Side] = ("left", "right")
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.control.global_mpc import GlobalController, SleeveTarget, Weights
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.sides import SIDES
 
 HORIZON = 3
-SIDES = ("left", "right")
 
 
 @pytest.fixture(scope="module")

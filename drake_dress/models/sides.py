@@ -1,0 +1,8 @@
+"""The person's two sides, which sleeves, arms and grippers are named by; index 0 is the left."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
