@@ -28,7 +28,7 @@ from drake_dress.report.summary import summarize, write_summary
 DONE, NOT_DRESSED, INTERRUPTED = 0, 1, 130
 # Simulated time between looks at the stages, s, and for which both sleeves must stay done.
 _CHUNK = 0.1
-_STAY = 0.5
+_STAY = 1.0
 
 
 def run_scenario(

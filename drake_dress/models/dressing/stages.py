@@ -2,7 +2,8 @@
 
 A sleeve is prepared (brought behind the hand), dressed (drawn up the arm), and done. With two
 sleeves of one coat the paper prepares the nearer one alone while the garment cannot reach both
-hands, then lets it wait on its arm while the other is prepared, and draws both up together.
+hands, then lets it wait on its arm while the other is prepared, and draws both up together. When
+both are on, both rest: drawn further they pull against each other, and one slips down again.
 
 Two things differ from the print, both measured: the garment's reach is judged by the distance of
 the two targets, not only of the two armholes (which else rises to the limit first and makes the
@@ -27,7 +28,7 @@ class Stage(IntEnum):
 class Task(IntEnum):
     """What the cost of one sleeve is made of."""
 
-    REST = 0  # no cost: the gripper serves the other sleeve
+    REST = 0  # no cost: the gripper serves the other sleeve, or both are done
     PREPARE = 1  # J_p
     DRESS = 2  # J_d
     WAIT = 3  # J_w
@@ -136,6 +137,8 @@ def advance_stages(
     n = state.first
     f = 1 - n
     tasks = [Task.REST, Task.REST]
+    if all(stage == Stage.DONE for stage in state.stage):
+        return state, (Task.REST, Task.REST)
     if all(on_arm) or target_distance < parameters.reach:
         for side in (0, 1):
             tasks[side] = Task.PREPARE if state.stage[side] == Stage.PREPARE else Task.DRESS

@@ -118,3 +118,12 @@ def test_progress_is_no_stall() -> None:
         pair = (facts(linked=True, s=0.2 + 0.05 * k), facts(linked=True, s=1.9))
         state, _ = advance_stages(state, pair, P, FAR, float(k))
         assert not eases(state, 0, P, float(k))
+
+
+def test_both_rest_while_both_are_on() -> None:
+    both = (facts(linked=True, s=1.95), facts(linked=True, s=1.97))
+    state, tasks = advance_stages(StageState(), both, P, FAR, 1.0)
+    assert tasks == (Task.REST, Task.REST)
+    slipped = (facts(linked=True, s=1.85), facts(linked=True, s=1.97))
+    _, tasks = advance_stages(state, slipped, P, FAR, 1.5)
+    assert tasks == (Task.DRESS, Task.DRESS)
