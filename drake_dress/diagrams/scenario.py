@@ -141,6 +141,7 @@ class Weights:
     free_force: float = 5.0  # N
     separation: float = 1.0
     least_spread: float = 0.5  # share of the grippers' distance at rest
+    entering_spread: float = 0.85  # the same while a sleeve is entered
     clearance: float = 10.0
     free_clearance: float = 0.05  # m
 
@@ -160,7 +161,7 @@ class GlobalMpc:
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.20  # cap of l_h, m
     waiting_progress: float = 0.3  # least s of a waiting sleeve
-    force_limit: float = 26.0  # beyond it grippers give way, N
+    force_limit: float = 21.0  # beyond it grippers give way, N
 
 
 @dataclass
@@ -280,6 +281,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.free_force": (0.0, 1e3),
     "weights.separation": (0.0, 1e6),
     "weights.least_spread": (0.0, 1.0),
+    "weights.entering_spread": (0.0, 1.0),
     "weights.clearance": (0.0, 1e6),
     "weights.free_clearance": (0.0, 1.0),
     "command_rate": (10.0, 1000.0),

@@ -40,6 +40,9 @@ class Weights:
         separation: on the distance of the grippers beyond what the garment between them spans at
             rest, 1/m²; it is what the force would say too late for a descent to hear. Also on
             what it is short of `least_spread` of that, where the garment collapses.
+        entering_spread: takes the place of `least_spread` while a sleeve is entered: an armhole is
+            held open and turned toward the hand by the garment between the grippers, if it is
+            stretched out; a slack one hangs, and is pushed away by the hand.
         clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
         free_clearance: distance of a gripper to the person's skin that costs nothing, m.
     """
@@ -51,6 +54,7 @@ class Weights:
     free_force: float = 5.0
     separation: float = 10.0
     least_spread: float = 0.5
+    entering_spread: float = 0.85
     clearance: float = 10.0
     free_clearance: float = 0.05
 
@@ -243,7 +247,7 @@ class GlobalController:
                 cost += w.safety * max(0.0, force[j, i] - w.free_force) ** 2
             sleeves.append((pair[0], pair[1]))
             apart = self._apart(x)
-            cost += w.separation * self._spread_error(float(np.linalg.norm(apart))) ** 2
+            cost += w.separation * self._spread_error(float(np.linalg.norm(apart)), targets) ** 2
             cost += self._clearance(x, obstacles[j])[0]
         return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
 
@@ -253,9 +257,11 @@ class GlobalController:
         apart: FloatArray = left - right
         return apart
 
-    def _spread_error(self, distance: float) -> float:
+    def _spread_error(self, distance: float, targets: tuple[SleeveTarget, SleeveTarget]) -> float:
         """Returns how far, m, grippers are too far apart (positive) or too close (negative)."""
-        short = distance - self.weights.least_spread * self._span
+        w = self.weights
+        entering = any(t.entering and t.position_weight > 0.0 for t in targets)
+        short = distance - (w.entering_spread if entering else w.least_spread) * self._span
         return max(0.0, distance - self._span) + min(0.0, short)
 
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
@@ -310,7 +316,7 @@ class GlobalController:
                     )
             apart = self._apart(rollout.states[j])
             distance = float(np.linalg.norm(apart))
-            error = self._spread_error(distance)
+            error = self._spread_error(distance, targets)
             if error != 0.0:
                 pull = 2.0 * w.separation * error * apart / distance
                 for i, sign in ((0, 1.0), (1, -1.0)):

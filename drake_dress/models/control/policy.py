@@ -272,6 +272,7 @@ class DressingPolicy:
             hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
+            opening=float(axis.D(0.0) @ _inward(side)),
         )
 
     def _prepared(

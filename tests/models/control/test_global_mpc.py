@@ -59,10 +59,16 @@ def _beside(point: FloatArray) -> Obstacles:
 
 
 @pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("span", [0.2, 1.0])
 def test_gradient_of_the_plan_matches_finite_differences(
-    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]], beside: bool
+    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
+    beside: bool,
+    span: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """Grippers beyond their span, and closer than a garment that is entered wants them."""
     controller, x, targets = setting
+    monkeypatch.setattr(controller, "_span", span)
     rng = np.random.default_rng(0)
     velocity = 0.03 * rng.normal(size=(HORIZON, 2, 3))
     grip = x[controller.cloth.held[controller._split[0]]].mean(axis=0)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 from drake_dress.models.dressing.stages import (
     SleeveFacts,
     Stage,
@@ -127,3 +129,11 @@ def test_both_rest_while_both_are_on() -> None:
     slipped = (facts(linked=True, s=1.85), facts(linked=True, s=1.97))
     _, tasks = advance_stages(state, slipped, P, FAR, 1.5)
     assert tasks == (Task.DRESS, Task.DRESS)
+
+
+def test_the_arm_that_opens_less_goes_first() -> None:
+    nearer, harder = facts(hand=0.3), replace(facts(hand=0.6), opening=-0.1)
+    _, tasks = advance_stages(StageState(), (nearer, harder), P, FAR, 0.0)
+    assert tasks == (Task.REST, Task.PREPARE)
+    _, tasks = advance_stages(StageState(), (harder, nearer), P, FAR, 0.0)
+    assert tasks == (Task.PREPARE, Task.REST)
