@@ -71,6 +71,8 @@ class StageParameters:
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
         done_progress: s from which a sleeve is done.
+        kept_progress: s down to which it stays done, and from which one that does not come any
+            further is done.
         reach: distance two armholes can be apart, m (φ_c).
         insertion_timeout: time after which a dressing without insertion is taken back, s.
         barred_distance: an armhole this close to a hand that does not see it is barred, m.
@@ -86,6 +88,7 @@ class StageParameters:
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
     done_progress: float = 1.925
+    kept_progress: float = 1.91
     reach: float = 0.45
     insertion_timeout: float = 8.0
     barred_distance: float = 0.4
@@ -177,9 +180,9 @@ def _advance(
     stage = state.stage[side]
     new = stage
     if fact.linked:
-        new = Stage.DONE if fact.s >= p.done_progress else Stage.DRESS
-        if stage == Stage.DONE and fact.s >= p.done_progress - 0.015:
-            new = Stage.DONE
+        settled = stage == Stage.DONE or time - state.best_time[side] > p.stall_timeout
+        enough = p.kept_progress if settled else p.done_progress
+        new = Stage.DONE if fact.s >= enough else Stage.DRESS
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance and fact.in_sight:
             new = Stage.DRESS

@@ -137,3 +137,15 @@ def test_the_arm_that_opens_less_goes_first() -> None:
     assert tasks == (Task.REST, Task.PREPARE)
     _, tasks = advance_stages(StageState(), (harder, nearer), P, FAR, 0.0)
     assert tasks == (Task.PREPARE, Task.REST)
+
+
+def test_a_sleeve_that_comes_no_further_near_the_shoulder_is_done() -> None:
+    there = (facts(linked=True, s=1.915), facts(linked=True, s=1.6))
+    state, _ = advance_stages(StageState(), there, P, FAR, 1.0)
+    assert state.stage[0] == Stage.DRESS
+    state, _ = advance_stages(state, there, P, FAR, 2.0)
+    assert state.stage[0] == Stage.DRESS
+    both = (there[0], facts(linked=True, s=1.915))
+    for time in (2.5, 3.0, 4.0, 5.0, 5.9):
+        state, _ = advance_stages(state, both, P, FAR, time)
+    assert state.stage == (Stage.DONE, Stage.DONE)
