@@ -22,10 +22,10 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_height
 from drake_dress.models.sides import SIDES, Side

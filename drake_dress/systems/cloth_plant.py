@@ -12,8 +12,8 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
-from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.human.body import Capsule
 
 FloatArray = np.ndarray

@@ -29,7 +29,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.detection import Proximity, find_proximity
+from drake_dress.models.cloth.contact.detection import Proximity, find_proximity
+from drake_dress.models.cloth.contact.distance import normal_derivative, pack
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import (
@@ -53,7 +55,6 @@ from drake_dress.models.cloth.matrices import (
     lumped_mass,
     stretch_matrix,
 )
-from drake_dress.models.cloth.obstacles import Obstacles
 
 _MAX_ITERATIONS = 200
 _NO_BLOCK = np.zeros((0, 14))
@@ -83,11 +84,22 @@ class Tape:
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative of a scalar with respect to the inputs of a step; (n,3), (n,3), (k,3)."""
+    """Derivative of a scalar with respect to the inputs of a step.
+
+    Attributes:
+        x, v: (n,3). held_motion: (k,3).
+        origin: (m,3) by the position of each obstacle, per m.
+        rotation: (m,3) by its rotation about its origin, per rad, world axes.
+        velocity, angular_velocity: (m,3) by its velocities.
+    """
 
     x: FloatArray
     v: FloatArray
     held_motion: FloatArray
+    origin: FloatArray
+    rotation: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
 
 
 class ExplicitBiasCloth:
@@ -313,19 +325,42 @@ class ExplicitBiasCloth:
 
         # prescribed motions: grippers, and surfaces that move and whose gap is closed
         held_in = prescribed_in[self.held].copy()
+        bodies = np.zeros((4, t.obstacles.count, 3))
         c = t.gap_prescribed
         if c.any():
-            p_in, nc = prescribed_in[c], normal[c]
-            x_in[c] -= np.einsum("ij,ij->i", p_in, nc)[:, None] * nc
-            normal_in[c] -= near.gap[c, None] * p_in
-            omega = t.obstacles.angular_velocity[near.owner[c]]
-            x_in[c] += h * np.cross(p_in, omega)
-            x_in[c] += _normal_derivative(t.x[c], near.owner[c], nc, t.obstacles, normal_in[c])
+            x_in[c] += self._prescribed_derivative(t, prescribed_in[c], normal_in[c], bodies)
 
         v_in += h * self.mass[:, None] * g_in
         force_in += 0.5 * h * h * g_in
         x_in -= self._stiffness(t.x, force_in)
-        return Gradient(x_in, v_in, held_in)
+        return Gradient(x_in, v_in, held_in, *bodies)
+
+    def _prescribed_derivative(
+        self, tape: Tape, prescribed_in: FloatArray, normal_in: FloatArray, bodies: FloatArray
+    ) -> FloatArray:
+        """Returns the derivative (c,3) of prescribed motions and normals by the nodes in contact.
+
+        The motion is h u − gap n, with u = v + ω × (x − origin) the surface's velocity. Adds to
+        `bodies` (4,m,3) the derivative by origins, rotations and velocities of the obstacles: a gap
+        only knows where a node is in its body's frame.
+        """
+        h, c, near = self.time_step, tape.gap_prescribed, tape.near
+        x, owner, normal = tape.x[c], near.owner[c], near.normal[c]
+        omega = tape.obstacles.twists()[1][owner]
+        arm = x - tape.obstacles.origins()[owner]
+        normal_in = normal_in - near.gap[c, None] * prescribed_in
+        along = near.slope[c] * np.einsum("ij,ij->i", prescribed_in, normal)
+        geometric = np.empty_like(x)
+        normal_derivative(
+            x, pack(tape.obstacles), owner, normal, normal_in, np.zeros(len(x)), geometric
+        )
+        geometric -= along[:, None] * normal
+        carried = h * np.cross(prescribed_in, omega)
+        np.add.at(bodies[0], owner, -geometric - carried)
+        np.add.at(bodies[1], owner, np.cross(normal, normal_in) - np.cross(arm, geometric))
+        np.add.at(bodies[2], owner, h * prescribed_in)
+        np.add.at(bodies[3], owner, h * np.cross(arm, prescribed_in))
+        return geometric + carried
 
     def _force(self, x: FloatArray) -> FloatArray:
         m = self.material
@@ -469,21 +504,3 @@ class ExplicitBiasCloth:
 def _in_contact(mode: IntArray) -> BoolArray:
     touching: BoolArray = (mode == STICK) | (mode == SLIP)
     return touching
-
-
-def _normal_derivative(
-    x: FloatArray, owner: IntArray, normal: FloatArray, obstacles: Obstacles, normal_in: FloatArray
-) -> FloatArray:
-    """Returns (∂n/∂x)ᵀ n̄ of the capsules' normals, (k,3)."""
-    a, b = obstacles.a[owner], obstacles.b[owner]
-    axis = b - a
-    length2 = np.maximum(np.einsum("ij,ij->i", axis, axis), 1e-30)
-    s = np.einsum("ij,ij->i", x - a, axis) / length2
-    inside = (s > 0.0) & (s < 1.0)
-    foot = a + np.clip(s, 0.0, 1.0)[:, None] * axis
-    distance = np.maximum(np.linalg.norm(x - foot, axis=1), 1e-9)
-    out = normal_in - np.einsum("ij,ij->i", normal_in, normal)[:, None] * normal
-    along = np.where(inside, np.einsum("ij,ij->i", out, axis) / length2, 0.0)
-    out = out - along[:, None] * axis
-    result: FloatArray = out / distance[:, None]
-    return result

@@ -16,7 +16,8 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.detection import find_proximity
+from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import (
@@ -36,7 +37,6 @@ from drake_dress.models.cloth.matrices import (
     lumped_mass,
     stretch_matrix,
 )
-from drake_dress.models.cloth.obstacles import Obstacles
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 # A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.detection import find_proximity
+from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
-from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.dressing.sleeve import (
     Entry,
     SleeveState,
@@ -267,12 +267,12 @@ class GlobalController:
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
         """Returns the cost of grippers close to the person, and its derivative by held nodes."""
         w, count = self.weights, np.array([len(s) for s in self._split])[self._side]
-        if not len(obstacles.radius):
+        if not obstacles.count:
             return 0.0, np.zeros((len(count), 3))
         near = find_proximity(x[self.cloth.held], obstacles, w.free_clearance)
         short = np.maximum(0.0, -near.gap)
         cost = w.clearance * float(np.sum(short**2 / count))
-        return cost, (-2.0 * w.clearance * short / count)[:, None] * near.normal
+        return cost, (-2.0 * w.clearance * short / count * near.slope)[:, None] * near.normal
 
     def _gradient(
         self,

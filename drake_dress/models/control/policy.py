@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.control.global_mpc import GlobalController, Plan, SleeveTarget, Weights
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number

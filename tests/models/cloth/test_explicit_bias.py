@@ -1,13 +1,18 @@
 """Laws and derivatives of the controller's garment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
+from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
+from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elements import Elements, FloatArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.obstacles import Obstacles
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 
 NOTHING = np.zeros((0, 3))
@@ -97,6 +102,95 @@ def test_derivative_of_a_contact_step_matches_finite_differences(h: float) -> No
         a, b = np.array(numeric), np.array(exact)
         assert a @ b / np.linalg.norm(a) / np.linalg.norm(b) > 0.9999, name
         assert np.linalg.norm(a - b) < 1e-3 * np.linalg.norm(a), name
+
+
+def _on_all_kinds(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, Obstacles]:
+    """A sheet that lies on a floor that rises, a ball given as a mesh that turns, and a capsule."""
+    x, e = sheet_elements(16, 18, 0.03)
+    cloth = ExplicitBiasCloth(e, Material(friction=0.3), h, NO_NODES, tolerance=1e-10)
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.06)
+    field = make_signed_distance_field(mesh.vertices, mesh.faces, 0.025)
+    ball = Solid(
+        field,
+        position=np.array([0.15, 0.3, -0.07]),
+        velocity=np.array([0.02, 0.0, 0.03]),
+        angular_velocity=np.array([0.3, 0.2, 0.1]),
+    )
+    floor = HalfSpaces(
+        np.array([[0.1, 0.0, -0.09]]),
+        np.array([[0.0, 0.1, 1.0]]) / np.hypot(0.1, 1.0),
+        np.array([[0.01, 0.0, 0.02]]),
+        np.array([[0.1, 0.0, 0.0]]),
+    )
+    limb = Obstacles(
+        np.array([[0.3, 0.1, -0.08]]),
+        np.array([[0.4, 0.3, -0.06]]),
+        np.array([0.05]),
+        np.array([[0.0, 0.0, 0.05]]),
+        np.array([[0.1, 0.2, 0.3]]),
+        floor,
+        (ball,),
+    )
+    settling = ExplicitBiasCloth(e, Material(friction=0.3), 0.005, NO_NODES)
+    v = np.zeros_like(x)
+    for _ in range(60):
+        x, v, _, _ = settling.step(x, v, NOTHING, limb)
+    return cloth, x, v, limb
+
+
+def _moved(o: Obstacles, owner: int, d: FloatArray) -> Obstacles:
+    """Returns obstacles with one displaced, turned and sped up by the rows of `d` (4,3)."""
+    turn = Rotation.from_rotvec(d[1])
+    if owner == 0:
+        a = o.a + d[0]
+        b = a + turn.apply(o.b - o.a)
+        return replace(
+            o, a=a, b=b, velocity=o.velocity + d[2], angular_velocity=o.angular_velocity + d[3]
+        )
+    if owner == 1:
+        p = o.half_spaces
+        p = HalfSpaces(
+            p.point + d[0], turn.apply(p.normal), p.velocity + d[2], p.angular_velocity + d[3]
+        )
+        return replace(o, half_spaces=p)
+    s = o.solids[0]
+    s = Solid(
+        s.distance,
+        turn.as_matrix() @ s.rotation,
+        s.position + d[0],
+        s.velocity + d[2],
+        s.angular_velocity + d[3],
+    )
+    return replace(o, solids=(s,))
+
+
+@pytest.mark.parametrize("h", [0.005, 0.05])
+def test_derivative_by_the_motion_of_bodies_matches_finite_differences(h: float) -> None:
+    rng = np.random.default_rng(3)
+    cloth, x, v, bodies = _on_all_kinds(h)
+    weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
+    _, _, _, tape = cloth.step(x, v, NOTHING, bodies)
+    modes = tape.mode
+    assert set(tape.near.owner[modes != FREE]) == {0, 1, 2}
+
+    def loss(obstacles: Obstacles) -> float:
+        x1, v1, _, _ = cloth.step(x, v, NOTHING, obstacles, modes)
+        return float(np.sum(weight_x * x1) + np.sum(weight_v * v1))
+
+    _, _, _, tape = cloth.step(x, v, NOTHING, bodies, modes)
+    g = cloth.vector_jacobian_product(tape, weight_x, weight_v, NOTHING)
+    slope = np.stack([g.origin, g.rotation, g.velocity, g.angular_velocity], axis=1)
+    scale = np.array([1.0, 1.0, 1.0 / h, 1.0 / h])[:, None]
+    for owner in (0, 1, 2):
+        numeric, exact = [], []
+        for _ in range(8):
+            d = scale * rng.normal(size=(4, 3))
+            step = 1e-7
+            high, low = (loss(_moved(bodies, owner, e * step * d)) for e in (1.0, -1.0))
+            numeric.append((high - low) / (2 * step))
+            exact.append(float(np.sum(slope[owner] * d)))
+        error = np.linalg.norm(np.subtract(numeric, exact))
+        assert error < 1e-3 * np.linalg.norm(numeric), owner
 
 
 def test_slipping_nodes_feel_friction_of_their_sticking_force() -> None:

@@ -1,24 +1,25 @@
 """Laws of motion of the plant's garment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.filtered_cg import STICK
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.obstacles import Obstacles
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 
 H = 0.004
 NOTHING = np.zeros((0, 3))
 
 
-def incline(angle: float, length: float = 50.0) -> Obstacles:
-    """A capsule so large that its top is a plane inclined about y by `angle`."""
+def incline(angle: float) -> Obstacles:
+    """A half-space through the origin, inclined about y by `angle`."""
     normal = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    center = -length * normal
-    return Obstacles.resting(center[None], center[None], np.array([length]))
+    return replace(Obstacles.none(), half_spaces=HalfSpaces.resting(np.zeros(3), normal))
 
 
 def test_free_fall_is_exact() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.obstacles import Obstacles
 from drake_dress.models.control.global_mpc import GlobalController, SleeveTarget, Weights
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat

@@ -1,0 +1,1 @@
+"""What the garment touches, and where."""

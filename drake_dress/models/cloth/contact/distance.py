@@ -1,0 +1,311 @@
+"""Signed distances, normals and their derivatives, compiled.
+
+Shapes come packed as a tuple of plain arrays (`pack`), so that kernels take them all at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elements import FloatArray, IntArray
+
+# Farther than any garment is from anything, m.
+_FAR = 1e9
+
+
+def pack(obstacles: Obstacles) -> tuple[Any, ...]:
+    """Returns the arrays that the kernels take."""
+    o, p, s = obstacles, obstacles.half_spaces, obstacles.solids
+    count = len(s)
+    pose = np.zeros((count, 12))
+    grid = np.zeros((count, 4))
+    size = np.zeros((count, 4), dtype=np.int64)
+    offset = 0
+    for i, solid in enumerate(s):
+        pose[i, :9], pose[i, 9:] = solid.rotation.ravel(), solid.position
+        grid[i, :3], grid[i, 3] = solid.distance.origin, solid.distance.spacing
+        size[i, :3], size[i, 3] = solid.distance.coefficients.shape, offset
+        offset += solid.distance.coefficients.size
+    parts = [solid.distance.coefficients.ravel() for solid in s]
+    if len(parts) == 1:
+        spline = parts[0]
+    else:
+        spline = np.concatenate(parts) if parts else np.zeros(0)
+    return (o.a, o.b, o.radius, p.point, p.normal, pose, grid, size, spline)
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _capsule(p0, p1, p2, a, b, radius, m):  # type: ignore[no-untyped-def]
+    """Returns signed distance and segment parameter of a point to capsule m."""
+    d0, d1, d2 = b[m, 0] - a[m, 0], b[m, 1] - a[m, 1], b[m, 2] - a[m, 2]
+    q0, q1, q2 = p0 - a[m, 0], p1 - a[m, 1], p2 - a[m, 2]
+    length2 = d0 * d0 + d1 * d1 + d2 * d2
+    t = 0.0
+    if length2 > 0.0:
+        t = min(1.0, max(0.0, (q0 * d0 + q1 * d1 + q2 * d2) / length2))
+    r0, r1, r2 = q0 - t * d0, q1 - t * d1, q2 - t * d2
+    return np.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius[m], t
+
+
+@nb.njit(cache=True, nogil=True)
+def _weights(t, w, d, c):  # type: ignore[no-untyped-def]
+    """Writes the four cubic B-spline weights at t in [0, 1), first and second derivatives."""
+    s = 1.0 - t
+    w[0] = s * s * s / 6.0
+    w[1] = (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0
+    w[2] = (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0
+    w[3] = t * t * t / 6.0
+    d[0] = -0.5 * s * s
+    d[1] = 0.5 * (3.0 * t * t - 4.0 * t)
+    d[2] = -0.5 * (3.0 * s * s - 4.0 * s)
+    d[3] = 0.5 * t * t
+    c[0] = s
+    c[1] = 3.0 * t - 2.0
+    c[2] = 3.0 * s - 2.0
+    c[3] = t
+
+
+@nb.njit(cache=True, nogil=True)
+def _solid(p0, p1, p2, pose, grid, size, spline, m, gradient, hessian, order):  # type: ignore[no-untyped-def]
+    """Returns the distance to solid m; writes world gradient (3,) and Hessian (3,3) by order.
+
+    Outside the grid: the distance at the nearest point of the grid and the way there.
+    """
+    q0, q1, q2 = p0 - pose[m, 9], p1 - pose[m, 10], p2 - pose[m, 11]
+    index = np.empty(3, dtype=np.int64)
+    w = np.empty((3, 4))
+    d = np.empty((3, 4))
+    c = np.empty((3, 4))
+    beyond = 0.0
+    spacing = grid[m, 3]
+    for i in range(3):
+        # B frame: Rᵀ q
+        local = pose[m, i] * q0 + pose[m, 3 + i] * q1 + pose[m, 6 + i] * q2
+        u = (local - grid[m, i]) / spacing
+        low, high = 1.0, float(size[m, i]) - 3.0
+        inside = min(max(u, low), high)
+        beyond += (u - inside) ** 2
+        index[i] = min(int(inside), size[m, i] - 3)
+        _weights(inside - index[i], w[i], d[i], c[i])
+    value = 0.0
+    g0 = g1 = g2 = 0.0
+    h00 = h01 = h02 = h11 = h12 = h22 = 0.0
+    for i in range(4):
+        for j in range(4):
+            base = (
+                size[m, 3]
+                + ((index[0] - 1 + i) * size[m, 1] + index[1] - 1 + j) * size[m, 2]
+                + index[2]
+                - 1
+            )
+            v = v1 = v2 = 0.0
+            for k in range(4):
+                s = spline[base + k]
+                v += s * w[2, k]
+                v1 += s * d[2, k]
+                v2 += s * c[2, k]
+            value += w[0, i] * w[1, j] * v
+            if order >= 1:
+                g0 += d[0, i] * w[1, j] * v
+                g1 += w[0, i] * d[1, j] * v
+                g2 += w[0, i] * w[1, j] * v1
+            if order >= 2:
+                h00 += c[0, i] * w[1, j] * v
+                h01 += d[0, i] * d[1, j] * v
+                h02 += d[0, i] * w[1, j] * v1
+                h11 += w[0, i] * c[1, j] * v
+                h12 += w[0, i] * d[1, j] * v1
+                h22 += w[0, i] * w[1, j] * v2
+    if order >= 1:
+        for i in range(3):
+            gradient[i] = (
+                pose[m, 3 * i] * g0 + pose[m, 3 * i + 1] * g1 + pose[m, 3 * i + 2] * g2
+            ) / spacing
+    if order >= 2:
+        body = np.empty((3, 3))
+        body[0, 0], body[1, 1], body[2, 2] = h00, h11, h22
+        body[0, 1] = body[1, 0] = h01
+        body[0, 2] = body[2, 0] = h02
+        body[1, 2] = body[2, 1] = h12
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    for n in range(3):
+                        total += pose[m, 3 * i + k] * body[k, n] * pose[m, 3 * j + n]
+                hessian[i, j] = total / (spacing * spacing)
+    return value + spacing * np.sqrt(beyond)
+
+
+@nb.njit(cache=True, nogil=True)
+def _nearest(p0, p1, p2, shapes, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Returns least signed distance and owner of a point."""
+    a, b, radius, point, normal, pose, grid, size, spline = shapes
+    best = _FAR
+    who = -1
+    m = radius.shape[0]
+    for i in range(m):
+        d, _ = _capsule(p0, p1, p2, a, b, radius, i)
+        if d < best:
+            best = d
+            who = i
+    for i in range(point.shape[0]):
+        d = (
+            (p0 - point[i, 0]) * normal[i, 0]
+            + (p1 - point[i, 1]) * normal[i, 1]
+            + (p2 - point[i, 2]) * normal[i, 2]
+        )
+        if d < best:
+            best = d
+            who = m + i
+    for i in range(pose.shape[0]):
+        d = _solid(p0, p1, p2, pose, grid, size, spline, i, gradient, hessian, 0)
+        if d < best:
+            best = d
+            who = m + point.shape[0] + i
+    return best, who
+
+
+@nb.njit(cache=True, nogil=True)
+def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: IntArray) -> None:
+    """Writes for each point of `x` (k,3) the least signed distance (k,), m, and whose it is (k,).
+
+    `owner` is -1 where there is no obstacle.
+    """
+    gradient = np.empty(3)
+    hessian = np.empty((3, 3))
+    for i in range(x.shape[0]):
+        d, who = _nearest(x[i, 0], x[i, 1], x[i, 2], shapes, gradient, hessian)
+        distance[i] = d
+        owner[i] = who
+
+
+@nb.njit(cache=True, nogil=True)
+def surface_frame(
+    x: FloatArray,
+    shapes: Any,
+    origin: FloatArray,
+    velocity: FloatArray,
+    angular_velocity: FloatArray,
+    owner: IntArray,
+    normal: FloatArray,
+    slope: FloatArray,
+    surface_velocity: FloatArray,
+) -> None:
+    """Writes outward unit normals (n,3), slopes (n,) and velocities (n,3) at the points `x` (n,3).
+
+    The gradient of the distance is slope · normal; the slope is 1 but for solids, whose distances
+    are interpolated. The velocity is that of the rigid body at the point itself. Rows without
+    owner are zero.
+    """
+    a, b, radius, point, plane, pose, grid, size, spline = shapes
+    m, k = radius.shape[0], point.shape[0]
+    gradient = np.empty(3)
+    hessian = np.empty((3, 3))
+    for i in range(x.shape[0]):
+        who = owner[i]
+        slope[i] = 1.0
+        for c in range(3):
+            normal[i, c] = 0.0
+            surface_velocity[i, c] = 0.0
+        if who < 0:
+            continue
+        q0, q1, q2 = x[i, 0] - origin[who, 0], x[i, 1] - origin[who, 1], x[i, 2] - origin[who, 2]
+        w0, w1, w2 = angular_velocity[who, 0], angular_velocity[who, 1], angular_velocity[who, 2]
+        surface_velocity[i, 0] = velocity[who, 0] + w1 * q2 - w2 * q1
+        surface_velocity[i, 1] = velocity[who, 1] + w2 * q0 - w0 * q2
+        surface_velocity[i, 2] = velocity[who, 2] + w0 * q1 - w1 * q0
+        if who < m:
+            _, t = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
+            size2 = 0.0
+            for c in range(3):
+                r = x[i, c] - a[who, c] - t * (b[who, c] - a[who, c])
+                normal[i, c] = r
+                size2 += r * r
+            r = np.sqrt(size2)
+            if r > 1e-12:
+                for c in range(3):
+                    normal[i, c] /= r
+            else:
+                normal[i, 0] = normal[i, 1] = 0.0
+                normal[i, 2] = 1.0
+        elif who < m + k:
+            for c in range(3):
+                normal[i, c] = plane[who - m, c]
+        else:
+            _solid(
+                x[i, 0],
+                x[i, 1],
+                x[i, 2],
+                pose,
+                grid,
+                size,
+                spline,
+                who - m - k,
+                gradient,
+                hessian,
+                1,
+            )
+            r = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+            if r > 1e-12:
+                slope[i] = r
+                for c in range(3):
+                    normal[i, c] = gradient[c] / r
+            else:
+                normal[i, 2] = 1.0
+
+
+@nb.njit(cache=True, nogil=True)
+def normal_derivative(
+    x: FloatArray,
+    shapes: Any,
+    owner: IntArray,
+    normal: FloatArray,
+    normal_bar: FloatArray,
+    slope_bar: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Writes (k,3) the derivative of n̄·n + slope̅·slope with respect to the points `x` (k,3)."""
+    a, b, radius, point, plane, pose, grid, size, spline = shapes
+    m, k = radius.shape[0], point.shape[0]
+    gradient = np.empty(3)
+    hessian = np.empty((3, 3))
+    for i in range(x.shape[0]):
+        who = owner[i]
+        for c in range(3):
+            out[i, c] = 0.0
+        if who < 0 or m <= who < m + k:
+            continue
+        along = 0.0
+        for c in range(3):
+            along += normal_bar[i, c] * normal[i, c]
+        if who < m:
+            d, t = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
+            inverse = 1.0 / max(d + radius[who], 1e-9)
+            axial = 0.0
+            length2 = 1e-30
+            for c in range(3):
+                out[i, c] = (normal_bar[i, c] - along * normal[i, c]) * inverse
+                e = b[who, c] - a[who, c]
+                axial += out[i, c] * e
+                length2 += e * e
+            if 0.0 < t < 1.0:
+                for c in range(3):
+                    out[i, c] -= axial / length2 * (b[who, c] - a[who, c])
+            continue
+        _solid(
+            x[i, 0], x[i, 1], x[i, 2], pose, grid, size, spline, who - m - k, gradient, hessian, 2
+        )
+        r = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+        if r <= 1e-12:
+            continue
+        for c in range(3):
+            total = 0.0
+            for e in range(3):
+                share = (normal_bar[i, e] - along * normal[i, e]) / r + slope_bar[i] * normal[i, e]
+                total += hessian[e, c] * share
+            out[i, c] = total

@@ -1,0 +1,128 @@
+"""What the garment touches: moving capsules, spheres, half-spaces and closed meshes.
+
+Each has one owner number in the order capsules, half-spaces, solids, and moves as a rigid body with
+a velocity at its origin (end a of a capsule, the point of a half-space, the frame's origin of a
+solid) and an angular velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drake_dress.models.cloth.contact.solid import SignedDistanceField
+from drake_dress.models.cloth.elements import FloatArray
+
+
+@dataclass(frozen=True)
+class HalfSpaces:
+    """Half-spaces in the world frame; the garment stays where the normals point.
+
+    Attributes:
+        point: (k,3) on the surface, m.
+        normal: (k,3) unit, outward.
+        velocity: (k,3) of the point, m/s.
+        angular_velocity: (k,3), rad/s.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+
+    @staticmethod
+    def none() -> HalfSpaces:
+        """Returns no half-space."""
+        return HalfSpaces(*(np.zeros((0, 3)) for _ in range(4)))
+
+    @staticmethod
+    def resting(point: FloatArray, normal: FloatArray) -> HalfSpaces:
+        """Returns half-spaces that do not move; normals of any length."""
+        p = np.atleast_2d(np.asarray(point, dtype=np.float64))
+        n = np.atleast_2d(np.asarray(normal, dtype=np.float64))
+        return HalfSpaces(
+            p, n / np.linalg.norm(n, axis=1, keepdims=True), np.zeros_like(p), np.zeros_like(p)
+        )
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed mesh as a rigid body.
+
+    Attributes:
+        distance: signed distance in the body's frame B.
+        rotation: (3,3) R_WB.
+        position: (3,) p_WB, m.
+        velocity: (3,) of B's origin, m/s.
+        angular_velocity: (3,), rad/s.
+    """
+
+    distance: SignedDistanceField
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    position: FloatArray = field(default_factory=lambda: np.zeros(3))
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """All that the garment touches at one instant; a sphere is a capsule with a == b.
+
+    Attributes:
+        a, b: (m,3) ends of the capsules' axes, world, m.
+        radius: (m,), m.
+        velocity: (m,3) of point a, m/s.
+        angular_velocity: (m,3), rad/s.
+        half_spaces: k of them.
+        solids: closed meshes.
+    """
+
+    a: FloatArray
+    b: FloatArray
+    radius: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    half_spaces: HalfSpaces = field(default_factory=HalfSpaces.none)
+    solids: tuple[Solid, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of bodies."""
+        return len(self.radius) + len(self.half_spaces.point) + len(self.solids)
+
+    @staticmethod
+    def none() -> Obstacles:
+        """Returns no obstacle at all."""
+        empty = np.zeros((0, 3))
+        return Obstacles(empty, empty, np.zeros(0), empty, empty)
+
+    @staticmethod
+    def resting(a: FloatArray, b: FloatArray, radius: FloatArray) -> Obstacles:
+        """Returns capsules that do not move."""
+        zero = np.zeros_like(np.asarray(a, dtype=np.float64))
+        return Obstacles(
+            np.ascontiguousarray(a, dtype=np.float64),
+            np.ascontiguousarray(b, dtype=np.float64),
+            np.ascontiguousarray(radius, dtype=np.float64),
+            zero,
+            zero.copy(),
+        )
+
+    @staticmethod
+    def floor(height: float = 0.0) -> Obstacles:
+        """Returns a resting horizontal half-space whose surface is at z = `height`, m."""
+        plane = HalfSpaces.resting(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]))
+        return replace(Obstacles.none(), half_spaces=plane)
+
+    def origins(self) -> FloatArray:
+        """Returns (count,3) the points whose velocities are given, in order of owners, m."""
+        solids = [s.position[None] for s in self.solids]
+        return np.concatenate([self.a, self.half_spaces.point, *solids])
+
+    def twists(self) -> tuple[FloatArray, FloatArray]:
+        """Returns velocity of the origins (count,3), m/s, and angular velocity (count,3), rad/s."""
+        v = [self.velocity, self.half_spaces.velocity, *(s.velocity[None] for s in self.solids)]
+        w = [self.angular_velocity, self.half_spaces.angular_velocity]
+        w += [s.angular_velocity[None] for s in self.solids]
+        return np.concatenate(v), np.concatenate(w)
