@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
+
+from scenario_run import run_scenario
 
 _COLUMNS = (
     ("success", "{}"),
@@ -65,13 +66,9 @@ def _seeds(text: str) -> range:
 
 def _dress(options: argparse.Namespace, seed: int) -> dict[str, Any]:
     out = options.out / f"seed_{seed}"
-    command = [sys.executable, "-m", "drake_dress", "run", str(options.scenario), "--no-meshcat"]
-    command += ["--seed", str(seed), "--out", str(out)]
-    for item in options.set:
-        command += ["--set", item]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):
-        return {"reason": f"exit {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"}
+    _, problem = run_scenario(options.scenario, out, options.set, seed)
+    if problem:
+        return {"reason": problem}
     summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
     return summary
 

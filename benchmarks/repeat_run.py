@@ -9,13 +9,13 @@ both runs are the same, 1 if they differ, 2 if the scenario could not be run.
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import h5py
 import numpy as np
+from scenario_run import run_scenario
 
 _MEASURED = ("solve_time",)
 
@@ -30,8 +30,10 @@ def main() -> int:
     options = parser.parse_args()
     folders = [options.out / name for name in ("first", "second")]
     with ThreadPoolExecutor(options.jobs) as pool:
-        statuses = list(pool.map(lambda folder: _run(options, folder), folders))
-    if any(status not in (0, 1) for status in statuses):
+        runs = pool.map(lambda out: run_scenario(options.scenario, out, options.set), folders)
+        statuses, problems = zip(*runs, strict=True)
+    if any(problems):
+        print(next(problem for problem in problems if problem), file=sys.stderr)
         return 2
     with h5py.File(folders[0] / "run.h5") as a, h5py.File(folders[1] / "run.h5") as b:
         names = _datasets(a)
@@ -46,17 +48,6 @@ def main() -> int:
     return int(bool(different) or statuses[0] != statuses[1])
 
 
-def _run(options: argparse.Namespace, folder: Path) -> int:
-    command = [sys.executable, "-m", "drake_dress", "run", str(options.scenario), "--no-meshcat"]
-    command += ["--out", str(folder)]
-    for item in options.set:
-        command += ["--set", item]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):
-        print(done.stderr.strip().splitlines()[-1:], file=sys.stderr)
-    return done.returncode
-
-
 def _datasets(file: h5py.File) -> list[str]:
     names: list[str] = []
     file.visititems(
@@ -69,9 +60,7 @@ def _same(a: h5py.File, b: h5py.File, name: str) -> bool:
     if name not in b or a[name].shape != b[name].shape:
         return False
     first, second = a[name][()], b[name][()]
-    if first.dtype.kind == "f":
-        return bool(np.array_equal(first, second, equal_nan=True))
-    return bool(np.array_equal(first, second))
+    return bool(np.array_equal(first, second, equal_nan=first.dtype.kind == "f"))
 
 
 if __name__ == "__main__":

@@ -351,9 +351,7 @@ class ExplicitBiasCloth:
         normal_in = normal_in - near.gap[c, None] * prescribed_in
         along = near.slope[c] * np.einsum("ij,ij->i", prescribed_in, normal)
         geometric = np.empty_like(x)
-        normal_derivative(
-            x, pack(tape.obstacles), owner, normal, normal_in, np.zeros(len(x)), geometric
-        )
+        normal_derivative(x, pack(tape.obstacles), owner, normal, normal_in, geometric)
         geometric -= along[:, None] * normal
         carried = h * np.cross(prescribed_in, omega)
         np.add.at(bodies[0], owner, -geometric - carried)

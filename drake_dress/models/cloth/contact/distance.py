@@ -35,7 +35,7 @@ def pack(obstacles: Obstacles) -> tuple[Any, ...]:
         spline = parts[0]
     else:
         spline = np.concatenate(parts) if parts else np.zeros(0)
-    return (o.a, o.b, o.radius, p.point, p.normal, pose, grid, size, spline)
+    return (o.a, o.b, o.radius, p.point, p.normal, (pose, grid, size, spline))
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -70,11 +70,12 @@ def _weights(t, w, d, c):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _solid(p0, p1, p2, pose, grid, size, spline, m, gradient, hessian, order):  # type: ignore[no-untyped-def]
+def _solid(p0, p1, p2, solids, m, gradient, hessian, order):  # type: ignore[no-untyped-def]
     """Returns the distance to solid m; writes world gradient (3,) and Hessian (3,3) by order.
 
     Outside the grid: the distance at the nearest point of the grid and the way there.
     """
+    pose, grid, size, spline = solids
     q0, q1, q2 = p0 - pose[m, 9], p1 - pose[m, 10], p2 - pose[m, 11]
     index = np.empty(3, dtype=np.int64)
     w = np.empty((3, 4))
@@ -144,7 +145,7 @@ def _solid(p0, p1, p2, pose, grid, size, spline, m, gradient, hessian, order):  
 @nb.njit(cache=True, nogil=True)
 def _nearest(p0, p1, p2, shapes, gradient, hessian):  # type: ignore[no-untyped-def]
     """Returns least signed distance and owner of a point."""
-    a, b, radius, point, normal, pose, grid, size, spline = shapes
+    a, b, radius, point, normal, solids = shapes
     best = _FAR
     who = -1
     m = radius.shape[0]
@@ -162,8 +163,8 @@ def _nearest(p0, p1, p2, shapes, gradient, hessian):  # type: ignore[no-untyped-
         if d < best:
             best = d
             who = m + i
-    for i in range(pose.shape[0]):
-        d = _solid(p0, p1, p2, pose, grid, size, spline, i, gradient, hessian, 0)
+    for i in range(solids[0].shape[0]):
+        d = _solid(p0, p1, p2, solids, i, gradient, hessian, 0)
         if d < best:
             best = d
             who = m + point.shape[0] + i
@@ -202,7 +203,7 @@ def surface_frame(
     are interpolated. The velocity is that of the rigid body at the point itself. Rows without
     owner are zero.
     """
-    a, b, radius, point, plane, pose, grid, size, spline = shapes
+    a, b, radius, point, plane, solids = shapes
     m, k = radius.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
@@ -237,19 +238,7 @@ def surface_frame(
             for c in range(3):
                 normal[i, c] = plane[who - m, c]
         else:
-            _solid(
-                x[i, 0],
-                x[i, 1],
-                x[i, 2],
-                pose,
-                grid,
-                size,
-                spline,
-                who - m - k,
-                gradient,
-                hessian,
-                1,
-            )
+            _solid(x[i, 0], x[i, 1], x[i, 2], solids, who - m - k, gradient, hessian, 1)
             r = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
             if r > 1e-12:
                 slope[i] = r
@@ -266,11 +255,10 @@ def normal_derivative(
     owner: IntArray,
     normal: FloatArray,
     normal_bar: FloatArray,
-    slope_bar: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Writes (k,3) the derivative of n̄·n + slope̅·slope with respect to the points `x` (k,3)."""
-    a, b, radius, point, plane, pose, grid, size, spline = shapes
+    """Writes (k,3) the derivative of n̄·n with respect to the points `x` (k,3)."""
+    a, b, radius, point, plane, solids = shapes
     m, k = radius.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
@@ -297,15 +285,13 @@ def normal_derivative(
                 for c in range(3):
                     out[i, c] -= axial / length2 * (b[who, c] - a[who, c])
             continue
-        _solid(
-            x[i, 0], x[i, 1], x[i, 2], pose, grid, size, spline, who - m - k, gradient, hessian, 2
-        )
+        _solid(x[i, 0], x[i, 1], x[i, 2], solids, who - m - k, gradient, hessian, 2)
         r = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
         if r <= 1e-12:
             continue
         for c in range(3):
             total = 0.0
             for e in range(3):
-                share = (normal_bar[i, e] - along * normal[i, e]) / r + slope_bar[i] * normal[i, e]
+                share = (normal_bar[i, e] - along * normal[i, e]) / r
                 total += hessian[e, c] * share
             out[i, c] = total

@@ -1,0 +1,24 @@
+"""One `drake-dress run` in a process of its own, for benchmarks that need several."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def run_scenario(
+    scenario: Path, out: Path, overrides: Sequence[str] = (), seed: int | None = None
+) -> tuple[int, str]:
+    """Returns the exit status, and why the run could not be used (empty where it could)."""
+    command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
+    command += ["--out", str(out)]
+    if seed is not None:
+        command += ["--seed", str(seed)]
+    for item in overrides:
+        command += ["--set", item]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode in (0, 1):
+        return done.returncode, ""
+    return done.returncode, f"exit {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"
