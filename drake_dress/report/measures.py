@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.cloth.contact.distance import nearest_obstacle, pack
+from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.dressing.linking import arm_linking_number
 from drake_dress.models.sides import SIDES
@@ -125,7 +125,7 @@ def penetration_depth(
     ).astype(np.float64)
     distance = np.empty(len(points))
     owner = np.empty(len(points), dtype=np.int32)
-    nearest_obstacle(points, pack(Obstacles.resting(a, b, radius)), distance, owner)
+    nearest_obstacle(points, Obstacles.resting(a, b, radius).packed, distance, owner)
     return float(max(0.0, -distance.min(initial=0.0)))
 
 

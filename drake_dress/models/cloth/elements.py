@@ -13,6 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+# Elements that a kernel works on at once: vector units want the same number of many elements side
+# by side, and this many fit in the first cache.
+LANES = 32
+
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 BoolArray = npt.NDArray[np.bool_]
@@ -34,6 +38,11 @@ class Elements:
         hinge_rest: (H,) ‖Σ c x‖ at rest, m.
         node_area: (n,) a third of the area of the triangles around a node, m².
         edge: (E,2) unique edges; edge_rest_length: (E,) m.
+        triangle_lanes: (⌈F/L⌉,3,L) `triangle` in tiles of L = LANES, padded with triangles without
+            area at node 0.
+        gradient_lanes: (⌈F/L⌉,5,L) g_1, g_2 (g_0 = −g_1 − g_2) and area, likewise.
+        hinge_lanes: (⌈H/L⌉,4,L) `hinge`, likewise.
+        bend_lanes: (⌈H/L⌉,6,L) coefficients, weight and rest of the hinges, likewise.
     """
 
     node_count: int
@@ -47,6 +56,10 @@ class Elements:
     node_area: FloatArray
     edge: IntArray
     edge_rest_length: FloatArray
+    triangle_lanes: npt.NDArray[np.uint32]
+    gradient_lanes: FloatArray
+    hinge_lanes: npt.NDArray[np.uint32]
+    bend_lanes: FloatArray
 
 
 def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> Elements:
@@ -105,7 +118,20 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
         node_area=node_area,
         edge=edge,
         edge_rest_length=edge_length,
+        triangle_lanes=in_lanes(triangle.astype(np.uint32)),
+        gradient_lanes=in_lanes(np.column_stack([gradient[:, 1], gradient[:, 2], area])),
+        hinge_lanes=in_lanes(hinge.astype(np.uint32)),
+        bend_lanes=in_lanes(np.column_stack([coefficient, weight, rest])),
     )
+
+
+def in_lanes(rows: npt.NDArray) -> npt.NDArray:
+    """Returns (k,c) rows, one an element, as (⌈k/L⌉,c,L) tiles, L = LANES, padded with zeros."""
+    count, columns = rows.shape
+    tiles = -(-count // LANES)
+    padded = np.zeros((tiles * LANES, columns), dtype=rows.dtype)
+    padded[:count] = rows
+    return np.ascontiguousarray(padded.reshape(tiles, LANES, columns).transpose(0, 2, 1))
 
 
 def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:

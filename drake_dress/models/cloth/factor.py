@@ -4,6 +4,10 @@ P's pattern never changes, the set of nodes with a prescribed motion does at eve
 ordering and the elimination tree are found once; a numeric factor then treats masked nodes as
 identity rows, which is the factor of P_ff with the order of all nodes kept. The algorithm is the
 up-looking factorisation of Davis, "Direct Methods for Sparse Linear Systems", ch. 4.
+
+What contact asks of P⁻¹ is little: how the nodes in contact move under forces on those same nodes.
+The columns of L that this takes are the paths from these nodes to the root of the elimination tree
+(`reach`): a fifth to a third of the factor for an arm in a sleeve.
 """
 
 from __future__ import annotations
@@ -28,7 +32,31 @@ class Factor:
     value: FloatArray
     inverse_diagonal: FloatArray
     permutation: IntArray
+    inverse_permutation: IntArray
+    parent: IntArray
     masked: BoolArray
+
+    @property
+    def arrays(self) -> tuple[IntArray, IntArray, IntArray, FloatArray, FloatArray, IntArray]:
+        """The factor as kernels take it."""
+        return (
+            self.column_start,
+            self.column_end,
+            self.row,
+            self.value,
+            self.inverse_diagonal,
+            self.permutation,
+        )
+
+    def reach(self, nodes: IntArray) -> IntArray:
+        """Returns, ascending, the columns of L that P_ff⁻¹ between `nodes` (k,) needs."""
+        return _reach(self.parent, self.inverse_permutation, nodes)
+
+    def solve_pair(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns P_ff⁻¹ of two (n,3) right-hand sides in one pass over the factor."""
+        out = np.empty_like(first), np.empty_like(second)
+        _solve_pair(*self.arrays, self.masked, first, second, *out)
+        return out
 
     def solve(self, rhs: FloatArray) -> FloatArray:
         """Returns P_ff⁻¹ rhs_f for (n,3) `rhs`, with zeros in masked rows."""
@@ -65,6 +93,7 @@ class SymbolicFactor:
         )
         # perm_c maps old to new; its argsort is the order of elimination.
         self.permutation = np.argsort(lu.perm_c).astype(np.int32)
+        self._inverse_permutation = np.argsort(self.permutation).astype(np.int32)
         permuted = sp.csc_matrix(matrix)[self.permutation][:, self.permutation]
         upper = sp.csc_matrix(sp.triu(permuted))
         upper.sort_indices()
@@ -113,6 +142,8 @@ class SymbolicFactor:
             value,
             inverse_diagonal,
             self.permutation,
+            self._inverse_permutation,
+            self._parent,
             masked.copy(),
         )
 
@@ -166,6 +197,130 @@ def solve_into(
         out[p, 0] = w0
         out[p, 1] = w1
         out[p, 2] = w2
+
+
+@nb.njit(cache=True, nogil=True)
+def _solve_pair(  # type: ignore[no-untyped-def]
+    start, end, row, value, inverse_diagonal, permutation, masked, first, second, x, y
+):
+    n = first.shape[0]
+    work = np.zeros((n, 6))
+    for i in range(n):
+        p = permutation[i]
+        if not masked[p]:
+            for c in range(3):
+                work[i, c] = first[p, c]
+                work[i, c + 3] = second[p, c]
+    for i in range(n):
+        w0, w1, w2 = work[i, 0], work[i, 1], work[i, 2]
+        w3, w4, w5 = work[i, 3], work[i, 4], work[i, 5]
+        for q in range(start[i], end[i]):
+            r = row[q]
+            v = value[q]
+            work[r, 0] -= v * w0
+            work[r, 1] -= v * w1
+            work[r, 2] -= v * w2
+            work[r, 3] -= v * w3
+            work[r, 4] -= v * w4
+            work[r, 5] -= v * w5
+    for i in range(n - 1, -1, -1):
+        d = inverse_diagonal[i]
+        w0, w1, w2 = work[i, 0] * d, work[i, 1] * d, work[i, 2] * d
+        w3, w4, w5 = work[i, 3] * d, work[i, 4] * d, work[i, 5] * d
+        for q in range(start[i], end[i]):
+            r = row[q]
+            v = value[q]
+            w0 -= v * work[r, 0]
+            w1 -= v * work[r, 1]
+            w2 -= v * work[r, 2]
+            w3 -= v * work[r, 3]
+            w4 -= v * work[r, 4]
+            w5 -= v * work[r, 5]
+        work[i, 0] = w0
+        work[i, 1] = w1
+        work[i, 2] = w2
+        work[i, 3] = w3
+        work[i, 4] = w4
+        work[i, 5] = w5
+        p = permutation[i]
+        x[p, 0] = w0
+        x[p, 1] = w1
+        x[p, 2] = w2
+        y[p, 0] = w3
+        y[p, 1] = w4
+        y[p, 2] = w5
+
+
+@nb.njit(cache=True, nogil=True)
+def _reach(parent, inverse_permutation, nodes):  # type: ignore[no-untyped-def]
+    n = parent.shape[0]
+    marked = np.zeros(n, dtype=np.bool_)
+    count = 0
+    for k in range(nodes.shape[0]):
+        i = inverse_permutation[nodes[k]]
+        while i >= 0 and not marked[i]:
+            marked[i] = True
+            count += 1
+            i = parent[i]
+    columns = np.empty(count, dtype=np.int32)
+    count = 0
+    for i in range(n):
+        if marked[i]:
+            columns[count] = i
+            count += 1
+    return columns
+
+
+@nb.njit(cache=True, nogil=True)
+def restricted_solve(factor, columns, places, force, motion, work):  # type: ignore[no-untyped-def]
+    """Writes to `motion` (k,3) the rows of P_ff⁻¹ E `force` at the nodes where `force` (k,3) acts.
+
+    Args:
+        factor: `Factor.arrays`.
+        columns: of `Factor.reach`.
+        places: (k,) rows of the nodes in the order of elimination.
+        force: (k,3).
+        motion: (k,3), written.
+        work: (n,3) scratch.
+    """
+    start, end, row, value, inverse_diagonal, _ = factor
+    for s in range(columns.shape[0]):
+        i = columns[s]
+        work[i, 0] = 0.0
+        work[i, 1] = 0.0
+        work[i, 2] = 0.0
+    for k in range(places.shape[0]):
+        i = places[k]
+        work[i, 0] = force[k, 0]
+        work[i, 1] = force[k, 1]
+        work[i, 2] = force[k, 2]
+    for s in range(columns.shape[0]):
+        i = columns[s]
+        w0, w1, w2 = work[i, 0], work[i, 1], work[i, 2]
+        for q in range(start[i], end[i]):
+            r = row[q]
+            v = value[q]
+            work[r, 0] -= v * w0
+            work[r, 1] -= v * w1
+            work[r, 2] -= v * w2
+    for s in range(columns.shape[0] - 1, -1, -1):
+        i = columns[s]
+        d = inverse_diagonal[i]
+        w0, w1, w2 = work[i, 0] * d, work[i, 1] * d, work[i, 2] * d
+        for q in range(start[i], end[i]):
+            r = row[q]
+            v = value[q]
+            w0 -= v * work[r, 0]
+            w1 -= v * work[r, 1]
+            w2 -= v * work[r, 2]
+        work[i, 0] = w0
+        work[i, 1] = w1
+        work[i, 2] = w2
+    for k in range(places.shape[0]):
+        i = places[k]
+        motion[k, 0] = work[i, 0]
+        motion[k, 1] = work[i, 1]
+        motion[k, 2] = work[i, 2]
 
 
 @nb.njit(cache=True, nogil=True)

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, solve_into
-from drake_dress.models.cloth.forces import filtered_product
+from drake_dress.models.cloth.filtered_stiffness import filtered_product
 from drake_dress.models.cloth.matrices import Csr
 
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
@@ -39,15 +39,16 @@ class SystemMatrix:
         scale: float = 0.0,
     ) -> None:
         if elements is None:
-            triangle, gradient, scale = np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3, 2)), 0.0
+            triangle = np.zeros((0, 3, LANES), dtype=np.uint32)
+            gradient, scale = np.zeros((0, 5, LANES)), 0.0
         else:
-            triangle, gradient = elements.triangle, elements.triangle_gradient
+            triangle, gradient = elements.triangle_lanes, elements.gradient_lanes
         self._operator = (linear.indptr, linear.indices, linear.data, triangle, gradient)
         self._scale = scale
         self._inverse_diagonal = inverse_diagonal
 
     def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
-        """Returns A z (n,3); `block` (F,14) is what `prepare_filtered` wrote for this state."""
+        """Returns A z (n,3); `block` is what `prepare_filtered` wrote for this state."""
         out = np.empty_like(z)
         _apply((*self._operator, block, self._scale), z, out)
         return out

@@ -28,7 +28,8 @@ from drake_dress.models.cloth.filtered_cg import (
     SystemMatrix,
     project,
 )
-from drake_dress.models.cloth.forces import internal_force, prepare_filtered
+from drake_dress.models.cloth.filtered_stiffness import no_stretch, prepare_filtered
+from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -140,7 +141,7 @@ class ImplicitCloth:
         self._system = SystemMatrix(
             Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale
         )
-        self._block = np.empty((len(elements.triangle), 14))
+        self._block = no_stretch()
         self._factor: Factor | None = None
         self._steps_since_factor = 0
 
@@ -157,9 +158,7 @@ class ImplicitCloth:
         e, m, h = self.elements, self.material, self.time_step
         x, v = state.x, state.v
         force = internal_force(e, m.stretch_stiffness, m.bending_stiffness, x)
-        prepare_filtered(
-            x, e.triangle, e.triangle_gradient, e.triangle_area, m.stretch_stiffness, self._block
-        )
+        self._block = prepare_filtered(e, m.stretch_stiffness, x)
         force += self.mass[:, None] * self.gravity
         rhs = self.mass[:, None] * v + h * force
 

@@ -74,15 +74,14 @@ def test_derivative_of_a_contact_step_matches_finite_differences(h: float) -> No
     weight_r = 1e-3 * rng.normal(size=motion.shape)
 
     def loss(x: FloatArray, v: FloatArray, motion: FloatArray) -> tuple[float, Tape]:
-        x1, v1, r, tape = cloth.step(x, v, motion, limb, modes)
+        x1, v1, r, tape = cloth.step(x, v, motion, limb, types)
         value = np.sum(weight_x * x1) + np.sum(weight_v * v1) + np.sum(weight_r * r[cloth.held])
         return float(value), tape
 
-    modes = None
+    types = None
     _, tape = loss(x, v, motion)
-    modes = np.where(tape.mode <= SLIP, tape.mode, FREE).astype(np.int32)
-    assert np.any(modes == SLIP)
-    assert np.any(modes != FREE)
+    types = tape.types
+    assert np.any(types.mode == SLIP)
     _, tape = loss(x, v, motion)
     gradient = cloth.vector_jacobian_product(tape, weight_x, weight_v, weight_r)
     for name, point, slope in (
@@ -170,14 +169,14 @@ def test_derivative_by_the_motion_of_bodies_matches_finite_differences(h: float)
     cloth, x, v, bodies = _on_all_kinds(h)
     weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
     _, _, _, tape = cloth.step(x, v, NOTHING, bodies)
-    modes = tape.mode
-    assert set(tape.near.owner[modes != FREE]) == {0, 1, 2}
+    types = tape.types
+    assert set(types.owner[types.mode != FREE]) == {0, 1, 2}
 
     def loss(obstacles: Obstacles) -> float:
-        x1, v1, _, _ = cloth.step(x, v, NOTHING, obstacles, modes)
+        x1, v1, _, _ = cloth.step(x, v, NOTHING, obstacles, types)
         return float(np.sum(weight_x * x1) + np.sum(weight_v * v1))
 
-    _, _, _, tape = cloth.step(x, v, NOTHING, bodies, modes)
+    _, _, _, tape = cloth.step(x, v, NOTHING, bodies, types)
     g = cloth.vector_jacobian_product(tape, weight_x, weight_v, NOTHING)
     slope = np.stack([g.origin, g.rotation, g.velocity, g.angular_velocity], axis=1)
     scale = np.array([1.0, 1.0, 1.0 / h, 1.0 / h])[:, None]
@@ -197,9 +196,9 @@ def test_slipping_nodes_feel_friction_of_their_sticking_force() -> None:
     """One pass, as in the paper: the cone is held against the force of sticking."""
     cloth, x, v, motion, limb = _in_contact(0.01)
     _, _, reaction, tape = cloth.step(x, v, motion, limb)
-    slip = tape.mode == SLIP
-    n = tape.near.normal[slip]
-    r = reaction[slip]
+    slip = tape.friction.mode == SLIP
+    n = tape.contacts.normal[slip]
+    r = reaction[tape.contacts.nodes[slip]]
     tangential = r - np.einsum("ij,ij->i", r, n)[:, None] * n
     pressure = np.einsum("ij,ij->i", tape.stick_reaction[slip], n)
     assert np.all(pressure > 0.0)

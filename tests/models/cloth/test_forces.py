@@ -5,12 +5,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drake_dress.models.cloth.elements import Elements, FloatArray, make_elements
-from drake_dress.models.cloth.forces import (
-    filtered_product,
-    internal_force,
-    prepare_filtered,
-    stiffness_product,
-)
+from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
+from drake_dress.models.cloth.forces import internal_force, stiffness_product
 from tests.models.cloth.sheets import sheet, sheet_elements
 
 STRETCH, BENDING = 120.0, 2e-3
@@ -87,19 +83,17 @@ def test_filtered_stiffness_never_gains_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x, e = curved()
     crushed = x * rng.uniform(0.3, 1.5, size=3) + 0.004 * rng.normal(size=x.shape)
-    block = np.empty((len(e.triangle), 14))
-    prepare_filtered(crushed, e.triangle, e.triangle_gradient, e.triangle_area, STRETCH, block)
+    block = prepare_filtered(e, STRETCH, crushed)
     z, product = rng.normal(size=x.shape), np.zeros_like(x)
-    filtered_product(z, e.triangle, e.triangle_gradient, block, 1.0, product)
+    filtered_product(z, e.triangle_lanes, e.gradient_lanes, block, 1.0, product)
     assert np.sum(z * product) >= -1e-12
 
 
 def test_filtered_stiffness_is_exact_under_tension() -> None:
     x, e = sheet_elements(5, 6, 0.03)
     pulled = x * np.array([1.1, 1.2, 1.0])
-    block = np.empty((len(e.triangle), 14))
-    prepare_filtered(pulled, e.triangle, e.triangle_gradient, e.triangle_area, STRETCH, block)
+    block = prepare_filtered(e, STRETCH, pulled)
     z, product = np.random.default_rng(3).normal(size=x.shape), np.zeros_like(x)
-    filtered_product(z, e.triangle, e.triangle_gradient, block, 1.0, product)
+    filtered_product(z, e.triangle_lanes, e.gradient_lanes, block, 1.0, product)
     exact = stiffness_product(e, STRETCH, 0.0, pulled, z)
     np.testing.assert_allclose(product, exact, atol=1e-9 * np.abs(exact).max())

@@ -12,9 +12,19 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.contact.distance import nearest_obstacle, pack, surface_frame
+from drake_dress.models.cloth.contact.distance import (
+    distance_to,
+    may_touch,
+    nearest_obstacle,
+    surface_frame,
+)
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+
+# Within this gap, m, a node that heads for a surface's plane touches it, also beside the body.
+_NEAR = 0.02
+# Farthest a node in contact is from the origin of a body, m.
+_LARGEST_ARM = 1.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +54,7 @@ def find_proximity(
 ) -> Proximity:
     """Returns the gap of each node of `x` (n,3), with edges (E,2) and faces (F,3) where given."""
     n = len(x)
-    shapes = pack(obstacles)
+    shapes = obstacles.packed
     gap = np.empty(n)
     owner = np.empty(n, dtype=np.int32)
     nearest_obstacle(x, shapes, gap, owner)
@@ -60,6 +70,137 @@ def find_proximity(
     twist = obstacles.twists()
     surface_frame(x, shapes, obstacles.origins(), *twist, owner, normal, slope, velocity)
     return Proximity(gap - margin, owner, normal, slope, velocity)
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The nodes that touch something during a step.
+
+    Attributes:
+        nodes: (c,) indices, ascending.
+        gap: (c,) distance at the start of the step less the margin, m.
+        owner: (c,) obstacle that is touched.
+        normal: (c,3) outward unit; slope: (c,) such that the gap's gradient is slope · normal.
+        surface_velocity: (c,3) m/s.
+    """
+
+    nodes: IntArray
+    gap: FloatArray
+    owner: IntArray
+    normal: FloatArray
+    slope: FloatArray
+    surface_velocity: FloatArray
+
+
+NO_CONTACTS = Contacts(
+    np.zeros(0, dtype=np.int32),
+    np.zeros(0),
+    np.zeros(0, dtype=np.int32),
+    np.zeros((0, 3)),
+    np.zeros(0),
+    np.zeros((0, 3)),
+)
+
+
+def find_contacts(
+    x: FloatArray,
+    motion: FloatArray,
+    obstacles: Obstacles,
+    margin: float,
+    time_step: float,
+    excluded: BoolArray,
+) -> Contacts:
+    """Returns the nodes that lie in a margin, or would enter one by their `motion` (n,3), m.
+
+    Surfaces are taken as planes at the start of the step. With a large step a node may end in a
+    body that was not the nearest at the start, and may pass by the plane of a body far away without
+    touching it: so both are decided where the node ends.
+
+    Args:
+        x: (n,3) positions at the start of the step, m.
+        motion: (n,3) of the step without contact, m.
+        obstacles: at the start of the step, with velocities.
+        margin: m.
+        time_step: s.
+        excluded: (n,) nodes that do not touch anything.
+    """
+    if not obstacles.count:
+        return NO_CONTACTS
+    shapes = obstacles.packed
+    nodes, distance, owner = may_touch(
+        x, motion, shapes, margin, time_step * _fastest(obstacles), excluded
+    )
+    at = x[nodes]
+    near = _contacts(at, nodes, distance, owner, obstacles, margin)
+    relative = motion[nodes] - time_step * near.surface_velocity
+    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
+    touching = (ahead < 0.0) | (near.gap < 0.0)
+
+    end_distance, end_owner = np.empty(len(nodes)), np.empty(len(nodes), dtype=np.int32)
+    nearest_obstacle(at + relative, shapes, end_distance, end_owner)
+    entered = end_distance < margin
+    touching &= entered | (near.gap < _NEAR)
+    other = ~touching & entered & (end_owner != owner)
+    if other.any():
+        owner = np.where(other, end_owner, owner).astype(np.int32)
+        distance_to(at, shapes, owner, distance)
+        near = _contacts(at, nodes, distance, owner, obstacles, margin)
+        relative = motion[nodes] - time_step * near.surface_velocity
+        ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
+        touching |= other & (ahead < 0.0)
+    return _chosen(near, touching)
+
+
+def known_contacts(
+    x: FloatArray, nodes: IntArray, owner: IntArray, obstacles: Obstacles, margin: float
+) -> Contacts:
+    """Returns contact of `nodes` (c,) with the obstacles `owner` (c,), wherever they are."""
+    distance = np.empty(len(nodes))
+    distance_to(x[nodes], obstacles.packed, owner, distance)
+    return _contacts(x[nodes], nodes, distance, owner, obstacles, margin)
+
+
+def _contacts(
+    at: FloatArray,
+    nodes: IntArray,
+    distance: FloatArray,
+    owner: IntArray,
+    obstacles: Obstacles,
+    margin: float,
+) -> Contacts:
+    normal, slope = np.empty((len(nodes), 3)), np.empty(len(nodes))
+    velocity = np.empty((len(nodes), 3))
+    surface_frame(
+        at,
+        obstacles.packed,
+        obstacles.origins(),
+        *obstacles.twists(),
+        owner,
+        normal,
+        slope,
+        velocity,
+    )
+    return Contacts(nodes, distance - margin, owner, normal, slope, velocity)
+
+
+def _chosen(near: Contacts, chosen: BoolArray) -> Contacts:
+    return Contacts(
+        near.nodes[chosen],
+        near.gap[chosen],
+        near.owner[chosen],
+        near.normal[chosen],
+        near.slope[chosen],
+        near.surface_velocity[chosen],
+    )
+
+
+def _fastest(obstacles: Obstacles) -> float:
+    """Returns a bound on the speed of surfaces near the garment, m/s."""
+    if not obstacles.count:
+        return 0.0
+    v, w = obstacles.twists()
+    speed = np.linalg.norm(v, axis=1) + _LARGEST_ARM * np.linalg.norm(w, axis=1)
+    return float(speed.max())
 
 
 @nb.njit(cache=True, nogil=True)

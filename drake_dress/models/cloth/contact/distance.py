@@ -1,6 +1,7 @@
 """Signed distances, normals and their derivatives, compiled.
 
-Shapes come packed as a tuple of plain arrays (`pack`), so that kernels take them all at once.
+Shapes come packed as a tuple of plain arrays (`Obstacles.packed`), so that kernels take them all at
+once.
 """
 
 from __future__ import annotations
@@ -10,32 +11,10 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 
 # Farther than any garment is from anything, m.
 _FAR = 1e9
-
-
-def pack(obstacles: Obstacles) -> tuple[Any, ...]:
-    """Returns the arrays that the kernels take."""
-    o, p, s = obstacles, obstacles.half_spaces, obstacles.solids
-    count = len(s)
-    pose = np.zeros((count, 12))
-    grid = np.zeros((count, 4))
-    size = np.zeros((count, 4), dtype=np.int64)
-    offset = 0
-    for i, solid in enumerate(s):
-        pose[i, :9], pose[i, 9:] = solid.rotation.ravel(), solid.position
-        grid[i, :3], grid[i, 3] = solid.distance.origin, solid.distance.spacing
-        size[i, :3], size[i, 3] = solid.distance.coefficients.shape, offset
-        offset += solid.distance.coefficients.size
-    parts = [solid.distance.coefficients.ravel() for solid in s]
-    if len(parts) == 1:
-        spline = parts[0]
-    else:
-        spline = np.concatenate(parts) if parts else np.zeros(0)
-    return (o.a, o.b, o.radius, p.point, p.normal, (pose, grid, size, spline))
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -143,46 +122,97 @@ def _solid(p0, p1, p2, solids, m, gradient, hessian, order):  # type: ignore[no-
 
 
 @nb.njit(cache=True, nogil=True)
-def _nearest(p0, p1, p2, shapes, gradient, hessian):  # type: ignore[no-untyped-def]
-    """Returns least signed distance and owner of a point."""
-    a, b, radius, point, normal, solids = shapes
-    best = _FAR
-    who = -1
-    m = radius.shape[0]
-    for i in range(m):
-        d, _ = _capsule(p0, p1, p2, a, b, radius, i)
-        if d < best:
-            best = d
-            who = i
-    for i in range(point.shape[0]):
-        d = (
-            (p0 - point[i, 0]) * normal[i, 0]
-            + (p1 - point[i, 1]) * normal[i, 1]
-            + (p2 - point[i, 2]) * normal[i, 2]
-        )
-        if d < best:
-            best = d
-            who = m + i
-    for i in range(solids[0].shape[0]):
-        d = _solid(p0, p1, p2, solids, i, gradient, hessian, 0)
-        if d < best:
-            best = d
-            who = m + point.shape[0] + i
-    return best, who
-
-
-@nb.njit(cache=True, nogil=True)
 def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: IntArray) -> None:
     """Writes for each point of `x` (k,3) the least signed distance (k,), m, and whose it is (k,).
 
     `owner` is -1 where there is no obstacle.
     """
+    a, b, radius, point, normal, solids = shapes
+    m, k = radius.shape[0], point.shape[0]
+    for i in range(x.shape[0]):
+        p0, p1, p2 = x[i, 0], x[i, 1], x[i, 2]
+        best = _FAR
+        who = -1
+        for j in range(m):
+            d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+            if d < best:
+                best = d
+                who = j
+        for j in range(k):
+            d = (
+                (p0 - point[j, 0]) * normal[j, 0]
+                + (p1 - point[j, 1]) * normal[j, 1]
+                + (p2 - point[j, 2]) * normal[j, 2]
+            )
+            if d < best:
+                best = d
+                who = m + j
+        distance[i] = best
+        owner[i] = who
+    if solids[0].shape[0]:
+        _nearest_solid(x, solids, m + k, distance, owner)
+
+
+@nb.njit(cache=True, nogil=True)
+def _nearest_solid(x, solids, first, distance, owner):  # type: ignore[no-untyped-def]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
     for i in range(x.shape[0]):
-        d, who = _nearest(x[i, 0], x[i, 1], x[i, 2], shapes, gradient, hessian)
-        distance[i] = d
-        owner[i] = who
+        for j in range(solids[0].shape[0]):
+            d = _solid(x[i, 0], x[i, 1], x[i, 2], solids, j, gradient, hessian, 0)
+            if d < distance[i]:
+                distance[i] = d
+                owner[i] = first + j
+
+
+@nb.njit(cache=True, nogil=True)
+def distance_to(x: FloatArray, shapes: Any, owner: IntArray, distance: FloatArray) -> None:
+    """Writes the signed distance (k,), m, of each point of `x` (k,3) to the body `owner` (k,)."""
+    a, b, radius, point, normal, solids = shapes
+    m, k = radius.shape[0], point.shape[0]
+    gradient = np.empty(3)
+    hessian = np.empty((3, 3))
+    for i in range(x.shape[0]):
+        who = owner[i]
+        if who < m:
+            distance[i], _ = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
+        elif who < m + k:
+            distance[i] = 0.0
+            for c in range(3):
+                distance[i] += (x[i, c] - point[who - m, c]) * normal[who - m, c]
+        else:
+            distance[i] = _solid(
+                x[i, 0], x[i, 1], x[i, 2], solids, who - m - k, gradient, hessian, 0
+            )
+
+
+@nb.njit(cache=True, nogil=True)
+def may_touch(  # type: ignore[no-untyped-def]
+    x, motion, shapes, margin, surface_motion, excluded
+):
+    """Returns which nodes may touch something within a step: nodes (c,), distances, owners.
+
+    A distance changes by no more than its point moves, so whoever is farther away than that and
+    the farthest motion of a surface together is left out.
+    """
+    n = x.shape[0]
+    all_distance = np.empty(n)
+    all_owner = np.empty(n, dtype=np.int32)
+    nearest_obstacle(x, shapes, all_distance, all_owner)
+    nodes = np.empty(n, dtype=np.int32)
+    distance = np.empty(n)
+    owner = np.empty(n, dtype=np.int32)
+    count = 0
+    for i in range(n):
+        if excluded[i] or all_owner[i] < 0:
+            continue
+        way = np.sqrt(motion[i, 0] ** 2 + motion[i, 1] ** 2 + motion[i, 2] ** 2)
+        if all_distance[i] - margin < way + surface_motion:
+            nodes[count] = i
+            distance[count] = all_distance[i]
+            owner[count] = all_owner[i]
+            count += 1
+    return nodes[:count], distance[:count], owner[:count]
 
 
 @nb.njit(cache=True, nogil=True)

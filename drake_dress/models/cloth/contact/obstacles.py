@@ -8,6 +8,8 @@ solid) and an angular velocity.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -115,14 +117,39 @@ class Obstacles:
         plane = HalfSpaces.resting(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]))
         return replace(Obstacles.none(), half_spaces=plane)
 
+    @cached_property
+    def packed(self) -> tuple[Any, ...]:
+        """The shapes as kernels take them: capsules, half-spaces, and solids with their grids."""
+        p, solids = self.half_spaces, self.solids
+        count = len(solids)
+        pose = np.zeros((count, 12))
+        grid = np.zeros((count, 4))
+        size = np.zeros((count, 4), dtype=np.int64)
+        offset = 0
+        for i, solid in enumerate(solids):
+            pose[i, :9], pose[i, 9:] = solid.rotation.ravel(), solid.position
+            grid[i, :3], grid[i, 3] = solid.distance.origin, solid.distance.spacing
+            size[i, :3], size[i, 3] = solid.distance.coefficients.shape, offset
+            offset += solid.distance.coefficients.size
+        parts = [solid.distance.coefficients.ravel() for solid in solids]
+        if len(parts) == 1:
+            spline = parts[0]
+        else:
+            spline = np.concatenate(parts) if parts else np.zeros(0)
+        return (self.a, self.b, self.radius, p.point, p.normal, (pose, grid, size, spline))
+
     def origins(self) -> FloatArray:
         """Returns (count,3) the points whose velocities are given, in order of owners, m."""
-        solids = [s.position[None] for s in self.solids]
-        return np.concatenate([self.a, self.half_spaces.point, *solids])
+        return self._frames[0]
 
     def twists(self) -> tuple[FloatArray, FloatArray]:
         """Returns velocity of the origins (count,3), m/s, and angular velocity (count,3), rad/s."""
+        return self._frames[1], self._frames[2]
+
+    @cached_property
+    def _frames(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        o = [self.a, self.half_spaces.point, *(s.position[None] for s in self.solids)]
         v = [self.velocity, self.half_spaces.velocity, *(s.velocity[None] for s in self.solids)]
         w = [self.angular_velocity, self.half_spaces.angular_velocity]
         w += [s.angular_velocity[None] for s in self.solids]
-        return np.concatenate(v), np.concatenate(w)
+        return np.concatenate(o), np.concatenate(v), np.concatenate(w)

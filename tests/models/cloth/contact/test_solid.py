@@ -8,7 +8,7 @@ import trimesh
 
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.contact.detection import find_proximity
-from drake_dress.models.cloth.contact.distance import normal_derivative, pack
+from drake_dress.models.cloth.contact.distance import normal_derivative
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import SignedDistanceField, make_signed_distance_field
 from drake_dress.models.cloth.elements import FloatArray
@@ -84,7 +84,7 @@ def test_gap_and_normal_derivatives_match_finite_differences(
     along = near.slope * np.einsum("ij,ij->i", near.normal, d)
     np.testing.assert_allclose(gap_rate, along, rtol=1e-4, atol=1e-7)
     out = np.empty_like(x)
-    normal_derivative(x, pack(obstacles), near.owner, near.normal, bar, out)
+    normal_derivative(x, obstacles.packed, near.owner, near.normal, bar, out)
     rate = np.einsum("ij,ij->i", bar, (high.normal - low.normal) / (2.0 * step))
     np.testing.assert_allclose(np.einsum("ij,ij->i", out, d), rate, rtol=2e-4, atol=1e-5)
 

@@ -1,0 +1,236 @@
+"""The adjoint of a step of `ExplicitBiasCloth`, with contact types held.
+
+The step runs: sticking → modes and friction → motion → velocity. The adjoint runs back through the
+same solves; every inner iteration is symmetric, so they are solves of the same system. Beyond the
+paper it carries how friction follows the sticking force, the projection on the surface, how normals
+and gaps follow nodes and bodies, and how the system follows positions where it does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drake_dress.models.cloth.contact.distance import normal_derivative
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.forces import (
+    force_and_product,
+    stiffness_product,
+    stiffness_products,
+)
+
+if TYPE_CHECKING:
+    from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+
+# Distance, relative to the largest entry of v, over which K is differenced along v, m.
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Derivative of a scalar with respect to the inputs of a step.
+
+    Attributes:
+        x, v: (n,3). held_motion: (k,3).
+        origin: (m,3) by the position of each obstacle, per m.
+        rotation: (m,3) by its rotation about its origin, per rad, world axes.
+        velocity, angular_velocity: (m,3) by its velocities.
+        material: by the fields of `Material` of the same names, where asked for.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    held_motion: FloatArray
+    origin: FloatArray
+    rotation: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    material: dict[str, float] = field(default_factory=dict)
+
+
+def run_adjoint(
+    cloth: ExplicitBiasCloth,
+    tape: Tape,
+    x_bar: FloatArray,
+    v_bar: FloatArray,
+    held_reaction_bar: FloatArray,
+    by_material: bool,
+) -> Gradient:
+    """Returns the derivative by the inputs; see `ExplicitBiasCloth.vector_jacobian_product`."""
+    h, held, mass = cloth.time_step, cloth.held, cloth.mass[:, None]
+    t, contacts, friction, system = tape, tape.contacts, tape.friction, tape.system
+    nodes, normal, mode = contacts.nodes, contacts.normal, friction.mode
+    slip = mode == SLIP
+    touching = len(nodes) > 0
+
+    # reaction of the held nodes: (2/h²) (A Δx − g)
+    motion_in = x_bar
+    seed = (2.0 / h**2) * held_reaction_bar
+    seeded = bool(np.any(seed))
+    if seeded:
+        full_seed = np.zeros_like(x_bar)
+        full_seed[held] = seed
+        motion_in = x_bar + system.product(full_seed)
+    nothing = np.zeros((len(held), 3))
+    back_motion, back_change = system.start((motion_in, nothing), (v_bar, nothing))
+    back_stick = system.blank()
+
+    prescribed_in = normal_in = np.zeros((0, 3))
+    contact_change = stick_in = np.zeros((0, 3))
+    friction_in = 0.0
+    if touching:
+        bound = np.where(mode == FREE, FREE, STICK).astype(np.int32)
+        zero = np.zeros((len(nodes), 3))
+        # velocities of nodes in contact: Δx/h − v
+        pull, _ = system.hold(back_change, bound, normal, zero)
+        contact_change = -pull
+        # the motion
+        pull, solved = system.hold(back_motion, mode, normal, zero, force=contact_change / h)
+        prescribed_in = -pull
+        normal_in = np.zeros_like(prescribed_in)
+        if slip.any():
+            ns = normal[slip]
+            normal_in = system.by_normal(t.motion_unknown, back_motion, normal, t.prescribed, slip)
+            # friction follows the force of sticking
+            stick_in = np.zeros_like(prescribed_in)
+            mu = cloth.material.friction
+            r, d, p = t.stick_reaction[slip], friction.direction[slip], friction.pressure[slip]
+            f_in = (0.5 * h * h) * solved[slip]
+            along_d = np.einsum("ij,ij->i", d, f_in)
+            friction_in = float(np.sum(p * along_d))
+            pressure_in = mu * along_d
+            d_in = (mu * p)[:, None] * f_in
+            t_in = d_in - d * np.einsum("ij,ij->i", d, d_in)[:, None]
+            t_in /= np.maximum(friction.tangential[slip], 1e-300)[:, None]
+            t_normal = np.einsum("ij,ij->i", t_in, ns)
+            stick_in[slip] = (2.0 / h**2) * (t_in + (pressure_in - t_normal)[:, None] * ns)
+            normal_in[slip] += pressure_in[:, None] * r - p[:, None] * t_in - t_normal[:, None] * r
+            everything = np.full(len(nodes), STICK, dtype=np.int32)
+            push, _ = system.hold(back_stick, everything, normal, stick_in)
+            prescribed_in = prescribed_in + push
+
+    g_in, rate_in = system.finish(back_motion, back_change, less=back_stick)
+    held_change = v_bar[held] - system.held_rows(rate_in)
+    held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
+    if seeded:
+        g_in[held] -= seed
+    v_in = v_bar + (h * mass) * g_in
+    v_in[held] -= held_change
+    force_in = (0.5 * h * h) * g_in + h * rate_in
+    if touching:
+        v_in[nodes] -= contact_change
+
+    by_force, by_rate, along_v = _stiffness_terms(cloth, t.x, t.v, force_in, rate_in)
+    x_in = x_bar - by_force - (0.5 * h * h) * along_v
+    v_in -= (0.5 * h * h) * by_rate
+
+    bodies = np.zeros((4, t.obstacles.count, 3))
+    if touching:
+        x_in[nodes] += _contact_derivative(cloth, t, prescribed_in, normal_in, bodies)
+
+    solves = [(1.0, t.motion_unknown, back_motion), (1.0, t.change_unknown, back_change)]
+    if t.stick_unknown is not None and slip.any():
+        solves.append((-1.0, t.stick_unknown, back_stick))
+    if cloth.inner.depends_on_position:
+        for sign, forward, backward in solves:
+            for w, z in system.pairs(forward, backward):
+                x_in -= sign * cloth.inner.derivative(t.x, w, z)
+        if seeded:
+            x_in += cloth.inner.derivative(t.x, full_seed, t.motion)
+    material: dict[str, float] = {}
+    if by_material:
+        material = _material_derivative(cloth, t, g_in, rate_in, force_in)
+        for name in material:
+            for sign, forward, backward in solves:
+                material[name] += sign * system.by_parameter(name, forward, backward)
+            if seeded:
+                material[name] += float(np.sum(full_seed * system.share(name, t.motion)))
+        material["friction"] = friction_in
+        material["margin"] = float(np.sum(prescribed_in * normal)) if touching else 0.0
+    origin, rotation, velocity, angular_velocity = bodies
+    return Gradient(x_in, v_in, held_in, origin, rotation, velocity, angular_velocity, material)
+
+
+def _stiffness_terms(
+    cloth: ExplicitBiasCloth,
+    x: FloatArray,
+    v: FloatArray,
+    force_in: FloatArray,
+    rate_in: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns K force_in, K rate_in and ∂(rate_inᵀ K(x) v)/∂x, all (n,3).
+
+    K is the derivative of a gradient, so the last is the derivative of K rate_in along v.
+    """
+    m = cloth.material
+    stiffness = (cloth.elements, m.stretch_stiffness, m.bending_stiffness)
+    by_force, by_rate = stiffness_products(*stiffness, x, force_in, rate_in)
+    largest = float(np.abs(v).max())
+    if largest == 0.0:
+        return by_force, by_rate, np.zeros_like(x)
+    step = _STEP / largest
+    ahead = stiffness_product(*stiffness, x + step * v, rate_in)
+    return by_force, by_rate, (ahead - by_rate) / step
+
+
+def _material_derivative(
+    cloth: ExplicitBiasCloth,
+    tape: Tape,
+    g_in: FloatArray,
+    rate_in: FloatArray,
+    force_in: FloatArray,
+) -> dict[str, float]:
+    """Returns the derivative by stiffnesses and density through forces and right-hand sides.
+
+    Forces are linear in each of them.
+
+    Args:
+        cloth: the garment.
+        tape: of the step.
+        g_in: (n,3) derivative by the right-hand side of Δx.
+        rate_in: (n,3) by that of Δv.
+        force_in: (n,3) derivative by the force f.
+    """
+    h, found = cloth.time_step, {}
+    for name, k, b in (("stretch_stiffness", 1.0, 0.0), ("bending_stiffness", 0.0, 1.0)):
+        force, rate = force_and_product(cloth.elements, k, b, tape.x, tape.v)
+        found[name] = float(np.sum(force_in * force) - 0.5 * h * h * np.sum(rate_in * rate))
+    area = cloth.elements.node_area[:, None]
+    fall = area * cloth.gravity
+    found["surface_density"] = float(
+        np.sum(g_in * (h * area * tape.v + 0.5 * h * h * fall)) + h * np.sum(rate_in * fall)
+    )
+    return found
+
+
+def _contact_derivative(
+    cloth: ExplicitBiasCloth,
+    tape: Tape,
+    prescribed_in: FloatArray,
+    normal_in: FloatArray,
+    bodies: FloatArray,
+) -> FloatArray:
+    """Returns the derivative (c,3) of prescribed motions and normals by the nodes in contact.
+
+    The motion is h u − gap n, with u = v + ω × (x − origin) the surface's velocity. Adds to
+    `bodies` (4,m,3) the derivative by origins, rotations and velocities of the obstacles: a gap
+    only knows where a node is in its body's frame.
+    """
+    h, near = cloth.time_step, tape.contacts
+    x, owner, normal = tape.x[near.nodes], near.owner, near.normal
+    omega = tape.obstacles.twists()[1][owner]
+    arm = x - tape.obstacles.origins()[owner]
+    normal_in = normal_in - near.gap[:, None] * prescribed_in
+    along = near.slope * np.einsum("ij,ij->i", prescribed_in, normal)
+    geometric = np.empty_like(x)
+    normal_derivative(x, tape.obstacles.packed, owner, normal, normal_in, geometric)
+    geometric -= along[:, None] * normal
+    carried = h * np.cross(prescribed_in, omega)
+    np.add.at(bodies[0], owner, -geometric - carried)
+    np.add.at(bodies[1], owner, np.cross(normal, normal_in) - np.cross(arm, geometric))
+    np.add.at(bodies[2], owner, h * prescribed_in)
+    np.add.at(bodies[3], owner, h * np.cross(arm, prescribed_in))
+    return geometric + carried

@@ -1,0 +1,370 @@
+"""A = P: the paper's scheme with one iteration, exact, contact included.
+
+P = M + h² Σ w AᵀA never changes, so its factor with the grippers' nodes left out is made once.
+Contact adds unknown forces λ at its nodes. Their motion is E z_free + S λ, S = E P⁻¹ Eᵀ: P_ic⁻¹ of
+the paper, of which nothing is formed. Conjugate gradients find λ, with S applied by the few columns
+of the factor that the contact nodes reach and the sparse block P_cc as preconditioner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.factor import Factor, SymbolicFactor, restricted_solve
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
+from drake_dress.models.cloth.inner.interface import normal_of_exact
+from drake_dress.models.cloth.matrices import Csr
+
+_NO_NODES = np.zeros(0, dtype=np.int32)
+
+
+@dataclass
+class ForcedUnknown:
+    """Solution without contact (n,3).
+
+    Where nodes are bound: the forces (c,3) that change it, the binding part of them, and the
+    solution at the nodes.
+    """
+
+    free: FloatArray
+    force: FloatArray | None = None
+    binding: FloatArray | None = None
+    at_nodes: FloatArray | None = None
+
+
+class OneStep:
+    """The scheme with one iteration; see `InnerIteration`.
+
+    Args:
+        p: (n,n) P, symmetric positive definite.
+        shares: its derivatives by values of `Material`, by their names.
+        held: (k,) nodes with prescribed motion.
+        tolerance: of the motion of nodes in contact, relative to how far they are moved.
+        max_iterations: of conjugate gradients.
+    """
+
+    depends_on_position = False
+
+    def __init__(
+        self,
+        p: sp.csc_matrix,
+        shares: dict[str, Csr],
+        held: IntArray,
+        tolerance: float,
+        max_iterations: int = 300,
+    ) -> None:
+        n = p.shape[0]
+        masked = np.zeros(n, dtype=np.bool_)
+        masked[held] = True
+        self.matrix = Csr.of(p)
+        self.shares = shares
+        self.held = held
+        self.masked = masked
+        self.factor: Factor = SymbolicFactor(p).factorize(masked)
+        self.tolerance = tolerance
+        self.max_iterations = max_iterations
+        self.node_count = n
+
+    def derivative(self, x: FloatArray, w: FloatArray, z: FloatArray) -> FloatArray:
+        """Returns zero (n,3): P is the same for all positions."""
+        return np.zeros_like(x)
+
+    def at(self, x: FloatArray) -> OneStepSystem:
+        """Returns the system; it is the same for all positions (n,3)."""
+        return OneStepSystem(self)
+
+
+class OneStepSystem:
+    """P z = rhs of one step; see `StepSystem`."""
+
+    def __init__(self, scheme: OneStep) -> None:
+        self._scheme = scheme
+        self._nodes = _NO_NODES
+        self.iterations = 0
+
+    def start(
+        self, motion: tuple[FloatArray, FloatArray], change: tuple[FloatArray, FloatArray]
+    ) -> tuple[ForcedUnknown, ForcedUnknown]:
+        """See `StepSystem`."""
+        s, m = self._scheme, self._scheme.matrix
+        rhs = []
+        for right, held in (motion, change):
+            r = right.copy()
+            _subtract_held(m.indptr, m.indices, m.data, s.held, held, r)
+            rhs.append(r)
+        first, second = s.factor.solve_pair(*rhs)
+        first[s.held] = motion[1]
+        second[s.held] = change[1]
+        return ForcedUnknown(first), ForcedUnknown(second)
+
+    def touch(self, nodes: IntArray) -> None:
+        """See `StepSystem`."""
+        s, m = self._scheme, self._scheme.matrix
+        self._nodes = nodes
+        self._columns = s.factor.reach(nodes)
+        self._places = s.factor.inverse_permutation[nodes]
+        self._block = _block(m.indptr, m.indices, m.data, nodes)
+        self._work = np.empty((s.node_count, 3))
+
+    def hold(
+        self,
+        unknown: ForcedUnknown,
+        mode: IntArray,
+        normal: FloatArray,
+        target: FloatArray,
+        force: FloatArray | None = None,
+        guess: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """See `StepSystem`."""
+        s = self._scheme
+        free = unknown.free[self._nodes]
+        moved = np.zeros_like(free)
+        if force is not None:
+            self._move(force, moved)
+        binding = np.zeros_like(free) if guess is None else guess.copy()
+        start = np.zeros_like(free)
+        reached = free + moved
+        if guess is not None:
+            project(binding, mode, normal)
+            self._move(binding, start)
+        iterations, _ = _bind(
+            s.factor.arrays,
+            self._columns,
+            self._places,
+            self._block,
+            mode,
+            normal,
+            target - reached,
+            binding,
+            start,
+            self._work,
+            s.tolerance,
+            s.max_iterations,
+        )
+        self.iterations += iterations
+        unknown.force = binding if force is None else binding + force
+        unknown.binding, unknown.at_nodes = binding, reached + start
+        return unknown.binding, unknown.at_nodes
+
+    def finish(
+        self, motion: ForcedUnknown, change: ForcedUnknown, less: ForcedUnknown | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """See `StepSystem`."""
+        if not len(self._nodes):
+            return motion.free, change.free
+        first = np.zeros_like(motion.free)
+        second = np.zeros_like(motion.free)
+        if motion.force is not None:
+            first[self._nodes] += motion.force
+        if less is not None and less.force is not None:
+            first[self._nodes] -= less.force
+        if change.force is not None:
+            second[self._nodes] += change.force
+        first, second = self._scheme.factor.solve_pair(first, second)
+        first += motion.free
+        second += change.free
+        return first, second
+
+    def blank(self) -> ForcedUnknown:
+        """See `StepSystem`."""
+        return ForcedUnknown(np.zeros((self._scheme.node_count, 3)))
+
+    def pairs(
+        self, forward: ForcedUnknown, backward: ForcedUnknown
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """See `StepSystem`."""
+        return [(self._solution(backward), self._solution(forward))]
+
+    def by_normal(
+        self,
+        forward: ForcedUnknown,
+        backward: ForcedUnknown,
+        normal: FloatArray,
+        target: FloatArray,
+        slip: BoolArray,
+    ) -> FloatArray:
+        """See `StepSystem`."""
+        assert forward.binding is not None and forward.at_nodes is not None
+        assert backward.binding is not None and backward.at_nodes is not None
+        return normal_of_exact(
+            forward.binding,
+            forward.at_nodes,
+            backward.binding,
+            backward.at_nodes,
+            normal,
+            target,
+            slip,
+        )
+
+    def again(self, unknown: ForcedUnknown) -> ForcedUnknown:
+        """See `StepSystem`."""
+        return ForcedUnknown(unknown.free)
+
+    def by_parameter(self, name: str, forward: ForcedUnknown, backward: ForcedUnknown) -> float:
+        """See `StepSystem`."""
+        pairs = self.pairs(forward, backward)
+        change = -sum(float(np.sum(w * self.share(name, z))) for w, z in pairs)
+        return change
+
+    def share(self, name: str, z: FloatArray) -> FloatArray:
+        """See `StepSystem`."""
+        out, m = np.empty_like(z), self._scheme.shares[name]
+        matrix_product(m.indptr, m.indices, m.data, z, out)
+        return out
+
+    def product(self, z: FloatArray) -> FloatArray:
+        """See `StepSystem`."""
+        out, m = np.empty_like(z), self._scheme.matrix
+        matrix_product(m.indptr, m.indices, m.data, z, out)
+        return out
+
+    def held_rows(self, z: FloatArray) -> FloatArray:
+        """See `StepSystem`."""
+        s, m = self._scheme, self._scheme.matrix
+        out = np.empty((len(s.held), 3))
+        _rows(m.indptr, m.indices, m.data, s.held, z, out)
+        return out
+
+    def _solution(self, unknown: ForcedUnknown) -> FloatArray:
+        if unknown.force is None:
+            return unknown.free
+        forces = np.zeros_like(unknown.free)
+        forces[self._nodes] = unknown.force
+        solution: FloatArray = unknown.free + self._scheme.factor.solve(forces)
+        return solution
+
+    def _move(self, force: FloatArray, motion: FloatArray) -> None:
+        s = self._scheme
+        restricted_solve(s.factor.arrays, self._columns, self._places, force, motion, self._work)
+
+
+@nb.njit(cache=True, nogil=True)
+def _bind(  # type: ignore[no-untyped-def]
+    factor, columns, places, block, mode, normal, lack, binding, moved, work, tolerance, most
+):
+    """Conjugate gradients on Π S Π λ = Π lack; improves `binding` and its motion S λ in place."""
+    k = places.shape[0]
+    residual = lack.copy()
+    project(residual, mode, normal)
+    conditioned = np.empty((k, 3))
+    _precondition(block, mode, normal, residual, conditioned)
+    floor = _dot(residual, conditioned)
+    for i in range(k):
+        for c in range(3):
+            residual[i, c] = lack[i, c] - moved[i, c]
+    project(residual, mode, normal)
+    _precondition(block, mode, normal, residual, conditioned)
+    rho = _dot(residual, conditioned)
+    floor = max(floor, 1e-300)
+    direction = conditioned.copy()
+    step = np.empty((k, 3))
+    iterations = 0
+    while iterations < most and rho > tolerance * tolerance * floor:
+        restricted_solve(factor, columns, places, direction, step, work)
+        curvature = _dot(direction, step)
+        if curvature <= 0.0:
+            break
+        alpha = rho / curvature
+        for i in range(k):
+            for c in range(3):
+                binding[i, c] += alpha * direction[i, c]
+                moved[i, c] += alpha * step[i, c]
+        project(step, mode, normal)
+        for i in range(k):
+            for c in range(3):
+                residual[i, c] -= alpha * step[i, c]
+        _precondition(block, mode, normal, residual, conditioned)
+        new = _dot(residual, conditioned)
+        beta = new / rho
+        rho = new
+        for i in range(k):
+            for c in range(3):
+                direction[i, c] = conditioned[i, c] + beta * direction[i, c]
+        iterations += 1
+    return iterations, np.sqrt(rho / floor)
+
+
+@nb.njit(cache=True, nogil=True)
+def project(z, mode, normal):  # type: ignore[no-untyped-def]
+    """Keeps of `z` (c,3), in place, what the modes bind: all, the normal part, nothing."""
+    for i in range(mode.shape[0]):
+        if mode[i] == SLIP:
+            d = z[i, 0] * normal[i, 0] + z[i, 1] * normal[i, 1] + z[i, 2] * normal[i, 2]
+            z[i, 0] = d * normal[i, 0]
+            z[i, 1] = d * normal[i, 1]
+            z[i, 2] = d * normal[i, 2]
+        elif mode[i] != STICK:
+            z[i, 0] = 0.0
+            z[i, 1] = 0.0
+            z[i, 2] = 0.0
+
+
+@nb.njit(cache=True, nogil=True)
+def _precondition(block, mode, normal, residual, out):  # type: ignore[no-untyped-def]
+    indptr, indices, data = block
+    matrix_product(indptr, indices, data, residual, out)
+    project(out, mode, normal)
+
+
+@nb.njit(cache=True, nogil=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    s = 0.0
+    for i in range(a.shape[0]):
+        s += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
+    return s
+
+
+@nb.njit(cache=True, nogil=True)
+def _subtract_held(indptr, indices, data, held, motion, rhs):  # type: ignore[no-untyped-def]
+    """Takes P_fh `motion` (k,3) off `rhs` (n,3), in place; rows of held nodes have no meaning."""
+    for k in range(held.shape[0]):
+        i = held[k]
+        for q in range(indptr[i], indptr[i + 1]):
+            j = indices[q]
+            for c in range(3):
+                rhs[j, c] -= data[q] * motion[k, c]
+
+
+@nb.njit(cache=True, nogil=True)
+def _rows(indptr, indices, data, nodes, z, out):  # type: ignore[no-untyped-def]
+    for k in range(nodes.shape[0]):
+        i = nodes[k]
+        for c in range(3):
+            out[k, c] = 0.0
+        for q in range(indptr[i], indptr[i + 1]):
+            for c in range(3):
+                out[k, c] += data[q] * z[indices[q], c]
+
+
+@nb.njit(cache=True, nogil=True)
+def _block(indptr, indices, data, nodes):  # type: ignore[no-untyped-def]
+    """Returns the block of a CSR matrix between `nodes` (c,), as CSR."""
+    k = nodes.shape[0]
+    local = np.full(indptr.shape[0] - 1, -1, dtype=np.int32)
+    for a in range(k):
+        local[nodes[a]] = a
+    start = np.zeros(k + 1, dtype=np.int32)
+    for a in range(k):
+        i = nodes[a]
+        for q in range(indptr[i], indptr[i + 1]):
+            if local[indices[q]] >= 0:
+                start[a + 1] += 1
+    for a in range(k):
+        start[a + 1] += start[a]
+    column = np.empty(start[k], dtype=np.int32)
+    value = np.empty(start[k])
+    at = 0
+    for a in range(k):
+        i = nodes[a]
+        for q in range(indptr[i], indptr[i + 1]):
+            b = local[indices[q]]
+            if b >= 0:
+                column[at] = b
+                value[at] = data[q]
+                at += 1
+    return start, column, value
