@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.contact.distance import normal_derivative
@@ -221,16 +222,54 @@ def _contact_derivative(
     """
     h, near = cloth.time_step, tape.contacts
     x, owner, normal = tape.x[near.nodes], near.owner, near.normal
-    omega = tape.obstacles.twists()[1][owner]
-    arm = x - tape.obstacles.origins()[owner]
     normal_in = normal_in - near.gap[:, None] * prescribed_in
-    along = near.slope * np.einsum("ij,ij->i", prescribed_in, normal)
     geometric = np.empty_like(x)
     normal_derivative(x, tape.obstacles.packed, owner, normal, normal_in, geometric)
-    geometric -= along[:, None] * normal
-    carried = h * np.cross(prescribed_in, omega)
-    np.add.at(bodies[0], owner, -geometric - carried)
-    np.add.at(bodies[1], owner, np.cross(normal, normal_in) - np.cross(arm, geometric))
-    np.add.at(bodies[2], owner, h * prescribed_in)
-    np.add.at(bodies[3], owner, h * np.cross(arm, prescribed_in))
-    return geometric + carried
+    _carry(
+        h,
+        x,
+        owner,
+        normal,
+        near.slope,
+        tape.obstacles.origins(),
+        tape.obstacles.twists()[1],
+        prescribed_in,
+        normal_in,
+        geometric,
+        bodies,
+    )
+    return geometric
+
+
+@nb.njit(cache=True, nogil=True)
+def _carry(  # type: ignore[no-untyped-def]
+    h, x, owner, normal, slope, origin, omega, prescribed_in, normal_in, geometric, bodies
+):
+    """Adds to `geometric` (c,3), the part of the normals, all else, and to `bodies` (4,m,3)."""
+    for i in range(x.shape[0]):
+        m = owner[i]
+        n0, n1, n2 = normal[i, 0], normal[i, 1], normal[i, 2]
+        p0, p1, p2 = prescribed_in[i, 0], prescribed_in[i, 1], prescribed_in[i, 2]
+        q0, q1, q2 = normal_in[i, 0], normal_in[i, 1], normal_in[i, 2]
+        a0, a1, a2 = x[i, 0] - origin[m, 0], x[i, 1] - origin[m, 1], x[i, 2] - origin[m, 2]
+        w0, w1, w2 = omega[m, 0], omega[m, 1], omega[m, 2]
+        along = slope[i] * (p0 * n0 + p1 * n1 + p2 * n2)
+        g0 = geometric[i, 0] - along * n0
+        g1 = geometric[i, 1] - along * n1
+        g2 = geometric[i, 2] - along * n2
+        c0, c1, c2 = h * (p1 * w2 - p2 * w1), h * (p2 * w0 - p0 * w2), h * (p0 * w1 - p1 * w0)
+        geometric[i, 0] = g0 + c0
+        geometric[i, 1] = g1 + c1
+        geometric[i, 2] = g2 + c2
+        bodies[0, m, 0] -= g0 + c0
+        bodies[0, m, 1] -= g1 + c1
+        bodies[0, m, 2] -= g2 + c2
+        bodies[1, m, 0] += (n1 * q2 - n2 * q1) - (a1 * g2 - a2 * g1)
+        bodies[1, m, 1] += (n2 * q0 - n0 * q2) - (a2 * g0 - a0 * g2)
+        bodies[1, m, 2] += (n0 * q1 - n1 * q0) - (a0 * g1 - a1 * g0)
+        bodies[2, m, 0] += h * p0
+        bodies[2, m, 1] += h * p1
+        bodies[2, m, 2] += h * p2
+        bodies[3, m, 0] += h * (a1 * p2 - a2 * p1)
+        bodies[3, m, 1] += h * (a2 * p0 - a0 * p2)
+        bodies[3, m, 2] += h * (a0 * p1 - a1 * p0)

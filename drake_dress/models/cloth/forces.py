@@ -43,7 +43,11 @@ def stiffness_product(
     elements: Elements, stretch: float, bending: float, x: FloatArray, z: FloatArray
 ) -> FloatArray:
     """Returns K(x) z (n,3), K = −∂f/∂x the exact (symmetric) stiffness; see `internal_force`."""
-    return force_and_product(elements, stretch, bending, x, z)[1]
+    e, product = elements, np.zeros_like(x)
+    _stretch_product(x, z, e.triangle_lanes, e.gradient_lanes, stretch, product)
+    if bending > 0.0:
+        _bending_product(x, z, e.hinge_lanes, e.bend_lanes, bending, product)
+    return product
 
 
 def force_and_product(
@@ -215,6 +219,30 @@ def _stretch_both(x, z, nodes, gradient, stretch, force, product):  # type: igno
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _stretch_product(x, z, nodes, gradient, stretch, product):  # type: ignore[no-untyped-def]
+    tile = np.empty(6 * LANES)
+    other = np.empty(6 * LANES)
+    for b in range(nodes.shape[0]):
+        gather(x, nodes, b, tile)
+        gather(z, nodes, b, other)
+        for l in range(LANES):
+            a0, a1, b0, b1, area = _row(gradient, b, l)
+            u0, u1, u2, v0, v1, v2 = _edges(tile, l)
+            r = polar(
+                u0 * a0 + v0 * b0,
+                u0 * a1 + v0 * b1,
+                u1 * a0 + v1 * b0,
+                u1 * a1 + v1 * b1,
+                u2 * a0 + v2 * b0,
+                u2 * a1 + v2 * b1,
+            )
+            w = stretch * area
+            u0, u1, u2, v0, v1, v2 = _edges(other, l)
+            _put(other, l, _times(r, _normal(r), w, a0, a1, b0, b1, u0, u1, u2, v0, v1, v2))
+        scatter(other, nodes, b, product)
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _stretch_products(x, y, z, nodes, gradient, stretch, of_y, of_z):  # type: ignore[no-untyped-def]
     tile = np.empty(6 * LANES)
     first = np.empty(6 * LANES)
@@ -288,6 +316,32 @@ def _bending_both(x, z, nodes, bend, bending, force, product):  # type: ignore[n
             other[LANES + l] = scale * t1 + along * s1
             other[2 * LANES + l] = scale * t2 + along * s2
         _scatter_hinges(tile, nodes, bend, b, force)
+        _scatter_hinges(other, nodes, bend, b, product)
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _bending_product(x, z, nodes, bend, bending, product):  # type: ignore[no-untyped-def]
+    tile = np.empty(3 * LANES)
+    other = np.empty(3 * LANES)
+    for b in range(nodes.shape[0]):
+        _gather_hinges(x, nodes, bend, b, tile)
+        _gather_hinges(z, nodes, bend, b, other)
+        for l in range(LANES):
+            s0, s1, s2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
+            rest = bend[b, 5, l]
+            least = _LEAST_CURVATURE * rest
+            length2 = s0 * s0 + s1 * s1 + s2 * s2
+            bounded = max(length2, least * least + 1e-300)
+            share = rest / np.sqrt(bounded)
+            weight = bending * bend[b, 4, l]
+            scale = weight * (1.0 - share)
+            along = weight * share / bounded
+            along = along if length2 >= bounded else 0.0
+            t0, t1, t2 = other[l], other[LANES + l], other[2 * LANES + l]
+            dot = along * (s0 * t0 + s1 * t1 + s2 * t2)
+            other[l] = scale * t0 + dot * s0
+            other[LANES + l] = scale * t1 + dot * s1
+            other[2 * LANES + l] = scale * t2 + dot * s2
         _scatter_hinges(other, nodes, bend, b, product)
 
 

@@ -1,11 +1,8 @@
 """Laws and derivatives of the controller's garment."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
@@ -138,29 +135,9 @@ def _on_all_kinds(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, 
 
 
 def _moved(o: Obstacles, owner: int, d: FloatArray) -> Obstacles:
-    """Returns obstacles with one displaced, turned and sped up by the rows of `d` (4,3)."""
-    turn = Rotation.from_rotvec(d[1])
-    if owner == 0:
-        a = o.a + d[0]
-        b = a + turn.apply(o.b - o.a)
-        return replace(
-            o, a=a, b=b, velocity=o.velocity + d[2], angular_velocity=o.angular_velocity + d[3]
-        )
-    if owner == 1:
-        p = o.half_spaces
-        p = HalfSpaces(
-            p.point + d[0], turn.apply(p.normal), p.velocity + d[2], p.angular_velocity + d[3]
-        )
-        return replace(o, half_spaces=p)
-    s = o.solids[0]
-    s = Solid(
-        s.distance,
-        turn.as_matrix() @ s.rotation,
-        s.position + d[0],
-        s.velocity + d[2],
-        s.angular_velocity + d[3],
-    )
-    return replace(o, solids=(s,))
+    offset = np.zeros((o.count, 4, 3))
+    offset[owner] = d
+    return o.moved(offset)
 
 
 @pytest.mark.parametrize("h", [0.005, 0.05])

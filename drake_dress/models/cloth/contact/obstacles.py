@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from drake_dress.models.cloth.contact.solid import SignedDistanceField
 from drake_dress.models.cloth.elements import FloatArray
@@ -116,6 +117,44 @@ class Obstacles:
         """Returns a resting horizontal half-space whose surface is at z = `height`, m."""
         plane = HalfSpaces.resting(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]))
         return replace(Obstacles.none(), half_spaces=plane)
+
+    def moved(self, offset: FloatArray) -> Obstacles:
+        """Returns the bodies displaced, turned and sped up by `offset` (count,4,3).
+
+        Rows are a displacement of the origin, m, a rotation vector about it, rad, and additions to
+        velocity, m/s, and angular velocity, rad/s, all in world axes, bodies in order of owners:
+        what `Gradient` differentiates by.
+        """
+        m, k = len(self.radius), len(self.half_spaces.point)
+        turn = Rotation.from_rotvec(offset[:, 1])
+        a = self.a + offset[:m, 0]
+        p = self.half_spaces
+        plane = slice(m, m + k)
+        half_spaces = HalfSpaces(
+            p.point + offset[plane, 0],
+            turn[plane].apply(p.normal) if k else p.normal,
+            p.velocity + offset[plane, 2],
+            p.angular_velocity + offset[plane, 3],
+        )
+        solids = tuple(
+            Solid(
+                s.distance,
+                turn[m + k + i].as_matrix() @ s.rotation,
+                s.position + offset[m + k + i, 0],
+                s.velocity + offset[m + k + i, 2],
+                s.angular_velocity + offset[m + k + i, 3],
+            )
+            for i, s in enumerate(self.solids)
+        )
+        return Obstacles(
+            a,
+            a + turn[:m].apply(self.b - self.a) if m else self.b,
+            self.radius,
+            self.velocity + offset[:m, 2],
+            self.angular_velocity + offset[:m, 3],
+            half_spaces,
+            solids,
+        )
 
     @cached_property
     def packed(self) -> tuple[Any, ...]:

@@ -1,0 +1,147 @@
+"""Many steps in a row, and their derivative with memory that grows with the root of their number.
+
+A tape holds some thirty arrays of the garment. So only the states at the start of segments are
+kept; the adjoint runs the segments again, last one first, and holds the tapes of one at a time. A
+step is a pure function, so the second run repeats the first bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+
+Observer = Callable[[int, FloatArray, FloatArray, FloatArray], None]
+# The derivative of a loss by positions (n,3), velocities (n,3), held reactions (k,3) of a step.
+Seeds = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What is kept of a run of N steps.
+
+    Attributes:
+        held_motion: (N,k,3) of each step, m.
+        obstacles: of each step.
+        starts: numbers of the steps whose states are kept, ascending from 0.
+        states: positions and velocities (n,3) before these steps.
+        x, v: (n,3) at the end.
+    """
+
+    cloth: ExplicitBiasCloth
+    held_motion: FloatArray
+    obstacles: Sequence[Obstacles]
+    starts: list[int]
+    states: list[tuple[FloatArray, FloatArray]]
+    x: FloatArray
+    v: FloatArray
+
+
+@dataclass
+class RolloutGradient:
+    """Derivative of a scalar by the inputs of a rollout of N steps.
+
+    Attributes:
+        x, v: (n,3) by the state at the start.
+        held_motion: (N,k,3).
+        bodies: (N,m,4,3) by position, rotation, velocity and angular velocity of each obstacle at
+            each step; see `Gradient`.
+        material: by the fields of `Material`, where asked for.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    held_motion: FloatArray
+    bodies: FloatArray
+    material: dict[str, float] = field(default_factory=dict)
+
+
+def roll_out(
+    cloth: ExplicitBiasCloth,
+    x: FloatArray,
+    v: FloatArray,
+    held_motion: FloatArray,
+    obstacles: Sequence[Obstacles],
+    observe: Observer | None = None,
+    segment: int | None = None,
+) -> Rollout:
+    """Runs N steps.
+
+    Args:
+        cloth: the garment.
+        x: (n,3) positions at the start, m.
+        v: (n,3) velocities, m/s.
+        held_motion: (N,k,3) displacement of the held nodes in each step, m.
+        obstacles: at the start of each of the N steps.
+        observe: called after each step with its number, positions, velocities and reactions of the
+            held nodes (k,3), N.
+        segment: steps whose tapes the adjoint may hold at once; by default √N.
+
+    Raises:
+        ValueError: numbers of steps differ, or a step fails: the message names it.
+    """
+    count = len(held_motion)
+    if len(obstacles) != count:
+        raise ValueError(
+            f"{count} motions and {len(obstacles)} sets of obstacles, expected as many"
+        )
+    length = segment or max(1, math.isqrt(count))
+    starts, states = [], []
+    for j in range(count):
+        if j % length == 0:
+            starts.append(j)
+            states.append((x, v))
+        try:
+            x, v, reaction, _ = cloth.step(x, v, held_motion[j], obstacles[j])
+        except ValueError as error:
+            raise ValueError(f"step {j}: {error}") from error
+        if observe:
+            observe(j, x, v, reaction[cloth.held])
+    return Rollout(cloth, held_motion, obstacles, starts, states, x, v)
+
+
+def roll_back(
+    rollout: Rollout,
+    seeds: Callable[[int, FloatArray, FloatArray, FloatArray], Seeds | None],
+    by_material: bool = False,
+) -> RolloutGradient:
+    """Returns the derivative of a loss by the inputs of a rollout.
+
+    Args:
+        rollout: of `roll_out`.
+        seeds: gives, for the number of a step and its results (positions, velocities, reactions of
+            the held nodes), the derivative of the loss by them; None where it does not depend on
+            them. Called once a step, last step first.
+        by_material: also by the material's values.
+    """
+    cloth, motion, obstacles = rollout.cloth, rollout.held_motion, rollout.obstacles
+    count = len(motion)
+    x_bar, v_bar = np.zeros_like(rollout.x), np.zeros_like(rollout.v)
+    bodies = np.zeros((count, obstacles[0].count if count else 0, 4, 3))
+    held_in = np.zeros_like(motion)
+    material: dict[str, float] = {}
+    ends = [*rollout.starts[1:], count]
+    for start, end, state in reversed(list(zip(rollout.starts, ends, rollout.states, strict=True))):
+        tapes: list[tuple[Tape, FloatArray, FloatArray, FloatArray]] = []
+        x, v = state
+        for j in range(start, end):
+            x, v, reaction, tape = cloth.step(x, v, motion[j], obstacles[j])
+            tapes.append((tape, x, v, reaction[cloth.held]))
+        for j in range(end - 1, start - 1, -1):
+            tape, x, v, reaction = tapes.pop()
+            given = seeds(j, x, v, reaction)
+            reaction_bar = np.zeros_like(reaction)
+            if given is not None:
+                x_bar, v_bar, reaction_bar = x_bar + given[0], v_bar + given[1], given[2]
+            g = cloth.vector_jacobian_product(tape, x_bar, v_bar, reaction_bar, by_material)
+            x_bar, v_bar, held_in[j] = g.x, g.v, g.held_motion
+            bodies[j] = np.stack([g.origin, g.rotation, g.velocity, g.angular_velocity], axis=1)
+            for name, value in g.material.items():
+                material[name] = material.get(name, 0.0) + value
+    return RolloutGradient(x_bar, v_bar, held_in, bodies, material)
