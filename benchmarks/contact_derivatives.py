@@ -28,7 +28,7 @@ from drake_dress.models.cloth.material import Material
 STEPS = (0.001, 0.005, 0.01, 0.05, 0.1)
 _DIRECTIONS = 8
 # Short, because forces have kinks (where a hinge has lost its direction): m.
-_DIFFERENCE = 1e-8
+_DIFFERENCE = 1e-9
 
 
 @dataclass(frozen=True)

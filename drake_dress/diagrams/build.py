@@ -26,6 +26,8 @@ def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat
             mesh=mesh,
             material=material(scenario.plant.material),
             time_step=scenario.plant.time_step,
+            integrator=scenario.plant.integrator,
+            self_collision=scenario.plant.self_collision,
             measures=measures(person),
             posture=posture(person),
             arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},

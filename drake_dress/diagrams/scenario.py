@@ -61,7 +61,7 @@ class Material:
 
     surface_density: float = 0.3  # kg/m²
     stretch_stiffness: float = 100.0  # N/m
-    bending_stiffness: float = 5e-4  # N·m
+    bending_stiffness: float = 1.5e-3  # N·m
     damping: float = 0.003  # s, of the plant's integrator
     friction: float = 0.3
     margin: float = 0.003  # m, kept between node and skin
@@ -127,6 +127,8 @@ class Plant:
 
     spacing: float = 0.02  # of the garment's mesh, m
     time_step: float = 0.004  # s
+    integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
+    self_collision: bool = False  # layers of the garment do not pass through each other
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
@@ -238,6 +240,7 @@ _CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.mesh.unit": ("m", "cm", "mm"),
     "person.posture": ("standing", "sitting"),
+    "plant.integrator": ("implicit", "projective_dynamics"),
     "station.kind": ("simulated",),
 }
 

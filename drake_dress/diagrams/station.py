@@ -23,9 +23,11 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.person import JointParameters, Person, add_person
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_height
 from drake_dress.models.sides import SIDES, Side
@@ -54,6 +56,8 @@ class StationParameters:
     distance_behind: float = 0.45
     height_offset: float = 0.0
     lateral_offset: float = 0.0
+    integrator: str = "implicit"
+    self_collision: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     cloth = builder.AddNamedSystem(
         "cloth",
         ClothPlant(
-            ImplicitCloth(elements, p.material, p.time_step, held),
+            _integrator(p, elements, held),
             (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
             start,
             grippers,
@@ -128,6 +132,18 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     diagram = builder.Build()
     diagram.set_name("station")
     return Station(diagram, plant, scene_graph, person, cloth, grippers)
+
+
+def _integrator(p: StationParameters, elements: Elements, held: np.ndarray) -> Integrator:
+    """Returns what steps the plant's garment."""
+    integrator: Integrator
+    if p.integrator == "projective_dynamics":
+        integrator = ProjectiveDynamicsCloth(
+            elements, p.material, p.time_step, held, quasi_newton=True
+        )
+    else:
+        integrator = ImplicitCloth(elements, p.material, p.time_step, held)
+    return LayeredCloth(integrator) if p.self_collision else integrator
 
 
 def settled(p: StationParameters, hung: FloatArray, held: np.ndarray) -> FloatArray:

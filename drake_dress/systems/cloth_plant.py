@@ -13,7 +13,8 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.human.body import Capsule
 
 FloatArray = np.ndarray
@@ -47,7 +48,7 @@ class ClothPlant(LeafSystem):
     each body that is touched. All outputs depend on discrete state only.
 
     Args:
-        cloth: the stepper; its held nodes are those of the left, then of the right gripper.
+        cloth: the integrator; its held nodes are those of the left, then of the right gripper.
         held_count: how many nodes the left and the right gripper hold.
         start: (n,3) garment at time 0, m.
         start_grippers: (2,3) p_WG of left and right at time 0, m.
@@ -57,7 +58,7 @@ class ClothPlant(LeafSystem):
 
     def __init__(
         self,
-        cloth: ImplicitCloth,
+        cloth: Integrator,
         held_count: tuple[int, int],
         start: FloatArray,
         start_grippers: FloatArray,

@@ -24,7 +24,12 @@ person:
   measures: {shoulder_width: 0.4}
   left_arm: {abduction_deg: 20.0}
   joints: {shoulder_stiffness: 3.0}
-plant: {spacing: 0.03, time_step: 0.005, material: {friction: 0.5}}
+plant:
+  spacing: 0.03
+  time_step: 0.005
+  integrator: projective_dynamics
+  self_collision: true
+  material: {friction: 0.5}
 controller:
   spacing: 0.04
   material: {stretch_stiffness: 80}

@@ -15,19 +15,20 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.contact.distance import normal_derivative
-from drake_dress.models.cloth.elements import FloatArray
-from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.elements import BoolArray, FloatArray
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK
 from drake_dress.models.cloth.forces import (
     force_and_product,
     stiffness_product,
     stiffness_products,
 )
+from drake_dress.models.cloth.layered import pushed_nodes
 
 if TYPE_CHECKING:
     from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
 
-# Distance, relative to the largest entry of v, over which K is differenced along v, m.
-_STEP = 1e-6
+# Farthest that a node moves where K is differenced along v, m.
+_STEP = 1e-8
 
 
 @dataclass(frozen=True)
@@ -67,62 +68,64 @@ def run_adjoint(
     slip = mode == SLIP
     touching = len(nodes) > 0
 
-    # reaction of the held nodes: (2/h²) (A Δx − g)
+    # layers kept apart after the solves
     motion_in = x_bar
+    if t.separation is not None and cloth.layers is not None:
+        pushed = pushed_nodes(t.separation.rate_change)[:, None]
+        motion_in = cloth.layers.correct_vjp(t.separation, x_bar)
+        motion_in += cloth.layers.rate_vjp(t.separation, np.where(pushed, v_bar / h, 0.0))
+        v_bar = np.where(pushed, 0.0, v_bar)
+
+    # reaction of the held nodes: (2/h²) (A Δx − g)
     seed = (2.0 / h**2) * held_reaction_bar
     seeded = bool(np.any(seed))
     if seeded:
         full_seed = np.zeros_like(x_bar)
         full_seed[held] = seed
-        motion_in = x_bar + system.product(full_seed)
+        motion_in = motion_in + system.product(full_seed)
     nothing = np.zeros((len(held), 3))
     back_motion, back_change = system.start((motion_in, nothing), (v_bar, nothing))
     back_stick = system.blank()
 
     prescribed_in = normal_in = np.zeros((0, 3))
-    contact_change = stick_in = np.zeros((0, 3))
+    target_in = np.zeros((0, 3))
     friction_in = 0.0
     if touching:
-        bound = np.where(mode == FREE, FREE, STICK).astype(np.int32)
         zero = np.zeros((len(nodes), 3))
-        # velocities of nodes in contact: Δx/h − v
-        pull, _ = system.hold(back_change, bound, normal, zero)
-        contact_change = -pull
+        everything = np.full(len(nodes), STICK, dtype=np.int32)
+        late = friction.velocity_mode == SLIP
+        # velocities
+        pull, _ = system.hold(
+            back_change, friction.velocity_mode, normal, zero, friction.push, backward=True
+        )
+        target_in = -pull
         # the motion
-        pull, solved = system.hold(back_motion, mode, normal, zero, force=contact_change / h)
+        pull, _ = system.hold(back_motion, mode, normal, zero, friction.push, backward=True)
         prescribed_in = -pull
         normal_in = np.zeros_like(prescribed_in)
         if slip.any():
-            ns = normal[slip]
-            normal_in = system.by_normal(t.motion_unknown, back_motion, normal, t.prescribed, slip)
-            # friction follows the force of sticking
-            stick_in = np.zeros_like(prescribed_in)
-            mu = cloth.material.friction
-            r, d, p = t.stick_reaction[slip], friction.direction[slip], friction.pressure[slip]
-            f_in = (0.5 * h * h) * solved[slip]
-            along_d = np.einsum("ij,ij->i", d, f_in)
-            friction_in = float(np.sum(p * along_d))
-            pressure_in = mu * along_d
-            d_in = (mu * p)[:, None] * f_in
-            t_in = d_in - d * np.einsum("ij,ij->i", d, d_in)[:, None]
-            t_in /= np.maximum(friction.tangential[slip], 1e-300)[:, None]
-            t_normal = np.einsum("ij,ij->i", t_in, ns)
-            stick_in[slip] = (2.0 / h**2) * (t_in + (pressure_in - t_normal)[:, None] * ns)
-            normal_in[slip] += pressure_in[:, None] * r - p[:, None] * t_in - t_normal[:, None] * r
-            everything = np.full(len(nodes), STICK, dtype=np.int32)
-            push, _ = system.hold(back_stick, everything, normal, stick_in)
+            by_row, by_binding = system.by_directions(
+                t.motion_unknown, back_motion, t.prescribed, slip
+            )
+            if late.any():
+                more = system.by_directions(t.change_unknown, back_change, t.target_change, late)
+                by_row, by_binding = by_row + more[0], by_binding + more[1]
+            # friction follows the direction of the force of sticking
+            stick_in, by_friction, friction_in = _through_friction(cloth, t, by_binding, slip)
+            normal_in = by_row + by_binding + by_friction
+            push, _ = system.hold(back_stick, everything, normal, (2.0 / h**2) * stick_in)
             prescribed_in = prescribed_in + push
 
     g_in, rate_in = system.finish(back_motion, back_change, less=back_stick)
     held_change = v_bar[held] - system.held_rows(rate_in)
     held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
     if seeded:
-        g_in[held] -= seed
+        g_in = g_in - full_seed
     v_in = v_bar + (h * mass) * g_in
     v_in[held] -= held_change
     force_in = (0.5 * h * h) * g_in + h * rate_in
     if touching:
-        v_in[nodes] -= contact_change
+        v_in[nodes] -= target_in
 
     by_force, by_rate, along_v = _stiffness_terms(cloth, t.x, t.v, force_in, rate_in)
     x_in = x_bar - by_force - (0.5 * h * h) * along_v
@@ -130,7 +133,7 @@ def run_adjoint(
 
     bodies = np.zeros((4, t.obstacles.count, 3))
     if touching:
-        x_in[nodes] += _contact_derivative(cloth, t, prescribed_in, normal_in, bodies)
+        x_in[nodes] += _contact_derivative(cloth, t, prescribed_in, target_in, normal_in, bodies)
 
     solves = [(1.0, t.motion_unknown, back_motion), (1.0, t.change_unknown, back_change)]
     if t.stick_unknown is not None and slip.any():
@@ -153,6 +156,32 @@ def run_adjoint(
         material["margin"] = float(np.sum(prescribed_in * normal)) if touching else 0.0
     origin, rotation, velocity, angular_velocity = bodies
     return Gradient(x_in, v_in, held_in, origin, rotation, velocity, angular_velocity, material)
+
+
+def _through_friction(
+    cloth: ExplicitBiasCloth, tape: Tape, binding_in: FloatArray, slip: BoolArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Returns the derivative by sticking forces (c,3), normals (c,3) and the coefficient.
+
+    Slipping nodes are bound along n + μ d, d the direction of the sticking force's tangential part.
+
+    Args:
+        cloth: the garment.
+        tape: of the step.
+        binding_in: (c,3) derivative by n + μ d of the nodes in contact.
+        slip: (c,) which of them slip.
+    """
+    friction, n = tape.friction, tape.contacts.normal[slip]
+    r, d, p = tape.stick_reaction[slip], friction.direction[slip], friction.pressure[slip]
+    b_in = binding_in[slip]
+    d_in = cloth.material.friction * b_in
+    t_in = d_in - d * np.einsum("ij,ij->i", d, d_in)[:, None]
+    t_in /= np.maximum(friction.tangential[slip], 1e-300)[:, None]
+    t_normal = np.einsum("ij,ij->i", t_in, n)[:, None]
+    reaction_in, normal_in = np.zeros_like(binding_in), np.zeros_like(binding_in)
+    reaction_in[slip] = t_in - t_normal * n
+    normal_in[slip] = -p[:, None] * t_in - t_normal * r
+    return reaction_in, normal_in, float(np.sum(b_in * d))
 
 
 def _stiffness_terms(
@@ -211,12 +240,13 @@ def _contact_derivative(
     cloth: ExplicitBiasCloth,
     tape: Tape,
     prescribed_in: FloatArray,
+    target_in: FloatArray,
     normal_in: FloatArray,
     bodies: FloatArray,
 ) -> FloatArray:
-    """Returns the derivative (c,3) of prescribed motions and normals by the nodes in contact.
+    """Returns the derivative (c,3) of what is prescribed and of normals by the nodes in contact.
 
-    The motion is h u − gap n, with u = v + ω × (x − origin) the surface's velocity. Adds to
+    The motion is h u − gap n, the velocity u = v + ω × (x − origin) that of the surface. Adds to
     `bodies` (4,m,3) the derivative by origins, rotations and velocities of the obstacles: a gap
     only knows where a node is in its body's frame.
     """
@@ -226,7 +256,6 @@ def _contact_derivative(
     geometric = np.empty_like(x)
     normal_derivative(x, tape.obstacles.packed, owner, normal, normal_in, geometric)
     _carry(
-        h,
         x,
         owner,
         normal,
@@ -234,6 +263,7 @@ def _contact_derivative(
         tape.obstacles.origins(),
         tape.obstacles.twists()[1],
         prescribed_in,
+        h * prescribed_in + target_in,
         normal_in,
         geometric,
         bodies,
@@ -243,13 +273,14 @@ def _contact_derivative(
 
 @nb.njit(cache=True, nogil=True)
 def _carry(  # type: ignore[no-untyped-def]
-    h, x, owner, normal, slope, origin, omega, prescribed_in, normal_in, geometric, bodies
+    x, owner, normal, slope, origin, omega, prescribed_in, surface_in, normal_in, geometric, bodies
 ):
     """Adds to `geometric` (c,3), the part of the normals, all else, and to `bodies` (4,m,3)."""
     for i in range(x.shape[0]):
         m = owner[i]
         n0, n1, n2 = normal[i, 0], normal[i, 1], normal[i, 2]
         p0, p1, p2 = prescribed_in[i, 0], prescribed_in[i, 1], prescribed_in[i, 2]
+        s0, s1, s2 = surface_in[i, 0], surface_in[i, 1], surface_in[i, 2]
         q0, q1, q2 = normal_in[i, 0], normal_in[i, 1], normal_in[i, 2]
         a0, a1, a2 = x[i, 0] - origin[m, 0], x[i, 1] - origin[m, 1], x[i, 2] - origin[m, 2]
         w0, w1, w2 = omega[m, 0], omega[m, 1], omega[m, 2]
@@ -257,7 +288,7 @@ def _carry(  # type: ignore[no-untyped-def]
         g0 = geometric[i, 0] - along * n0
         g1 = geometric[i, 1] - along * n1
         g2 = geometric[i, 2] - along * n2
-        c0, c1, c2 = h * (p1 * w2 - p2 * w1), h * (p2 * w0 - p0 * w2), h * (p0 * w1 - p1 * w0)
+        c0, c1, c2 = s1 * w2 - s2 * w1, s2 * w0 - s0 * w2, s0 * w1 - s1 * w0
         geometric[i, 0] = g0 + c0
         geometric[i, 1] = g1 + c1
         geometric[i, 2] = g2 + c2
@@ -267,9 +298,9 @@ def _carry(  # type: ignore[no-untyped-def]
         bodies[1, m, 0] += (n1 * q2 - n2 * q1) - (a1 * g2 - a2 * g1)
         bodies[1, m, 1] += (n2 * q0 - n0 * q2) - (a2 * g0 - a0 * g2)
         bodies[1, m, 2] += (n0 * q1 - n1 * q0) - (a0 * g1 - a1 * g0)
-        bodies[2, m, 0] += h * p0
-        bodies[2, m, 1] += h * p1
-        bodies[2, m, 2] += h * p2
-        bodies[3, m, 0] += h * (a1 * p2 - a2 * p1)
-        bodies[3, m, 1] += h * (a2 * p0 - a0 * p2)
-        bodies[3, m, 2] += h * (a0 * p1 - a1 * p0)
+        bodies[2, m, 0] += s0
+        bodies[2, m, 1] += s1
+        bodies[2, m, 2] += s2
+        bodies[3, m, 0] += a1 * s2 - a2 * s1
+        bodies[3, m, 1] += a2 * s0 - a0 * s2
+        bodies[3, m, 2] += a0 * s1 - a1 * s0

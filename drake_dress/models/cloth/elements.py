@@ -33,8 +33,11 @@ class Elements:
         triangle_area: (F,) rest area, m².
         hinge: (H,4) node indices: the shared edge first, then the two opposite corners.
         hinge_coefficient: (H,4) c_i, dimensionless.
-        hinge_weight: (H,) 3 / (area of the two triangles), 1/m²; the hinge's energy is
-            ½ B weight (‖Σ c x‖ − rest)², B the bending stiffness (Bergou et al. 2006).
+        hinge_weight: (H,) 1 / (area of the two triangles), 1/m²; the hinge's energy is
+            ½ B weight (‖Σ c x‖ − rest)². (Bergou et al. 2006 have 3 in place of 1. A sheet bent to
+            a cylinder then stores three times ½ B κ² on equilateral triangles and on a grid along
+            its lines, 4.5 times across the diagonals of a grid; with 1 a strip droops by its
+            bending length.)
         hinge_rest: (H,) ‖Σ c x‖ at rest, m.
         node_area: (n,) a third of the area of the triangles around a node, m².
         edge: (E,2) unique edges; edge_rest_length: (E,) m.
@@ -100,7 +103,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
 
     hinge, hinge_faces = _hinges(triangle)
     coefficient = _hinge_coefficients(x, hinge)
-    weight = 3.0 / (area[hinge_faces[:, 0]] + area[hinge_faces[:, 1]])
+    weight = 1.0 / (area[hinge_faces[:, 0]] + area[hinge_faces[:, 1]])
     rest = np.linalg.norm(np.einsum("hi,hij->hj", coefficient, x[hinge]), axis=1)
 
     half_edges = np.sort(triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)

@@ -13,9 +13,14 @@ force is an elastic bounce, springs at the grippers report forces that are not t
 
 1. all nodes in reach stick, Δx = h u_surface − gap n, which takes the force r;
 2. nodes with r·n < 0 take off; those with ‖r_T‖ > μ r_N slip: they keep their normal motion and
-   feel the friction μ r_N along r_T; the rest sticks. The reduced system (three rows for stick,
-   one for slip) is solved for Δx: it stays bounded for tight sleeves and large steps;
-3. contact nodes take the velocity Δx/h, the others follow A Δv = h f + ½h² df/dt.
+   feel friction along r_T, μ times the normal force that they then have; the rest sticks. The
+   reduced system (three rows for stick, one for slip) is solved for Δx: it stays bounded for tight
+   sleeves and large steps. Nodes that it would have to draw to a surface are let go and sticking
+   ones that friction cannot hold slip, and it is solved again;
+3. sticking nodes take the velocity of the surface, slipping ones do so along its normal and feel
+   the same friction, unless it stops them within the step; all others follow
+   A Δv = h f + ½h² df/dt. (With the velocity Δx/h instead, a node that starts to slide gains only
+   half of its speed.)
 
 `step` returns a tape with which `vector_jacobian_product` (adjoint.py) runs the exact adjoint of
 the step with contact types held: friction follows the sticking force, normals follow the nodes.
@@ -30,10 +35,15 @@ import scipy.sparse as sp
 
 from drake_dress.models.cloth.adjoint import Gradient, run_adjoint
 from drake_dress.models.cloth.contact.detection import Contacts, find_contacts, known_contacts
-from drake_dress.models.cloth.contact.friction import NO_CONTACT, Friction, find_modes
+from drake_dress.models.cloth.contact.friction import (
+    NO_CONTACT,
+    Friction,
+    find_modes,
+    revise_modes,
+)
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
+from drake_dress.models.cloth.filtered_cg import HELD, STICK
 from drake_dress.models.cloth.forces import force_and_product
 from drake_dress.models.cloth.implicit import GRAVITY
 from drake_dress.models.cloth.inner.conjugate_gradients import ConjugateGradients
@@ -42,6 +52,8 @@ from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.interface import InnerIteration, StepSystem, Unknown
 from drake_dress.models.cloth.inner.one_step import OneStep
 from drake_dress.models.cloth.inner.stationary import Stationary
+from drake_dress.models.cloth.layered import inverse_mass, pushed_nodes
+from drake_dress.models.cloth.layers.separation import LayerSeparation, SeparationRecord
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -51,6 +63,8 @@ from drake_dress.models.cloth.matrices import (
     stretch_matrix,
 )
 
+# Solves of the motion, at most, while modes are corrected by the forces that they led to.
+_MOST_REVISIONS = 4
 INNER = ("one_step", "stationary", "conjugate_gradients", "direct")
 
 
@@ -60,12 +74,14 @@ class ContactTypes:
 
     Attributes:
         nodes: (c,) ascending; owner: (c,) obstacles.
-        mode: (c,) STICK, SLIP or, for nodes that take off, FREE.
+        mode: (c,) STICK, SLIP or, for nodes that take off, FREE; velocity_mode: (c,) likewise of
+            the velocity at the end of the step.
     """
 
     nodes: IntArray
     owner: IntArray
     mode: IntArray
+    velocity_mode: IntArray
 
 
 @dataclass(frozen=True)
@@ -77,10 +93,12 @@ class Tape:
         force, stiffness_rate: (n,3) f and K v at x.
         system: the linear system; motion_unknown, change_unknown: of Δx and Δv; stick_unknown: of
             Δx with all contact nodes sticking, None without contact.
-        contacts: nodes that touch something; prescribed: (c,3) Δx of sticking, m.
+        contacts: nodes that touch something; prescribed: (c,3) Δx of sticking, m;
+            target_change: (c,3) its Δv, m/s.
         friction: their modes and what follows from the sticking force.
         stick_reaction: (c,3) the force that sticking would take, N.
         binding: (c,3) λ of the motion, kg·m. motion, change: (n,3) Δx, Δv.
+        separation: how layers were kept apart, which changed Δx and Δv once more; None where off.
     """
 
     x: FloatArray
@@ -95,17 +113,20 @@ class Tape:
     stick_unknown: Unknown | None
     contacts: Contacts
     prescribed: FloatArray
+    target_change: FloatArray
     friction: Friction
     stick_reaction: FloatArray
     binding: FloatArray
     motion: FloatArray
     change: FloatArray
+    separation: SeparationRecord | None
     held: IntArray
 
     @property
     def types(self) -> ContactTypes:
         """The contact of this step, to hold in another."""
-        return ContactTypes(self.contacts.nodes, self.contacts.owner, self.friction.mode)
+        f = self.friction
+        return ContactTypes(self.contacts.nodes, self.contacts.owner, f.mode, f.velocity_mode)
 
     @property
     def mode(self) -> IntArray:
@@ -127,6 +148,9 @@ class ExplicitBiasCloth:
         gravity: (3,) m/s².
         tolerance: of solves by conjugate gradients, relative.
         iterations: of the inner iteration: 1 for the paper's one-step scheme.
+        self_collision: thickness, m, that layers of the garment keep; 0 lets them pass. Layers are
+            kept apart after the step (layers/), by the pairs, weights and directions that the
+            adjoint holds.
         inner: which inner iteration (`INNER`); by default `one_step` for 1 iteration and
             `conjugate_gradients` for more.
 
@@ -144,6 +168,7 @@ class ExplicitBiasCloth:
         tolerance: float = 1e-4,
         iterations: int = 1,
         inner: str | None = None,
+        self_collision: float = 0.0,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -151,6 +176,7 @@ class ExplicitBiasCloth:
         self.held = np.asarray(held, dtype=np.int32)
         self.gravity = np.asarray(gravity, dtype=np.float64)
         self.mass = lumped_mass(elements, material)
+        self.layers = LayerSeparation(elements, self_collision) if self_collision else None
         self.held_mask = np.zeros(elements.node_count, dtype=np.bool_)
         self.held_mask[self.held] = True
         self.inner = self._make_inner(
@@ -213,30 +239,59 @@ class ExplicitBiasCloth:
             stick_unknown = system.again(motion_unknown)
             stick_binding, _ = system.hold(stick_unknown, everything, contacts.normal, prescribed)
             stick_reaction = (2.0 / h**2) * stick_binding
+            target_change = contacts.surface_velocity - v[contacts.nodes]
             friction = find_modes(
-                stick_reaction, contacts.normal, m.friction, None if types is None else types.mode
-            )
-            binding, reached = system.hold(
-                motion_unknown,
-                friction.mode,
+                stick_reaction,
                 contacts.normal,
-                prescribed,
-                force=(0.5 * h * h) * friction.force,
-                guess=stick_binding,
+                m.friction,
+                -self.mass[contacts.nodes, None] * target_change,
+                h,
+                None if types is None else (types.mode, types.velocity_mode),
             )
-            bound = np.where(friction.mode == FREE, FREE, STICK).astype(np.int32)
-            velocity_change = reached / h - v[contacts.nodes]
-            system.hold(change_unknown, bound, contacts.normal, velocity_change)
+            binding = stick_binding
+            for _ in range(_MOST_REVISIONS):
+                binding, _ = system.hold(
+                    motion_unknown,
+                    friction.mode,
+                    contacts.normal,
+                    prescribed,
+                    friction.push,
+                    binding,
+                )
+                if types is not None or not revise_modes(
+                    binding, contacts.normal, contacts.gap, m.friction, friction
+                ):
+                    break
+            # A lasting force r moves by ½h² r and hastens by h r.
+            system.hold(
+                change_unknown,
+                friction.velocity_mode,
+                contacts.normal,
+                target_change,
+                friction.push,
+                (2.0 / h) * binding,
+            )
         else:
             stick_unknown, stick_reaction, binding = None, prescribed, prescribed
+            target_change = prescribed
             friction = NO_CONTACT
         motion, change = system.finish(motion_unknown, change_unknown)
+        proposed, separation = motion, None
+        if self.layers is not None:
+            mode = np.zeros(len(x), dtype=np.int32)
+            mode[contacts.nodes] = friction.mode
+            mode[self.held] = HELD
+            barred = np.zeros_like(x)
+            barred[contacts.nodes] = contacts.normal
+            motion, separation = self.layers.correct(
+                x, motion, inverse_mass(self.mass, mode), barred
+            )
 
         reaction = np.zeros_like(x)
         g = self.mass[self.held, None] * (h * v[self.held]) + (0.5 * h * h) * total[self.held]
-        reaction[self.held] = (2.0 / h**2) * (system.held_rows(motion) - g)
+        reaction[self.held] = (2.0 / h**2) * (system.held_rows(proposed) - g)
         if n_c:
-            reaction[contacts.nodes] = (2.0 / h**2) * binding + friction.force
+            reaction[contacts.nodes] = (2.0 / h**2) * binding
         tape = Tape(
             x=x,
             v=v,
@@ -250,14 +305,20 @@ class ExplicitBiasCloth:
             stick_unknown=stick_unknown,
             contacts=contacts,
             prescribed=prescribed,
+            target_change=target_change,
             friction=friction,
             stick_reaction=stick_reaction,
             binding=binding,
-            motion=motion,
+            motion=proposed,
             change=change,
+            separation=separation,
             held=self.held,
         )
-        return x + motion, v + change, reaction, tape
+        if separation is None:
+            return x + motion, v + change, reaction, tape
+        pushed = pushed_nodes(separation.rate_change)
+        velocity = np.where(pushed[:, None], (proposed + separation.rate_change) / h, v + change)
+        return x + motion, velocity, reaction, tape
 
     def vector_jacobian_product(
         self,

@@ -49,6 +49,8 @@ _REFACTOR_AFTER = 40
 _NEAR = 0.05
 # The passes before the last only find the modes: their tolerance is this much coarser.
 _COARSER = 6.0
+# Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
+_TOLERATED_EXCESS = 0.02
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
 
@@ -106,6 +108,7 @@ class ImplicitCloth:
         max_iterations: of conjugate gradients, per pass.
         max_passes: of the active-set iteration, per step; what is left over is mended in the next.
         sample_elements: contact at edge midpoints and face centroids too.
+        most_cone_passes: solves added, at most, while nodes stick beyond what friction can hold.
     """
 
     def __init__(
@@ -119,6 +122,7 @@ class ImplicitCloth:
         max_iterations: int = 40,
         max_passes: int = 2,
         sample_elements: bool = True,
+        most_cone_passes: int = 3,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -129,6 +133,7 @@ class ImplicitCloth:
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._max_passes = max_passes
+        self._most_cone_passes = most_cone_passes
         self._edge = elements.edge if sample_elements else None
         self._triangle = elements.triangle if sample_elements else None
 
@@ -185,7 +190,7 @@ class ImplicitCloth:
         _initial_friction(state.reaction, near.normal, m.friction * h, mode, friction)
 
         velocity = self._start(v, held_velocity, mode, near.normal, rhs)
-        total, residual, passes, changed = 0, 0.0, 0, 1
+        total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
         refactored = self._renew_factor(mode)
         max_passes = self._max_passes if np.any(near.gap < _NEAR) else 1
         while True:
@@ -208,6 +213,10 @@ class ImplicitCloth:
             impulse -= rhs
             passes += 1
             if last:
+                # Sticking may not hold more than friction can: what does slides after all.
+                if left > 0 and _slip_out_of_cone(near.normal, impulse, m.friction, mode, friction):
+                    left -= 1
+                    continue
                 break
             changed = _update_modes(
                 near.gap,
@@ -352,6 +361,57 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
                 along += normal[i, c] * (surface_velocity[i, c] - velocity[i, c])
             for c in range(3):
                 velocity[i, c] += along * normal[i, c]
+
+
+@nb.njit(cache=True, nogil=True)
+def _slip_out_of_cone(normal, impulse, mu, mode, friction):  # type: ignore[no-untyped-def]
+    """Lets sticking nodes slip whose friction exceeds the cone; returns if it matters in sum."""
+    excess = 0.0
+    bound = 0.0
+    for i in range(mode.shape[0]):
+        if mode[i] != STICK and mode[i] != SLIP:
+            continue
+        pressure = 0.0
+        for c in range(3):
+            pressure += impulse[i, c] * normal[i, c]
+        pressure = max(pressure, 0.0)
+        bound += mu * pressure
+        if mode[i] == SLIP:
+            continue
+        tangential = 0.0
+        for c in range(3):
+            tangential += (impulse[i, c] - pressure * normal[i, c]) ** 2
+        tangential = np.sqrt(tangential)
+        if tangential > mu * pressure:
+            excess += tangential - mu * pressure
+    if excess <= _TOLERATED_EXCESS * bound:
+        return False
+    for i in range(mode.shape[0]):
+        if mode[i] != STICK and mode[i] != SLIP:
+            continue
+        pressure = 0.0
+        for c in range(3):
+            pressure += impulse[i, c] * normal[i, c]
+        pressure = max(pressure, 0.0)
+        if mode[i] == SLIP:
+            size = 0.0
+            for c in range(3):
+                size += friction[i, c] ** 2
+            size = np.sqrt(size)
+            if size > 0.0:
+                for c in range(3):
+                    friction[i, c] *= mu * pressure / size
+            continue
+        tangential = 0.0
+        for c in range(3):
+            tangential += (impulse[i, c] - pressure * normal[i, c]) ** 2
+        tangential = np.sqrt(tangential)
+        if tangential > mu * pressure:
+            mode[i] = SLIP
+            for c in range(3):
+                t = impulse[i, c] - pressure * normal[i, c]
+                friction[i, c] = mu * pressure * t / tangential
+    return True
 
 
 @nb.njit(cache=True, nogil=True)

@@ -24,7 +24,7 @@ class Material:
 
     surface_density: float = 0.3
     stretch_stiffness: float = 100.0
-    bending_stiffness: float = 5e-4
+    bending_stiffness: float = 1.5e-3
     damping: float = 0.0
     friction: float = 0.3
     margin: float = 3e-3

@@ -34,10 +34,9 @@ class ClothStep(torch.autograd.Function):
         material: torch.Tensor,
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Runs the step; see `cloth_step`."""
-        arrays = [_array(t) for t in (x, v, held_motion)]
         offset = _array(bodies)
         moved = obstacles.moved(offset) if offset.any() else obstacles
-        x1, v1, reaction, tape = cloth.step(*arrays, moved)
+        x1, v1, reaction, tape = cloth.step(_array(x), _array(v), _array(held_motion), moved)
         ctx.cloth, ctx.tape = cloth, tape
         ctx.by_material = ctx.needs_input_grad[6]
         return tuple(torch.from_numpy(a) for a in (x1, v1, reaction[cloth.held]))  # type: ignore[return-value]

@@ -14,6 +14,7 @@ import numpy as np
 
 from drake_dress.models.cloth.contact.distance import (
     distance_to,
+    first_touch,
     may_touch,
     nearest_obstacle,
     surface_frame,
@@ -21,8 +22,6 @@ from drake_dress.models.cloth.contact.distance import (
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 
-# Within this gap, m, a node that heads for a surface's plane touches it, also beside the body.
-_NEAR = 0.02
 # Farthest a node in contact is from the origin of a body, m.
 _LARGEST_ARM = 1.0
 
@@ -112,9 +111,8 @@ def find_contacts(
 ) -> Contacts:
     """Returns the nodes that lie in a margin, or would enter one by their `motion` (n,3), m.
 
-    Surfaces are taken as planes at the start of the step. With a large step a node may end in a
-    body that was not the nearest at the start, and may pass by the plane of a body far away without
-    touching it: so both are decided where the node ends.
+    Which bodies a node comes to is found along its way, so that a large step leaps over nothing;
+    what it comes to is taken as the plane at the point nearest to where it starts.
 
     Args:
         x: (n,3) positions at the start of the step, m.
@@ -133,21 +131,14 @@ def find_contacts(
     at = x[nodes]
     near = _contacts(at, nodes, distance, owner, obstacles, margin)
     relative = motion[nodes] - time_step * near.surface_velocity
-    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
-    touching = (ahead < 0.0) | (near.gap < 0.0)
-
-    end_distance, end_owner = np.empty(len(nodes)), np.empty(len(nodes), dtype=np.int32)
-    nearest_obstacle(at + relative, shapes, end_distance, end_owner)
-    entered = end_distance < margin
-    touching &= entered | (near.gap < _NEAR)
-    other = ~touching & entered & (end_owner != owner)
-    if other.any():
-        owner = np.where(other, end_owner, owner).astype(np.int32)
-        distance_to(at, shapes, owner, distance)
-        near = _contacts(at, nodes, distance, owner, obstacles, margin)
+    met = owner.copy()
+    touched = first_touch(at, relative, shapes, margin, met)
+    if np.any(met != owner):
+        distance_to(at, shapes, met, distance)
+        near = _contacts(at, nodes, distance, met, obstacles, margin)
         relative = motion[nodes] - time_step * near.surface_velocity
-        ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
-        touching |= other & (ahead < 0.0)
+    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
+    touching = (near.gap < 0.0) | (touched & (ahead < 0.0))
     return _chosen(near, touching)
 
 

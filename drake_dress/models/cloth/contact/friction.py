@@ -14,54 +14,162 @@ import numpy as np
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 
+# A node within this gap lies on the surface, m.
+_LYING = 1e-4
+# Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
+_TOLERATED_EXCESS = 0.01
+
 
 @dataclass(frozen=True)
 class Friction:
     """Contact types of c nodes.
 
     Attributes:
-        mode: (c,) FREE, STICK or SLIP.
+        mode: (c,) FREE, STICK or SLIP, of the motion.
+        velocity_mode: (c,) likewise, of the velocity at the end: nodes that friction stops within
+            the step stick.
         pressure: (c,) normal part of the sticking force, N.
         tangential: (c,) size of its tangential part, N.
-        direction: (c,3) unit along that part of slipping nodes, else zero.
-        force: (c,3) friction on slipping nodes, N.
+        direction: (c,3) unit along that part.
+        push: (c,3) friction on slipping nodes per normal force, μ d.
     """
 
     mode: IntArray
+    velocity_mode: IntArray
     pressure: FloatArray
     tangential: FloatArray
     direction: FloatArray
-    force: FloatArray
+    push: FloatArray
 
 
 _NONE, _NONE_3 = np.zeros(0), np.zeros((0, 3))
-NO_CONTACT = Friction(np.zeros(0, dtype=np.int32), _NONE, _NONE, _NONE_3, _NONE_3)
+_NO_MODE = np.zeros(0, dtype=np.int32)
+NO_CONTACT = Friction(_NO_MODE, _NO_MODE, _NONE, _NONE, _NONE_3, _NONE_3)
 
 
 def find_modes(
-    reaction: FloatArray, normal: FloatArray, friction: float, known: IntArray | None = None
+    reaction: FloatArray,
+    normal: FloatArray,
+    friction: float,
+    momentum: FloatArray,
+    time_step: float,
+    known: tuple[IntArray, IntArray] | None = None,
 ) -> Friction:
     """Returns the contact types by the sticking force `reaction` (c,3), N.
+
+    The sticking force t ends a motion; t − s / h, s the momentum of sliding, ends a velocity.
+    Friction that exceeds this has stopped the node before the step is over.
 
     Args:
         reaction: (c,3) N.
         normal: (c,3) outward unit.
         friction: μ.
-        known: (c,) modes to take instead of judging them.
+        momentum: (c,3) of the nodes relative to the surface, kg m/s.
+        time_step: h, s.
+        known: (c,) modes of motion and of velocity to take instead of judging them.
     """
     c = len(reaction)
-    mode = np.empty(c, dtype=np.int32) if known is None else known
+    mode, velocity_mode = known or (np.empty(c, dtype=np.int32), np.empty(c, dtype=np.int32))
     pressure, tangential = np.empty(c), np.empty(c)
-    direction, force = np.zeros((c, 3)), np.zeros((c, 3))
+    direction, push = np.zeros((c, 3)), np.zeros((c, 3))
     _find_modes(
-        reaction, normal, friction, known is None, mode, pressure, tangential, direction, force
+        reaction,
+        normal,
+        friction,
+        momentum,
+        time_step,
+        known is None,
+        mode,
+        velocity_mode,
+        pressure,
+        tangential,
+        direction,
+        push,
     )
-    return Friction(mode, pressure, tangential, direction, force)
+    return Friction(mode, velocity_mode, pressure, tangential, direction, push)
+
+
+def revise_modes(
+    binding: FloatArray, normal: FloatArray, gap: FloatArray, mu: float, friction: Friction
+) -> bool:
+    """Corrects the modes, in place, by the forces that they led to; returns if any changed.
+
+    Nodes that a force would have to draw to a surface are let go: over a gap they would gain energy
+    from nowhere, at h = 0.2 s twenty times what a falling sheet had. (One that lies on the surface
+    and is held back for a step gains nothing, and letting it go would only move the pull to its
+    neighbours.) Sticking nodes that friction cannot hold slip, where it matters in sum: the forces
+    of sticking press nodes that the motion does not press.
+
+    Args:
+        binding: (c,3) what binds the nodes, of any unit of force.
+        normal: (c,3) outward unit.
+        gap: (c,) at the start of the step, m.
+        mu: friction coefficient.
+        friction: modes, with the directions of all nodes.
+    """
+    return bool(
+        _revise(
+            binding,
+            normal,
+            gap,
+            mu,
+            friction.direction,
+            friction.mode,
+            friction.velocity_mode,
+            friction.push,
+        )
+    )
+
+
+@nb.njit(cache=True, nogil=True)
+def _revise(binding, normal, gap, mu, direction, mode, velocity_mode, push):  # type: ignore[no-untyped-def]
+    changed = False
+    excess = 0.0
+    bound = 0.0
+    over = np.zeros(mode.shape[0], dtype=np.bool_)
+    for i in range(mode.shape[0]):
+        if mode[i] == FREE:
+            continue
+        p = 0.0
+        along = 0.0
+        for c in range(3):
+            p += binding[i, c] * normal[i, c]
+            along += binding[i, c] * direction[i, c]
+        if p < 0.0 and gap[i] > _LYING:
+            mode[i] = FREE
+            velocity_mode[i] = FREE
+            changed = True
+            continue
+        p = max(p, 0.0)
+        bound += mu * p
+        if mode[i] == STICK and along > mu * p:
+            over[i] = True
+            excess += along - mu * p
+    if excess > _TOLERATED_EXCESS * bound:
+        for i in range(mode.shape[0]):
+            if over[i]:
+                mode[i] = SLIP
+                velocity_mode[i] = SLIP
+                for c in range(3):
+                    push[i, c] = mu * direction[i, c]
+                changed = True
+    return changed
 
 
 @nb.njit(cache=True, nogil=True)
 def _find_modes(  # type: ignore[no-untyped-def]
-    reaction, normal, mu, judge, mode, pressure, tangential, direction, force
+    reaction,
+    normal,
+    mu,
+    momentum,
+    h,
+    judge,
+    mode,
+    velocity_mode,
+    pressure,
+    tangential,
+    direction,
+    push,
 ):
     t = np.empty(3)
     for i in range(reaction.shape[0]):
@@ -82,7 +190,16 @@ def _find_modes(  # type: ignore[no-untyped-def]
                 mode[i] = SLIP
             else:
                 mode[i] = STICK
-        if mode[i] == SLIP and size > 0.0:
+        if size > 0.0:
             for c in range(3):
                 direction[i, c] = t[c] / size
-                force[i, c] = mu * p * direction[i, c]
+                if mode[i] == SLIP:
+                    push[i, c] = mu * direction[i, c]
+        if judge:
+            velocity_mode[i] = mode[i]
+            if mode[i] == SLIP:
+                sliding = 0.0
+                for c in range(3):
+                    sliding -= momentum[i, c] * direction[i, c]
+                if mu * p > size - sliding / h:
+                    velocity_mode[i] = STICK

@@ -16,21 +16,22 @@ from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.interface import normal_of_exact
+from drake_dress.models.cloth.inner.interface import directions_of_exact
+from drake_dress.models.cloth.inner.oblique import hold_obliquely
 
 
 @dataclass
 class Solved:
     """An unknown with its right-hand side (n,3), held values (k,3) and solution (n,3).
 
-    `binding` (c,3) is what binds nodes in contact.
+    `multiplier` (c,) is what binds nodes in contact along their normals.
     """
 
     rhs: FloatArray
     held: FloatArray
     free: FloatArray
     z: FloatArray
-    binding: FloatArray | None = None
+    multiplier: FloatArray | None = None
 
 
 class ConjugateGradients:
@@ -103,32 +104,19 @@ class ConjugateGradientSystem:
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-        force: FloatArray | None = None,
+        push: FloatArray | None = None,
         guess: FloatArray | None = None,
+        backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`; iterations start from the unknown's last solution, not from `guess`."""
-        nodes = self._nodes
-        rhs = unknown.rhs.copy()
-        if force is not None:
-            rhs[nodes] += force
-        z = unknown.z.copy()
-        stick, slip = mode == STICK, mode == SLIP
-        z[nodes[stick]] = target[stick]
-        n = normal[slip]
-        lack = np.einsum("ij,ij->i", target[slip] - z[nodes[slip]], n)
-        z[nodes[slip]] += lack[:, None] * n
-        modes = np.zeros(len(z), dtype=np.int32)
-        modes[nodes] = mode
-        modes[self._scheme.held] = HELD
-        normals = np.zeros_like(z)
-        normals[nodes] = normal
-        self._solve(self._factor, modes, normals, rhs, z)
-        unknown.z = z
-        binding = (self.product(z) - rhs)[nodes]
-        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
-        binding[~(stick | slip)] = 0.0
-        unknown.binding = binding
-        return binding, z[nodes]
+        """See `StepSystem`; there is nothing to guess."""
+
+        def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+            return self._hold(unknown, mode, normal, target, force)
+
+        force, z, unknown.multiplier = hold_obliquely(
+            plain, mode, normal, target, push, backward, self._scheme.tolerance
+        )
+        return force, z
 
     def finish(
         self, motion: Solved, change: Solved, less: Solved | None = None
@@ -145,22 +133,17 @@ class ConjugateGradientSystem:
         """See `StepSystem`."""
         return [(backward.z, forward.z)]
 
-    def by_normal(
-        self,
-        forward: Solved,
-        backward: Solved,
-        normal: FloatArray,
-        target: FloatArray,
-        slip: BoolArray,
-    ) -> FloatArray:
+    def by_directions(
+        self, forward: Solved, backward: Solved, target: FloatArray, slip: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
-        assert forward.binding is not None and backward.binding is not None
-        return normal_of_exact(
-            forward.binding,
-            forward.z[self._nodes],
-            backward.binding,
-            backward.z[self._nodes],
-            normal,
+        assert forward.multiplier is not None and backward.multiplier is not None
+        nodes = self._nodes
+        return directions_of_exact(
+            forward.multiplier,
+            forward.z[nodes],
+            backward.multiplier,
+            backward.z[nodes],
             target,
             slip,
         )
@@ -187,6 +170,36 @@ class ConjugateGradientSystem:
         """See `StepSystem`."""
         rows: FloatArray = self.product(z)[self._scheme.held]
         return rows
+
+    def _hold(
+        self,
+        unknown: Solved,
+        mode: IntArray,
+        normal: FloatArray,
+        target: FloatArray,
+        force: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Binds without friction; returns what binds and z at the nodes."""
+        nodes = self._nodes
+        rhs = unknown.rhs.copy()
+        rhs[nodes] += force
+        z = unknown.z.copy()
+        stick, slip = mode == STICK, mode == SLIP
+        z[nodes[stick]] = target[stick]
+        n = normal[slip]
+        lack = np.einsum("ij,ij->i", target[slip] - z[nodes[slip]], n)
+        z[nodes[slip]] += lack[:, None] * n
+        modes = np.zeros(len(z), dtype=np.int32)
+        modes[nodes] = mode
+        modes[self._scheme.held] = HELD
+        normals = np.zeros_like(z)
+        normals[nodes] = normal
+        self._solve(self._factor, modes, normals, rhs, z)
+        unknown.z = z
+        binding = (self.product(z) - rhs)[nodes]
+        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
+        binding[~(stick | slip)] = 0.0
+        return binding, z[nodes]
 
     def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
         z = np.zeros_like(rhs)

@@ -10,7 +10,8 @@ from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK
 from drake_dress.models.cloth.inner.conjugate_gradients import Solved
 from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.interface import normal_of_exact
+from drake_dress.models.cloth.inner.interface import directions_of_exact
+from drake_dress.models.cloth.inner.oblique import hold_obliquely
 
 
 class Direct:
@@ -47,6 +48,7 @@ class DirectSystem:
         self._block = block
         self._nodes = np.zeros(0, dtype=np.int32)
         self._matrix = scheme.matrix.assemble(block)
+        self._factors: dict[tuple[bytes, bytes, bytes], tuple[sp.csc_matrix, spla.SuperLU]] = {}
 
     def start(
         self, motion: tuple[FloatArray, FloatArray], change: tuple[FloatArray, FloatArray]
@@ -64,26 +66,19 @@ class DirectSystem:
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-        force: FloatArray | None = None,
+        push: FloatArray | None = None,
         guess: FloatArray | None = None,
+        backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`; there is nothing to guess."""
-        nodes, scheme = self._nodes, self._scheme
-        rhs = unknown.rhs.copy()
-        if force is not None:
-            rhs[nodes] += force
-        slip, stick = mode == SLIP, mode == STICK
-        fixed = np.zeros_like(rhs)
-        fixed[scheme.held] = unknown.held
-        fixed[nodes[stick]] = target[stick]
-        n = normal[slip]
-        fixed[nodes[slip]] = np.einsum("ij,ij->i", target[slip], n)[:, None] * n
-        unknown.z = self._solve(rhs, fixed, nodes[stick], nodes[slip], n)
-        binding = (self.product(unknown.z) - rhs)[nodes]
-        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
-        binding[~(stick | slip)] = 0.0
-        unknown.binding = binding
-        return binding, unknown.z[nodes]
+
+        def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+            return self._hold(unknown, mode, normal, target, force)
+
+        force, z, unknown.multiplier = hold_obliquely(
+            plain, mode, normal, target, push, backward, 1e-13
+        )
+        return force, z
 
     def finish(
         self, motion: Solved, change: Solved, less: Solved | None = None
@@ -96,22 +91,17 @@ class DirectSystem:
         zero = np.zeros((self._scheme.node_count, 3))
         return Solved(zero, np.zeros((len(self._scheme.held), 3)), zero, zero)
 
-    def by_normal(
-        self,
-        forward: Solved,
-        backward: Solved,
-        normal: FloatArray,
-        target: FloatArray,
-        slip: BoolArray,
-    ) -> FloatArray:
+    def by_directions(
+        self, forward: Solved, backward: Solved, target: FloatArray, slip: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
-        assert forward.binding is not None and backward.binding is not None
-        return normal_of_exact(
-            forward.binding,
-            forward.z[self._nodes],
-            backward.binding,
-            backward.z[self._nodes],
-            normal,
+        assert forward.multiplier is not None and backward.multiplier is not None
+        nodes = self._nodes
+        return directions_of_exact(
+            forward.multiplier,
+            forward.z[nodes],
+            backward.multiplier,
+            backward.z[nodes],
             target,
             slip,
         )
@@ -143,6 +133,30 @@ class DirectSystem:
         rows: FloatArray = self.product(z)[self._scheme.held]
         return rows
 
+    def _hold(
+        self,
+        unknown: Solved,
+        mode: IntArray,
+        normal: FloatArray,
+        target: FloatArray,
+        force: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Binds without friction; returns what binds and z at the nodes."""
+        nodes, scheme = self._nodes, self._scheme
+        rhs = unknown.rhs.copy()
+        rhs[nodes] += force
+        slip, stick = mode == SLIP, mode == STICK
+        fixed = np.zeros_like(rhs)
+        fixed[scheme.held] = unknown.held
+        fixed[nodes[stick]] = target[stick]
+        n = normal[slip]
+        fixed[nodes[slip]] = np.einsum("ij,ij->i", target[slip], n)[:, None] * n
+        unknown.z = self._solve(rhs, fixed, nodes[stick], nodes[slip], n)
+        binding = (self.product(unknown.z) - rhs)[nodes]
+        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
+        binding[~(stick | slip)] = 0.0
+        return binding, unknown.z[nodes]
+
     def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
         fixed = np.zeros_like(rhs)
         fixed[self._scheme.held] = held
@@ -159,6 +173,16 @@ class DirectSystem:
         normal: FloatArray,
     ) -> FloatArray:
         """Solves on the rows that are free: all of a node, or two tangents of one that slips."""
+        key = (stick.tobytes(), slip.tobytes(), normal.tobytes())
+        if key not in self._factors:
+            basis = self._free_rows(stick, slip, normal)
+            self._factors[key] = basis, spla.splu(sp.csc_matrix(basis.T @ self._matrix @ basis))
+        basis, factor = self._factors[key]
+        inner = factor.solve(basis.T @ (rhs.ravel() - self._matrix @ fixed.ravel()))
+        z: FloatArray = fixed + (basis @ inner).reshape(-1, 3)
+        return z
+
+    def _free_rows(self, stick: IntArray, slip: IntArray, normal: FloatArray) -> sp.csc_matrix:
         count = self._scheme.node_count
         bound = np.zeros(count, dtype=np.bool_)
         bound[self._scheme.held] = True
@@ -181,8 +205,4 @@ class DirectSystem:
             column = np.concatenate([column, np.repeat(first + np.arange(len(slip)), 3)])
             value = np.concatenate([value, tangent.ravel()])
         size = int(column.max()) + 1
-        basis = sp.csc_matrix((value, (row, column)), shape=(3 * count, size))
-        right = basis.T @ (rhs.ravel() - self._matrix @ fixed.ravel())
-        inner = spla.spsolve(sp.csc_matrix(basis.T @ self._matrix @ basis), right)
-        z: FloatArray = fixed + (basis @ inner).reshape(count, 3)
-        return z
+        return sp.csc_matrix((value, (row, column)), shape=(3 * count, size))

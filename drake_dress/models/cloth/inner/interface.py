@@ -51,22 +51,29 @@ class StepSystem(Protocol):
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-        force: FloatArray | None = None,
+        push: FloatArray | None = None,
         guess: FloatArray | None = None,
+        backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """Binds nodes of an unknown, instead of what an earlier call bound.
 
+        A slipping node is bound with ν (n + push), push = μ d its friction, so that n·z = n·target.
+        Backward it is the other way round: ν n so that (n + push)·z = (n + push)·target.
+
         Args:
             unknown: whose solution is bound.
-            mode: (c,) of each touched node: STICK takes all of `target`, SLIP its part along
-                `normal`, FREE nothing.
+            mode: (c,) of the touched nodes: STICK takes all of `target`, SLIP one row, FREE none.
             normal: (c,3) unit.
             target: (c,3) in the unknown's unit.
-            force: (c,3) added to the right-hand side at the touched nodes.
-            guess: (c,3) of the binding force, a start for iterations.
+            push: (c,3) friction of slipping nodes per normal force, across the normal.
+            guess: (c,3) of ν n or of the sticking force, a start for iterations.
+            backward: solve the transposed problem.
 
         Returns:
-            The binding force λ (c,3), so that A z = rhs + force + λ, and z (c,3) at the nodes.
+            The binding force λ (c,3), so that A z = rhs + λ, and z (c,3) at the nodes.
+
+        Raises:
+            ValueError: the scheme has no transposed problem with friction.
         """
 
     def finish(
@@ -86,20 +93,14 @@ class StepSystem(Protocol):
                 side.
         """
 
-    def by_normal(
-        self,
-        forward: Unknown,
-        backward: Unknown,
-        normal: FloatArray,
-        target: FloatArray,
-        slip: BoolArray,
-    ) -> FloatArray:
-        """Returns the derivative (c,3) of the motion by the normals of slipping nodes.
+    def by_directions(
+        self, forward: Unknown, backward: Unknown, target: FloatArray, slip: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Returns the derivative (c,3) by the row n and by the binding n + push of slipping nodes.
 
         Args:
             forward: as for `pairs`, with nodes bound by `hold`.
             backward: likewise.
-            normal: (c,3) of the forward solve.
             target: (c,3) of the forward solve.
             slip: (c,) which nodes slip.
         """
@@ -138,22 +139,26 @@ class InnerIteration(Protocol):
         """Returns the system at positions `x` (n,3), m."""
 
 
-def normal_of_exact(
-    binding: FloatArray,
+def directions_of_exact(
+    multiplier: FloatArray,
     z: FloatArray,
-    back_binding: FloatArray,
+    back_multiplier: FloatArray,
     back_z: FloatArray,
-    normal: FloatArray,
     target: FloatArray,
     slip: BoolArray,
-) -> FloatArray:
-    """Returns `StepSystem.by_normal` of a scheme that solves exactly; all (c,3), `slip` (c,).
+) -> tuple[FloatArray, FloatArray]:
+    """Returns `StepSystem.by_directions` of a scheme that solves exactly.
 
-    From P z = rhs + n ν, n·(z − target) = 0 and the same of the adjoint.
+    From A z = rhs + ν b, a·(z − target) = 0 and the transposed pair.
+
+    Args:
+        multiplier: (c,) ν.
+        z: (c,3) at the nodes.
+        back_multiplier: (c,) that of the adjoint.
+        back_z: (c,3) that of the adjoint.
+        target: (c,3) of the forward solve.
+        slip: (c,) which nodes slip.
     """
-    out = np.zeros_like(normal)
-    n = normal[slip]
-    pressing = np.einsum("ij,ij->i", binding[slip], n)
-    along = np.einsum("ij,ij->i", back_binding[slip], n)
-    out[slip] = pressing[:, None] * back_z[slip] + along[:, None] * (z[slip] - target[slip])
-    return out
+    by_row = np.where(slip[:, None], back_multiplier[:, None] * (z - target), 0.0)
+    by_binding = np.where(slip[:, None], multiplier[:, None] * back_z, 0.0)
+    return by_row, by_binding

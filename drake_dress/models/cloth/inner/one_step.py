@@ -17,23 +17,26 @@ import scipy.sparse as sp
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, SymbolicFactor, restricted_solve
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
-from drake_dress.models.cloth.inner.interface import normal_of_exact
+from drake_dress.models.cloth.inner.interface import directions_of_exact
 from drake_dress.models.cloth.matrices import Csr
 
 _NO_NODES = np.zeros(0, dtype=np.int32)
+_NO_PUSH = np.zeros((0, 3))
+# Vectors that GMRES keeps before it starts anew.
+_RESTART = 60
 
 
 @dataclass
 class ForcedUnknown:
     """Solution without contact (n,3).
 
-    Where nodes are bound: the forces (c,3) that change it, the binding part of them, and the
-    solution at the nodes.
+    Where nodes are bound: the forces (c,3) that change it, their multipliers ν (c,) where nodes
+    slip, and the solution at the nodes (c,3).
     """
 
     free: FloatArray
     force: FloatArray | None = None
-    binding: FloatArray | None = None
+    multiplier: FloatArray | None = None
     at_nodes: FloatArray | None = None
 
 
@@ -117,39 +120,44 @@ class OneStepSystem:
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-        force: FloatArray | None = None,
+        push: FloatArray | None = None,
         guess: FloatArray | None = None,
+        backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
         s = self._scheme
         free = unknown.free[self._nodes]
+        bound = np.zeros_like(free) if guess is None else guess.copy()
         moved = np.zeros_like(free)
-        if force is not None:
-            self._move(force, moved)
-        binding = np.zeros_like(free) if guess is None else guess.copy()
-        start = np.zeros_like(free)
-        reached = free + moved
+        oblique = push is not None and bool(push.any())
+        side = _NO_PUSH if push is None else push
         if guess is not None:
-            project(binding, mode, normal)
-            self._move(binding, start)
-        iterations, _ = _bind(
-            s.factor.arrays,
-            self._columns,
-            self._places,
+            project(bound, mode, normal)
+            pushed = with_friction(bound, mode, normal, side) if oblique and not backward else bound
+            restricted_solve(
+                s.factor.arrays, self._columns, self._places, pushed, moved, self._work
+            )
+        solve = _bind_oblique if oblique else _bind
+        iterations, _ = solve(
+            (s.factor.arrays, self._columns, self._places, self._work),
             self._block,
             mode,
             normal,
-            target - reached,
-            binding,
-            start,
-            self._work,
+            side,
+            backward,
+            target - free,
+            bound,
+            moved,
             s.tolerance,
             s.max_iterations,
         )
         self.iterations += iterations
-        unknown.force = binding if force is None else binding + force
-        unknown.binding, unknown.at_nodes = binding, reached + start
-        return unknown.binding, unknown.at_nodes
+        unknown.multiplier = np.einsum("ij,ij->i", bound, normal)
+        unknown.force = (
+            with_friction(bound, mode, normal, side) if oblique and not backward else bound
+        )
+        unknown.at_nodes = free + moved
+        return unknown.force, unknown.at_nodes
 
     def finish(
         self, motion: ForcedUnknown, change: ForcedUnknown, less: ForcedUnknown | None = None
@@ -180,23 +188,17 @@ class OneStepSystem:
         """See `StepSystem`."""
         return [(self._solution(backward), self._solution(forward))]
 
-    def by_normal(
-        self,
-        forward: ForcedUnknown,
-        backward: ForcedUnknown,
-        normal: FloatArray,
-        target: FloatArray,
-        slip: BoolArray,
-    ) -> FloatArray:
+    def by_directions(
+        self, forward: ForcedUnknown, backward: ForcedUnknown, target: FloatArray, slip: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
-        assert forward.binding is not None and forward.at_nodes is not None
-        assert backward.binding is not None and backward.at_nodes is not None
-        return normal_of_exact(
-            forward.binding,
+        assert forward.multiplier is not None and forward.at_nodes is not None
+        assert backward.multiplier is not None and backward.at_nodes is not None
+        return directions_of_exact(
+            forward.multiplier,
             forward.at_nodes,
-            backward.binding,
+            backward.multiplier,
             backward.at_nodes,
-            normal,
             target,
             slip,
         )
@@ -238,34 +240,30 @@ class OneStepSystem:
         solution: FloatArray = unknown.free + self._scheme.factor.solve(forces)
         return solution
 
-    def _move(self, force: FloatArray, motion: FloatArray) -> None:
-        s = self._scheme
-        restricted_solve(s.factor.arrays, self._columns, self._places, force, motion, self._work)
-
 
 @nb.njit(cache=True, nogil=True)
 def _bind(  # type: ignore[no-untyped-def]
-    factor, columns, places, block, mode, normal, lack, binding, moved, work, tolerance, most
+    factor, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
 ):
     """Conjugate gradients on Π S Π λ = Π lack; improves `binding` and its motion S λ in place."""
+    arrays, columns, places, work = factor
     k = places.shape[0]
     residual = lack.copy()
     project(residual, mode, normal)
     conditioned = np.empty((k, 3))
     _precondition(block, mode, normal, residual, conditioned)
-    floor = _dot(residual, conditioned)
+    floor = max(_dot(residual, conditioned), 1e-300)
     for i in range(k):
         for c in range(3):
             residual[i, c] = lack[i, c] - moved[i, c]
     project(residual, mode, normal)
     _precondition(block, mode, normal, residual, conditioned)
     rho = _dot(residual, conditioned)
-    floor = max(floor, 1e-300)
     direction = conditioned.copy()
     step = np.empty((k, 3))
     iterations = 0
     while iterations < most and rho > tolerance * tolerance * floor:
-        restricted_solve(factor, columns, places, direction, step, work)
+        restricted_solve(arrays, columns, places, direction, step, work)
         curvature = _dot(direction, step)
         if curvature <= 0.0:
             break
@@ -287,6 +285,122 @@ def _bind(  # type: ignore[no-untyped-def]
                 direction[i, c] = conditioned[i, c] + beta * direction[i, c]
         iterations += 1
     return iterations, np.sqrt(rho / floor)
+
+
+@nb.njit(cache=True, nogil=True)
+def _bind_oblique(  # type: ignore[no-untyped-def]
+    factor, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
+):
+    """The same with friction, which makes the system unsymmetric: GMRES (Saad and Schultz 1986).
+
+    Preconditioned from the right, in the inner product of the preconditioner, so that the residual
+    is measured as in `_bind`. Vectors are as short as there are nodes in contact: all are kept.
+    """
+    arrays, columns, places, work = factor
+    k = places.shape[0]
+    residual = lack.copy()
+    _rows_of(residual, mode, normal, push, backward)
+    conditioned = np.empty((k, 3))
+    _precondition(block, mode, normal, residual, conditioned)
+    goal = tolerance * np.sqrt(max(_dot(residual, conditioned), 1e-300))
+    basis = np.empty((_RESTART + 1, k, 3))
+    along = np.empty((_RESTART + 1, k, 3))
+    motion = np.empty((_RESTART, k, 3))
+    hessenberg = np.zeros((_RESTART + 1, _RESTART))
+    cosine, sine = np.empty(_RESTART), np.empty(_RESTART)
+    right = np.empty(_RESTART + 1)
+    iterations = 0
+    size = 0.0
+    while True:
+        for i in range(k):
+            for c in range(3):
+                residual[i, c] = lack[i, c] - moved[i, c]
+        _rows_of(residual, mode, normal, push, backward)
+        _precondition(block, mode, normal, residual, conditioned)
+        size = np.sqrt(max(_dot(residual, conditioned), 0.0))
+        if size <= goal or iterations >= most:
+            break
+        for i in range(k):
+            for c in range(3):
+                basis[0, i, c] = residual[i, c] / size
+                along[0, i, c] = conditioned[i, c] / size
+        right[0] = size
+        count = 0
+        while count < _RESTART and iterations < most and abs(right[count]) > goal:
+            j = count
+            if backward:
+                restricted_solve(arrays, columns, places, along[j], motion[j], work)
+            else:
+                forces = with_friction(along[j], mode, normal, push)
+                restricted_solve(arrays, columns, places, forces, motion[j], work)
+            residual[:] = motion[j]
+            _rows_of(residual, mode, normal, push, backward)
+            for i in range(j + 1):
+                h = _dot(residual, along[i])
+                hessenberg[i, j] = h
+                for q in range(k):
+                    for c in range(3):
+                        residual[q, c] -= h * basis[i, q, c]
+            _precondition(block, mode, normal, residual, conditioned)
+            h = np.sqrt(max(_dot(residual, conditioned), 0.0))
+            for i in range(j):
+                u, w = hessenberg[i, j], hessenberg[i + 1, j]
+                hessenberg[i, j] = cosine[i] * u + sine[i] * w
+                hessenberg[i + 1, j] = cosine[i] * w - sine[i] * u
+            u = hessenberg[j, j]
+            length = np.sqrt(u * u + h * h)
+            iterations += 1
+            if length == 0.0:
+                break
+            cosine[j], sine[j] = u / length, h / length
+            hessenberg[j, j] = length
+            right[j + 1] = -sine[j] * right[j]
+            right[j] = cosine[j] * right[j]
+            count += 1
+            if h <= 1e-14 * length:
+                break
+            for q in range(k):
+                for c in range(3):
+                    basis[j + 1, q, c] = residual[q, c] / h
+                    along[j + 1, q, c] = conditioned[q, c] / h
+        if count == 0:
+            break
+        for i in range(count - 1, -1, -1):
+            for j in range(i + 1, count):
+                right[i] -= hessenberg[i, j] * right[j]
+            right[i] /= hessenberg[i, i]
+        for j in range(count):
+            for i in range(k):
+                for c in range(3):
+                    binding[i, c] += right[j] * along[j, i, c]
+                    moved[i, c] += right[j] * motion[j, i, c]
+    return iterations, tolerance * size / goal
+
+
+@nb.njit(cache=True, nogil=True)
+def with_friction(force, mode, normal, push):  # type: ignore[no-untyped-def]
+    """Returns ν (n + push) for slipping nodes whose force (c,3) is ν n, the others as they are."""
+    out = force.copy()
+    for i in range(mode.shape[0]):
+        if mode[i] == SLIP:
+            nu = (
+                force[i, 0] * normal[i, 0] + force[i, 1] * normal[i, 1] + force[i, 2] * normal[i, 2]
+            )
+            for c in range(3):
+                out[i, c] += nu * push[i, c]
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _rows_of(z, mode, normal, push, backward):  # type: ignore[no-untyped-def]
+    """Projects motions (c,3), in place; backward the row of slipping nodes is n + push."""
+    if backward:
+        for i in range(mode.shape[0]):
+            if mode[i] == SLIP:
+                extra = z[i, 0] * push[i, 0] + z[i, 1] * push[i, 1] + z[i, 2] * push[i, 2]
+                for c in range(3):
+                    z[i, c] += extra * normal[i, c]
+    project(z, mode, normal)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -1,8 +1,9 @@
 """A = M + h² K₊, by K iterations with P (Eq. iterative-solver).
 
-z ← z + P⁻¹ (rhs − A z) starts from zero with prescribed nodes in place. As 0 ≤ A ≤ P, every iterate
-is bounded by the solution, and K iterations are a symmetric polynomial in P⁻¹A: the adjoint is the
-same K iterations. Contact is held in every one of them, exactly, as `OneStep` does.
+z ← z + P⁻¹ (rhs − A z) starts from zero with prescribed nodes in place. As 0 ≤ A ≤ P, iterates are
+bounded by the solution, and K iterations are a symmetric polynomial in P⁻¹A: the adjoint is the
+same K iterations. Contact is held in every one of them, exactly, as `OneStep` does; through
+slipping contact there is no derivative.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import scipy.sparse as sp
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
+from drake_dress.models.cloth.inner.oblique import hold_obliquely
 from drake_dress.models.cloth.inner.one_step import OneStep, OneStepSystem
 
 
@@ -22,9 +24,8 @@ from drake_dress.models.cloth.inner.one_step import OneStep, OneStepSystem
 class Iterates:
     """An unknown with its right-hand side (n,3), held values (k,3) and solution (n,3).
 
-    `steps` are the corrections, `iterates` what they were added to, and `bindings` the forces (c,3)
-    that kept the corrections of bound nodes in their surfaces, K of each. `left` (c,3) is
-    A z − rhs at the touched nodes.
+    `steps` are the corrections and `iterates` what they were added to, K of each. `multiplier` (c,)
+    is what binds nodes in contact along their normals.
     """
 
     rhs: FloatArray
@@ -33,8 +34,7 @@ class Iterates:
     z: FloatArray
     steps: list[FloatArray] = field(default_factory=list)
     iterates: list[FloatArray] = field(default_factory=list)
-    bindings: list[FloatArray] = field(default_factory=list)
-    left: FloatArray | None = None
+    multiplier: FloatArray | None = None
 
 
 class Stationary:
@@ -93,26 +93,24 @@ class StationarySystem:
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-        force: FloatArray | None = None,
+        push: FloatArray | None = None,
         guess: FloatArray | None = None,
+        backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`; there is nothing to guess."""
-        nodes = self._nodes
-        rhs = unknown.rhs.copy()
-        if force is not None:
-            rhs[nodes] += force
-        slip, bound = mode == SLIP, (mode == SLIP) | (mode == STICK)
-        start = np.zeros_like(rhs)
-        start[self._held] = unknown.held
-        start[nodes[bound]] = target[bound]
-        n = normal[slip]
-        start[nodes[slip]] = np.einsum("ij,ij->i", target[slip], n)[:, None] * n
-        self._iterate(unknown, rhs, start, (mode, normal))
-        unknown.left = (self.product(unknown.z) - rhs)[nodes]
-        binding = unknown.left.copy()
-        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
-        binding[~bound] = 0.0
-        return binding, unknown.z[nodes]
+        if backward and push is not None and push.any():
+            raise ValueError(
+                "the stationary scheme has no derivative through slipping contact: "
+                "take one_step or conjugate_gradients"
+            )
+
+        def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+            return self._hold(unknown, mode, normal, target, force)
+
+        force, z, unknown.multiplier = hold_obliquely(
+            plain, mode, normal, target, push, backward, self._scheme.one_step.tolerance
+        )
+        return force, z
 
     def finish(
         self, motion: Iterates, change: Iterates, less: Iterates | None = None
@@ -125,27 +123,14 @@ class StationarySystem:
         zero = np.zeros((self._scheme.one_step.node_count, 3))
         return Iterates(zero, np.zeros((len(self._held), 3)), zero, zero)
 
-    def by_normal(
-        self,
-        forward: Iterates,
-        backward: Iterates,
-        normal: FloatArray,
-        target: FloatArray,
-        slip: BoolArray,
-    ) -> FloatArray:
-        """See `StepSystem`: the start lies along the normals, every correction across them."""
-        assert backward.left is not None
-        out = np.zeros_like(normal)
-        n, u, left = normal[slip], target[slip], -backward.left[slip]
-        nodes = self._nodes[slip]
-        out[slip] = np.einsum("ij,ij->i", u, n)[:, None] * left
-        out[slip] += np.einsum("ij,ij->i", left, n)[:, None] * u
-        for k, step in enumerate(forward.steps):
-            pressing = np.einsum("ij,ij->i", forward.bindings[k][slip], n)
-            along = np.einsum("ij,ij->i", backward.bindings[-1 - k][slip], n)
-            out[slip] += pressing[:, None] * backward.steps[-1 - k][nodes]
-            out[slip] += along[:, None] * step[nodes]
-        return out
+    def by_directions(
+        self, forward: Iterates, backward: Iterates, target: FloatArray, slip: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """See `StepSystem`."""
+        raise ValueError(
+            "the stationary scheme has no derivative through slipping contact: "
+            "take one_step or conjugate_gradients"
+        )
 
     def again(self, unknown: Iterates) -> Iterates:
         """See `StepSystem`."""
@@ -185,6 +170,30 @@ class StationarySystem:
         rows: FloatArray = self.product(z)[self._held]
         return rows
 
+    def _hold(
+        self,
+        unknown: Iterates,
+        mode: IntArray,
+        normal: FloatArray,
+        target: FloatArray,
+        force: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Binds without friction; returns what binds and z at the nodes."""
+        nodes = self._nodes
+        rhs = unknown.rhs.copy()
+        rhs[nodes] += force
+        slip, bound = mode == SLIP, (mode == SLIP) | (mode == STICK)
+        start = np.zeros_like(rhs)
+        start[self._held] = unknown.held
+        start[nodes[bound]] = target[bound]
+        n = normal[slip]
+        start[nodes[slip]] = np.einsum("ij,ij->i", target[slip], n)[:, None] * n
+        self._iterate(unknown, rhs, start, (mode, normal))
+        binding: FloatArray = (self.product(unknown.z) - rhs)[nodes]
+        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
+        binding[~bound] = 0.0
+        return binding, unknown.z[nodes]
+
     def _free(self, rhs: FloatArray, held: FloatArray) -> Iterates:
         start = np.zeros_like(rhs)
         start[self._held] = held
@@ -203,13 +212,12 @@ class StationarySystem:
         """Runs K iterations from `z`; (mode, normal) of the touched nodes where they are bound."""
         still = np.zeros((len(self._held), 3))
         blank = np.zeros_like(rhs)
-        unknown.steps, unknown.iterates, unknown.bindings = [], [], []
+        unknown.steps, unknown.iterates = [], []
         for _ in range(self._scheme.iterations):
             unknown.iterates.append(z)
             correction, other = self._p.start((rhs - self.product(z), still), (blank, still))
             if contact is not None:
-                binding, _ = self._p.hold(correction, *contact, np.zeros((len(self._nodes), 3)))
-                unknown.bindings.append(binding)
+                self._p.hold(correction, *contact, np.zeros((len(self._nodes), 3)))
             step = self._p.finish(correction, other)[0]
             unknown.steps.append(step)
             z = z + step

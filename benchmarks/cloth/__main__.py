@@ -1,0 +1,183 @@
+"""`python -m benchmarks.cloth`: measures the cloth schemes and prints tables."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import math
+import os
+import platform
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from benchmarks.cloth.measure import Session
+from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
+from drake_dress.interrupt import caught_interrupt
+
+UNUSABLE, INTERRUPTED = 2, 130
+# In the order of the paper, then what it does not have.
+SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying")
+_PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
+_QUICK_LIMIT = 1.0
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(UNUSABLE, f"bench cloth: {message}\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measures and prints; returns the exit status: 0, 2 for bad arguments, 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    names = options.only or list(SCENES)
+    about = _about()
+    print("\n".join(f"{key}: {value}" for key, value in about.items()), flush=True)
+    results: dict[str, Any] = {}
+    begin = time.perf_counter()
+
+    def finish(name: str, result: dict[str, Any]) -> None:
+        results[name] = result
+        for table in scene_module(name).tables(result):
+            if table.rows:
+                print(f"\n{table.text()}\n", flush=True)
+
+    with caught_interrupt() as stop:
+        settings = (names, options.quick, _limit(options), options.cache, stop, finish)
+        if options.jobs == 1:
+            measure_in_turn(*settings)
+        else:
+            measure_at_once(options.jobs, *settings)
+        interrupted = stop.is_set()
+    wall = time.perf_counter() - begin
+    print(f"{wall:.0f} s in all" + (", interrupted" if interrupted else ""))
+    if options.json:
+        document = {"about": about, "quick": options.quick, "wall_s": wall, "scenes": results}
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(_plain(document), indent=1, allow_nan=False) + "\n")
+        print(f"wrote {options.json}")
+    if options.png:
+        for name in names:
+            if name in results:
+                for file in scene_module(name).write_figures(results[name], options.png):
+                    print(f"wrote {file}")
+    return INTERRUPTED if interrupted else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="bench cloth", description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=_file, metavar="FILE", help="write all figures here")
+    parser.add_argument("--png", type=_folder, metavar="DIR", help="write plots as cloth_*.png")
+    parser.add_argument(
+        "--only", type=_names, metavar="NAME,…", help=f"of {', '.join(SCENES)} (default: all)"
+    )
+    parser.add_argument("--quick", action="store_true", help="small meshes, within a minute")
+    parser.add_argument(
+        "--jobs",
+        type=_count,
+        default=1,
+        metavar="N",
+        help="scenes at once; 2 and more disturb times",
+    )
+    parser.add_argument(
+        "--limit",
+        type=_seconds,
+        metavar="S",
+        help="wall time that one engine may take for one run (default 10, quick 1)",
+    )
+    parser.add_argument(
+        "--cache",
+        type=_folder,
+        default=Path("out/cloth_bench"),
+        metavar="DIR",
+        help="where fine references are kept",
+    )
+    return parser
+
+
+def _names(text: str) -> list[str]:
+    names = [name for name in text.split(",") if name]
+    unknown = [name for name in names if name not in SCENES]
+    if unknown or not names:
+        raise argparse.ArgumentTypeError(
+            f"{', '.join(unknown) or text!r} is no scene, expected some of {', '.join(SCENES)}"
+        )
+    return [name for name in SCENES if name in names]
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected a number above 0")
+    return value
+
+
+def _file(text: str) -> Path:
+    if Path(text).is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder, expected a file")
+    return Path(text)
+
+
+def _folder(text: str) -> Path:
+    if Path(text).exists() and not Path(text).is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a file, expected a folder")
+    return Path(text)
+
+
+def _limit(options: argparse.Namespace) -> float:
+    return options.limit or (_QUICK_LIMIT if options.quick else Session.limit)
+
+
+def _about() -> dict[str, Any]:
+    """Returns versions, processor and threads."""
+    about: dict[str, Any] = {"python": platform.python_version(), "processor": _processor()}
+    about["cores"] = os.cpu_count()
+    about["threads"] = "one for every engine; peers on the CPU"
+    for package in _PACKAGES:
+        about[package] = _version(package)
+    return {"drake_dress": _version("drake_dress")} | about
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _plain(value: Any) -> Any:
+    """Returns `value` as JSON has it: NaN and infinity become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,199 @@
+"""Steps engines side by side and keeps their times, positions and contact.
+
+Engines that are compared advance in turn, a stretch of simulated time each, so that whatever else
+the machine does falls on all of them alike. What the tables show are medians of steps; ratios are
+medians over the stretches of the ratio within a stretch.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.cloth.engines import Engine, Recipe
+from benchmarks.cloth.scene import FloatArray, Scene
+from drake_dress.models.cloth.elements import Elements
+
+# Interval of the kept positions and of the turns, s.
+SAMPLE_INTERVAL = 0.1
+# Beyond this far from the origin a garment has exploded, m.
+_FAR = 20.0
+
+
+@dataclass
+class Session:
+    """What all scenes need to know about a run of the benchmark.
+
+    Attributes:
+        quick: small meshes and short times.
+        limit: wall time that one engine may take for one run, s; then it is cut short.
+        cache: folder of references.
+        say: prints a line of progress.
+        stop: set by Ctrl-C; what was measured until then counts.
+    """
+
+    quick: bool = False
+    limit: float = 10.0
+    cache: Path = Path("out/cloth_bench")
+    say: Callable[[str], None] = print
+    stop: threading.Event = field(default_factory=threading.Event)
+
+
+@dataclass
+class Run:
+    """One engine on one scene at one time step.
+
+    Attributes:
+        name: of the engine.
+        time_step: h, s.
+        setup: wall time of making it, s; first_step: of its first step, s, which compiles.
+        step_time: (steps,) wall time of the others, s.
+        contact: (steps,) nodes in contact after the step.
+        turn_mean: mean step time of each turn, s; nan where it did not take part.
+        final: (n,3) positions at the time that was reached, m.
+        sample: multiple of SAMPLE_INTERVAL → (n,3) positions, m.
+        exploded: simulated time at which it was not finite or metres away, s; None if never.
+        reached: simulated time, s.
+        unconverged: steps whose solver gave up, where the engine tells.
+    """
+
+    name: str
+    time_step: float
+    setup: float = 0.0
+    first_step: float = 0.0
+    step_time: list[float] = field(default_factory=list)
+    contact: list[int] = field(default_factory=list)
+    turn_mean: list[float] = field(default_factory=list)
+    final: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    sample: dict[int, FloatArray] = field(default_factory=dict)
+    exploded: float | None = None
+    reached: float = 0.0
+    unconverged: int = 0
+
+    def median(self) -> float:
+        """Returns the median wall time of a step, s; nan without steps."""
+        times = self.step_time or ([self.first_step] if self.first_step else [])
+        return float(np.median(times)) if times else float("nan")
+
+    def worst(self) -> float:
+        """Returns the largest wall time of a step but the first, s."""
+        return max(self.step_time, default=float("nan"))
+
+    def spread(self) -> float:
+        """Returns the interquartile range of the step times by their median."""
+        if len(self.step_time) < 4:
+            return float("nan")
+        low, high = np.percentile(self.step_time, (25, 75))
+        return float((high - low) / self.median())
+
+    def summary(self) -> dict[str, Any]:
+        """Returns the figures of the run for JSON."""
+        return {
+            "engine": self.name,
+            "time_step_s": self.time_step,
+            "setup_s": self.setup,
+            "first_step_s": self.first_step,
+            "step_median_s": self.median(),
+            "step_worst_s": self.worst(),
+            "step_spread": self.spread(),
+            "steps": len(self.step_time) + (self.first_step > 0.0),
+            "wall_per_simulated_s": self.median() / self.time_step,
+            "reached_s": self.reached,
+            "exploded_s": self.exploded,
+            "unconverged_steps": self.unconverged,
+        }
+
+
+def race(session: Session, scene: Scene, recipes: Sequence[Recipe], time_step: float) -> list[Run]:
+    """Returns the runs of the engines over the scene's duration, in the order of `recipes`.
+
+    An engine that is missing gives a line of progress and no run, nor does one that was
+    interrupted before its first step.
+    """
+    runs: list[Run] = []
+    engines: list[Engine] = []
+    for recipe in recipes:
+        if session.stop.is_set():
+            break
+        missing = recipe.missing()
+        if missing:
+            session.say(f"  {recipe.name}: skipped, {missing}")
+            continue
+        begin = time.perf_counter()
+        engine = recipe.make(scene, time_step)
+        runs.append(Run(recipe.name, time_step, setup=time.perf_counter() - begin))
+        runs[-1].sample[0] = engine.positions().copy()
+        engines.append(engine)
+    steps = round(scene.duration / time_step)
+    stretch = max(1, round(SAMPLE_INTERVAL / time_step))
+    for first in range(0, steps, stretch):
+        for run, engine in zip(runs, engines, strict=True):
+            _turn(session, scene, run, engine, range(first, min(first + stretch, steps)))
+        if session.stop.is_set():
+            break
+    begun = [run for run in runs if run.first_step > 0.0]
+    for run in begun:
+        session.say(_line(run, scene))
+    return begun
+
+
+def _turn(session: Session, scene: Scene, run: Run, engine: Engine, steps: range) -> None:
+    """Advances one engine by one stretch and writes it into its run."""
+    h = run.time_step
+    taken: list[float] = []
+    for step in steps:
+        if run.exploded is not None or sum(run.step_time) > session.limit or session.stop.is_set():
+            break
+        held = scene.motion((step + 1) * h)
+        begin = time.perf_counter()
+        engine.step(held)
+        elapsed = time.perf_counter() - begin
+        if run.first_step == 0.0:
+            run.first_step = elapsed
+        else:
+            run.step_time.append(elapsed)
+            taken.append(elapsed)
+        x = engine.positions()
+        run.reached = (step + 1) * h
+        run.final = x.copy()
+        if not np.isfinite(x).all() or np.abs(x).max() > _FAR:
+            run.exploded = run.reached
+            break
+        if scene.obstacles.count:
+            run.contact.append(int(np.count_nonzero(scene.touching(x))))
+        multiple = round(run.reached / SAMPLE_INTERVAL)
+        if abs(run.reached - multiple * SAMPLE_INTERVAL) < 0.25 * h:
+            run.sample[multiple] = x.copy()
+    run.turn_mean.append(float(np.mean(taken)) if taken else float("nan"))
+    run.unconverged = int(getattr(engine, "unconverged", 0))
+
+
+def _line(run: Run, scene: Scene) -> str:
+    end = f"exploded at {run.exploded:.2f} s" if run.exploded is not None else ""
+    if run.exploded is None and run.reached < scene.duration - 1e-9:
+        end = f"cut at {run.reached:.2f} s"
+    return (
+        f"  {run.name:24s} h {1e3 * run.time_step:5.4g} ms: {1e3 * run.median():8.3f} ms a step"
+        f"  {end}"
+    ).rstrip()
+
+
+def ratio(run: Run, to: Run) -> float:
+    """Returns how many times as long as `to` a step of `run` took, median over turns."""
+    count = min(len(run.turn_mean), len(to.turn_mean))
+    both = np.array(run.turn_mean[:count]) / np.array(to.turn_mean[:count])
+    both = both[np.isfinite(both)]
+    return float(np.median(both)) if len(both) else float("nan")
+
+
+def edge_strain(x: FloatArray, elements: Elements) -> float:
+    """Returns the 99th percentile of |strain| over the edges of `x` (n,3)."""
+    length = np.linalg.norm(x[elements.edge[:, 1]] - x[elements.edge[:, 0]], axis=1)
+    strain = np.abs(length / elements.edge_rest_length - 1.0)
+    return float(np.percentile(strain, 99.0)) if np.isfinite(strain).all() else float("inf")

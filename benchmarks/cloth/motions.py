@@ -1,0 +1,59 @@
+"""How the held nodes are led: none of these jumps, so accuracy is not a matter of the first step.
+
+Each function returns a motion: time, s → (k,3) positions, m.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cloth.scene import FloatArray, Motion
+
+
+def at_rest(held: FloatArray) -> Motion:
+    """Returns no motion of the nodes at `held` (k,3)."""
+    return lambda time: held
+
+
+def carried(held: FloatArray, velocity: FloatArray) -> Motion:
+    """Returns a motion at constant `velocity` (3,), m/s."""
+    return lambda time: held + time * velocity
+
+
+def _eased(share: float) -> float:
+    """Returns 0 … 1 with velocity and acceleration zero at both ends (quintic)."""
+    s = min(max(share, 0.0), 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def pulled(held: FloatArray, way: FloatArray, duration: float) -> Motion:
+    """Returns an eased straight motion by `way` (3,), m, that takes `duration`, s."""
+    return lambda time: held + _eased(time / duration) * way
+
+
+def laid_down(
+    held: FloatArray, table: float, length: float, down_time: float, fold_time: float
+) -> Motion:
+    """Returns a motion that lays a hanging garment on a table and folds it over.
+
+    The shoulders go down and forward on a quarter ellipse until the lowest held node is on the
+    table, so that the hem touches first and the rest follows, then in an arc back over what lies
+    there by a third of the length. The held patches stay as they are: flattened, they would strain.
+
+    Args:
+        held: (k,3) start, m.
+        table: height at which nodes lie on the table, m.
+        length: of the garment from shoulder to hem, m: how far forward the shoulders go.
+        down_time: of laying down, s.
+        fold_time: of folding over, s.
+    """
+    drop = float(held[:, 2].min()) - table
+
+    def motion(now: float) -> FloatArray:
+        angle = 0.5 * np.pi * _eased(now / down_time)
+        back = _eased((now - down_time) / fold_time)
+        forward = length * (np.sin(angle) - back / 3.0)
+        height = 0.25 * length * np.sin(np.pi * back) - drop * (1.0 - np.cos(angle))
+        return held + np.array([forward, 0.0, height])
+
+    return motion

@@ -1,0 +1,1 @@
+"""Other simulators behind the interface of `benchmarks.cloth.engines.Engine`."""

@@ -1,0 +1,1 @@
+"""Parts of the Projective Dynamics reference."""

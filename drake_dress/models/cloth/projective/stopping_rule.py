@@ -1,0 +1,61 @@
+"""When a fixed-point iteration is done: at an estimate of how far the fixed point still is.
+
+If updates d shrink by ρ an iteration, ‖d‖ ρ / (1 − ρ) is left. A small update alone says little:
+where ρ is 0.99, a hundred times as much is to come.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+# An update of so small a share of the tolerance is rounding; contraction is below 1 minus that.
+_NEGLIGIBLE = 1e-7
+# Spans of updates over which a rate of contraction is taken: at least, at most.
+_LEAST_SPANS = 4
+_LONGEST_SPAN = 20
+
+
+class StoppingRule:
+    """Estimates from the last updates how far the fixed point is.
+
+    The rate is the largest over several spans of updates that end now, and the estimate has to hold
+    twice: fast modes die first, so that early rates are too good, and L-BFGS takes updates of very
+    unequal size. What it cannot see is a motion that has yet to begin: near a saddle, where cloth
+    is about to buckle, updates shrink before they grow.
+
+    Args:
+        tolerance: m.
+    """
+
+    def __init__(self, tolerance: float) -> None:
+        self._tolerance = tolerance
+        self._size: deque[float] = deque(maxlen=_LONGEST_SPAN + 1)
+        self._within = 0
+        self.contraction = 1.0
+        self.remaining = np.inf
+
+    def restart(self) -> None:
+        """Forgets all updates: other contacts, another contraction."""
+        self._size.clear()
+        self._within = 0
+        self.remaining, self.contraction = np.inf, 1.0
+
+    def add(self, size: float) -> None:
+        """Takes in the largest motion of a node in the last iteration, m."""
+        self._size.append(size)
+        spans = np.arange(1, len(self._size))
+        self.remaining, self.contraction = np.inf, 1.0
+        if size <= _NEGLIGIBLE * self._tolerance:
+            self.remaining = self.contraction = 0.0
+        elif len(spans) >= _LEAST_SPANS:
+            earlier = np.array(self._size)[-1 - spans]
+            self.contraction = float(((size / earlier) ** (1.0 / spans)).max())
+            if self.contraction < 1.0:
+                self.remaining = size * self.contraction / (1.0 - self.contraction)
+        self._within = self._within + 1 if self.remaining <= self._tolerance else 0
+
+    def reached(self) -> bool:
+        """Returns whether the estimate is within the tolerance."""
+        return self.remaining == 0.0 or self._within >= 2

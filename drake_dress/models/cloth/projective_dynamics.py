@@ -1,0 +1,281 @@
+"""Projective Dynamics (Bouaziz et al. 2014), the scheme that the others are compared with.
+
+A step of implicit Euler minimises
+
+    E(x) = 1/(2h²) ‖x − y‖²_M + ψ(x),    y = x_n + h v_n + h² g,
+
+with ψ the energy of `forces.internal_force`. With p the projections of the elements (the isometry
+nearest to F, the curvature vector at its rest length) ψ is ½ Σ w ‖A x − p‖², so that the local step
+"find p" and the global step "solve P x = M y + h² Σ w Aᵀp" are together
+
+    x ← x − P⁻¹ h² ∇E(x),    P = M + h² Σ w AᵀA,
+
+because h² ∇E(x) = P x − M y − h² Σ w Aᵀp. P is constant: one factor serves all iterations. E never
+rises, as the quadratic with p held lies above it. `quasi_newton` uses P⁻¹ as the first guess of
+L-BFGS, with a line search on E (Liu, Bouaziz and Kavan 2017).
+
+Contact is found at every iterate (`iterated_contact.py`) and leaves nodes without some of their
+freedom (`projected_system.py`). The iteration stops at an estimate of how far the fixed point still
+is (`stopping_rule.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elastic_energy import elastic_energy
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK, project
+from drake_dress.models.cloth.forces import internal_force
+from drake_dress.models.cloth.implicit import GRAVITY, ClothState
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.matrices import bending_matrix, lumped_mass, stretch_matrix
+from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
+from drake_dress.models.cloth.projective.projected_system import ProjectedSystem
+from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory, dot
+from drake_dress.models.cloth.projective.stopping_rule import StoppingRule
+
+_WINDOW = 5
+# Decrease that a line search asks for, as a share of what the slope promises.
+_ARMIJO = 1e-4
+_MOST_HALVINGS = 12
+# E is known to about this share of its parts: a rise within it is rounding.
+_ROUNDING = 1e-14
+
+
+@dataclass(frozen=True)
+class ProjectiveInfo:
+    """How a step was solved.
+
+    Attributes:
+        iterations: global steps.
+        remaining: estimated distance to the fixed point, m, the largest over the nodes.
+        converged: whether that is within the tolerance.
+        contraction: ρ it was estimated with.
+        refactored: factors made.
+        solves: triangular solves, with those of conjugate gradients.
+        changes: nodes whose contact changed in the last iteration.
+    """
+
+    iterations: int
+    remaining: float
+    converged: bool
+    contraction: float
+    refactored: int
+    solves: int
+    changes: int
+
+
+class ProjectiveDynamicsCloth:
+    """Steps a garment by Projective Dynamics.
+
+    Contact is at nodes only, unlike `ImplicitCloth`'s: thin things slip between them. With friction
+    a step of 0.1 s that lands has more than one fixed point; which is found depends on the way.
+
+    Args:
+        elements: the rest shape.
+        material: SI values; `damping` is not used, implicit Euler damps by itself.
+        time_step: h, s.
+        held: (k,) nodes whose motion is prescribed.
+        gravity: (3,) m/s².
+        tolerance: estimated distance to the fixed point at which a step is done, m.
+        max_iterations: global steps at most; the info says if they did not suffice.
+        quasi_newton: L-BFGS instead of the plain iteration.
+    """
+
+    def __init__(
+        self,
+        elements: Elements,
+        material: Material,
+        time_step: float,
+        held: IntArray,
+        gravity: FloatArray = GRAVITY,
+        tolerance: float = 1e-5,
+        max_iterations: int = 5000,
+        quasi_newton: bool = False,
+    ) -> None:
+        self.elements = elements
+        self.material = material
+        self.time_step = time_step
+        self.held = np.asarray(held, dtype=np.int32)
+        self.gravity = np.asarray(gravity, dtype=np.float64)
+        self.mass = lumped_mass(elements, material)
+        self._tolerance = tolerance
+        self._max_iterations = max_iterations
+        self._quasi_newton = quasi_newton
+
+        stiffness = stretch_matrix(elements, material) + bending_matrix(elements, material)
+        p = sp.csc_matrix(sp.diags(self.mass) + time_step**2 * stiffness)
+        self._system = ProjectedSystem(p)
+
+    def step(
+        self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
+    ) -> tuple[ClothState, ProjectiveInfo]:
+        """Returns the state one time step later.
+
+        Args:
+            state: now.
+            obstacles: the person now, with velocities.
+            held_velocity: (k,3) of the held nodes over this step, m/s.
+        """
+        h, n = self.time_step, len(state.x)
+        material = self.material
+        contact = IteratedContact(
+            state.x,
+            state.mode,
+            state.owner,
+            state.reaction,
+            self.held,
+            obstacles,
+            self.mass,
+            h,
+            material.friction,
+            material.margin,
+            self._tolerance,
+        )
+        self._system.start_counting()
+        inertial = state.x + h * state.v + h * h * self.gravity
+        fall, steady = inertial.copy(), state.x + h * state.v
+        fall[self.held] = steady[self.held] = state.x[self.held] + h * held_velocity
+        # a falling garment falls on, a hanging one goes on as before
+        falls = self._energy(fall, inertial) < self._energy(steady, inertial)
+        x = contact.place(fall if falls else steady, steady)
+        history = CurvatureHistory(_WINDOW, n) if self._quasi_newton else None
+        stop = StoppingRule(self._tolerance)
+        before = x.copy()
+        old_gradient = np.zeros((0, 3))
+        iterations = 0
+        while True:
+            changes = contact.bind(x)
+            gradient = self._gradient(x, inertial)
+            changes += contact.classify(gradient)
+            if iterations > 0:
+                if changes:
+                    stop.restart()
+                else:
+                    stop.add(_largest(x, before))
+                if stop.reached() or iterations >= self._max_iterations:
+                    break
+            if history is not None:
+                if changes:
+                    history.clear()
+                elif iterations > 0:
+                    s, y = x - before, gradient - old_gradient
+                    y += contact.resistance[:, None] * s
+                    project(s, contact.mode, contact.normal)
+                    project(y, contact.mode, contact.normal)
+                    history.add(s, y)
+            before[:] = x
+            old_gradient = gradient
+            motion = self._motion(gradient - contact.friction, contact, history)
+            if history is not None:
+                self._shorten(x, motion, inertial, gradient, contact, history)
+            contact.shorten(x, motion)
+            x += motion
+            iterations += 1
+
+        reaction = contact.reaction(gradient) / h**2
+        touching = (contact.mode == STICK) | (contact.mode == SLIP)
+        after = ClothState(
+            x,
+            (x - state.x) / h,
+            contact.mode,
+            reaction,
+            np.where(touching, contact.owner, -1).astype(np.int32),
+        )
+        return after, ProjectiveInfo(
+            iterations,
+            stop.remaining,
+            stop.reached(),
+            stop.contraction,
+            self._system.factors,
+            self._system.solves,
+            changes,
+        )
+
+    def _energy(self, x: FloatArray, inertial: FloatArray) -> float:
+        """Returns h² E(x), kg m²."""
+        m = self.material
+        elastic = elastic_energy(self.elements, m.stretch_stiffness, m.bending_stiffness, x)
+        return float(_inertia_energy(x, inertial, self.mass)) + self.time_step**2 * elastic
+
+    def _gradient(self, x: FloatArray, inertial: FloatArray) -> FloatArray:
+        """Returns h² ∇E(x) (n,3), kg m."""
+        m = self.material
+        out = internal_force(self.elements, m.stretch_stiffness, m.bending_stiffness, x)
+        _add_inertia(x, inertial, self.mass, self.time_step**2, out)
+        return out
+
+    def _motion(
+        self, gradient: FloatArray, contact: IteratedContact, history: CurvatureHistory | None
+    ) -> FloatArray:
+        if history is None:
+            return self._system.solve(-gradient, contact)
+        project(gradient, contact.mode, contact.normal)
+        motion = history.direction(gradient, lambda q: self._system.solve(q, contact))
+        project(motion, contact.mode, contact.normal)
+        if dot(motion, gradient) >= 0.0:
+            history.clear()
+            motion = self._system.solve(-gradient, contact)
+        return motion
+
+    def _shorten(
+        self,
+        x: FloatArray,
+        motion: FloatArray,
+        inertial: FloatArray,
+        gradient: FloatArray,
+        contact: IteratedContact,
+        history: CurvatureHistory,
+    ) -> None:
+        """Halves `motion` in place until E with the work of friction falls as its slope says.
+
+        If it never does, the history is at fault: the plain motion takes its place.
+        """
+        force = gradient - contact.friction
+        slope = dot(force, motion)
+        start = self._energy(x, inertial)
+        noise = _ROUNDING * abs(start)
+        for _ in range(_MOST_HALVINGS):
+            resisted = dot(contact.friction, motion)
+            resisted -= 0.5 * float(np.einsum("i,ij,ij->", contact.resistance, motion, motion))
+            if self._energy(x + motion, inertial) - resisted <= start + _ARMIJO * slope + noise:
+                return
+            motion *= 0.5
+            slope *= 0.5
+        history.clear()
+        motion[:] = self._system.solve(-force, contact)
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True)
+def _inertia_energy(x, inertial, mass):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(x.shape[0]):
+        for c in range(3):
+            total += 0.5 * mass[i] * (x[i, c] - inertial[i, c]) ** 2
+    return total
+
+
+@nb.njit(cache=True, nogil=True)
+def _add_inertia(x, inertial, mass, h2, force):  # type: ignore[no-untyped-def]
+    """Turns forces (n,3) into h² ∇E, in place."""
+    for i in range(x.shape[0]):
+        for c in range(3):
+            force[i, c] = mass[i] * (x[i, c] - inertial[i, c]) - h2 * force[i, c]
+
+
+@nb.njit(cache=True, nogil=True)
+def _largest(x, before):  # type: ignore[no-untyped-def]
+    """Returns the largest distance of two rows (n,3)."""
+    largest = 0.0
+    for i in range(x.shape[0]):
+        size2 = 0.0
+        for c in range(3):
+            size2 += (x[i, c] - before[i, c]) ** 2
+        largest = max(largest, size2)
+    return np.sqrt(largest)
