@@ -10,16 +10,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+import drake_dress
 from drake_dress import __version__
 from drake_dress.errors import UserError
 
 UNUSABLE, INTERRUPTED = 2, 130
+BENCHMARKS = ("cloth",)
 
 _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml
   drake-dress run scenarios/dummy_varied.yaml --seed 3 --out out/try
   drake-dress run scenarios/dummy_standing.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress replay out/dummy_standing-seed0/run.h5
+  drake-dress bench cloth --only draping,growth --json cloth.json
 
 exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input"""
 
@@ -33,8 +36,12 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command line; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        if words[:1] == ["bench"]:
+            # A benchmark has options of its own.
+            return _bench(words[1:])
+        options = _parser().parse_args(words)
         _check_libraries()
         status: int = options.command(options)
         return status
@@ -86,6 +93,10 @@ def _parser() -> argparse.ArgumentParser:
     replay.add_argument("log", metavar="run.h5")
     replay.add_argument("--port", type=int, metavar="PORT", help="default: a free one")
     replay.set_defaults(command=_replay)
+
+    verbs.add_parser(
+        "bench", help="measure speed and accuracy, beside other simulators where installed"
+    )
     return parser
 
 
@@ -105,6 +116,21 @@ def _replay(options: argparse.Namespace) -> int:
     from drake_dress.report.replay import show_replay
 
     return show_replay(options.log, options.port)
+
+
+def _bench(words: list[str]) -> int:
+    name, arguments = BENCHMARKS[0], list(words)
+    if arguments and not arguments[0].startswith("-"):
+        name = arguments.pop(0)
+    if name not in BENCHMARKS:
+        raise UserError("bench", name, f"is no benchmark, expected {' or '.join(BENCHMARKS)}")
+    root = Path(drake_dress.__file__).parents[1]
+    if not (root / "benchmarks" / name).is_dir():
+        raise UserError("bench", name, f"{root} has no benchmarks/, expected a checkout")
+    sys.path.insert(0, str(root))
+    module = importlib.import_module(f"benchmarks.{name}.__main__")
+    status: int = module.main(arguments)
+    return status
 
 
 def _rate(text: str) -> float:

@@ -100,6 +100,8 @@ def test_bad_scenario(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["run", "S", "--seed", "x"], ["--seed"]),
         (["run", "S", "--realtime-rate", "-1"], ["--realtime-rate"]),
         (["replay", "no.h5"], ["no.h5"]),
+        (["bench", "dance"], ["dance", "cloth"]),
+        (["bench", "cloth", "--only", "dance"], ["dance", "draping"]),
     ],
     ids=lambda value: " ".join(value) if value and isinstance(value, list) else "",
 )

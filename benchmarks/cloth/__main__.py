@@ -29,7 +29,7 @@ class _Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(UNUSABLE, f"bench cloth: {message}\n")
+        self.exit(UNUSABLE, f"drake-dress: bench cloth: {message}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="bench cloth", description=__doc__.splitlines()[0])
+    parser = _Parser(prog="drake-dress bench cloth", description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=_file, metavar="FILE", help="write all figures here")
     parser.add_argument("--png", type=_folder, metavar="DIR", help="write plots as cloth_*.png")
     parser.add_argument(

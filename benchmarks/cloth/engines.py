@@ -5,7 +5,6 @@ What differs between their constructors stands here and nowhere else.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -15,6 +14,7 @@ import numpy as np
 from benchmarks.cloth.scene import FloatArray, Scene
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
 
 
 class Engine(Protocol):
@@ -127,22 +127,13 @@ def implicit() -> Recipe:
     return Recipe("implicit", _make_implicit)
 
 
-_PD_MODULE = "drake_dress.models.cloth.projective_dynamics"
+def projective_dynamics(quasi_newton: bool = False) -> Recipe:
+    """Returns Projective Dynamics, the paper's baseline, plain or with Liu's acceleration."""
 
+    def make(scene: Scene, h: float) -> Engine:
+        cloth = ProjectiveDynamicsCloth(
+            scene.elements(), scene.material, h, scene.held, quasi_newton=quasi_newton
+        )
+        return StateEngine(cloth, scene, h)
 
-def _make_projective_dynamics(scene: Scene, h: float) -> Engine:
-    cloth = importlib.import_module(_PD_MODULE).ProjectiveDynamicsCloth
-    return StateEngine(cloth(scene.elements(), scene.material, h, scene.held), scene, h)
-
-
-def _pd_missing() -> str | None:
-    try:
-        importlib.import_module(_PD_MODULE).ProjectiveDynamicsCloth  # noqa: B018
-    except (ImportError, AttributeError):
-        return "this version of the package has none"
-    return None
-
-
-def projective_dynamics() -> Recipe:
-    """Returns Projective Dynamics, the paper's baseline."""
-    return Recipe("projective dynamics", _make_projective_dynamics, _pd_missing)
+    return Recipe("projective dynamics" + (", quasi-Newton" if quasi_newton else ""), make)
