@@ -13,9 +13,14 @@ from drake_dress.models.human.body import ArmPose, BodyMeasures
 H = 0.005
 
 
-@pytest.fixture(scope="module")
-def station() -> Station:
+@pytest.fixture(
+    scope="module",
+    params=[("implicit", False), ("implicit", True), ("projective_dynamics", False)],
+    ids=["implicit", "layered", "projective"],
+)
+def station(request: pytest.FixtureRequest) -> Station:
     """A coat that hangs close behind the person, so that it drapes over the arms."""
+    integrator, layered = request.param
     pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
     return make_simulated_station(
         StationParameters(
@@ -27,6 +32,8 @@ def station() -> Station:
             arms={"left": pose, "right": pose},
             joints=JointParameters(),
             distance_behind=0.35,
+            integrator=integrator,
+            self_collision=layered,
         )
     )
 
@@ -61,7 +68,9 @@ def test_forces_on_grippers_and_person_are_what_moves_the_garment(station: Stati
     assert np.linalg.norm(missing) < 0.01 * np.linalg.norm(weight) * 240 * H
 
 
-def test_garment_moves_the_arms(station: Station) -> None:
+def test_garment_moves_the_arms(station: Station, request: pytest.FixtureRequest) -> None:
+    if "projective" in request.node.name:
+        pytest.skip("contact at nodes only: a mesh of 5 cm hardly touches an arm")
     simulator = Simulator(station.diagram)
     context = simulator.get_mutable_context()
     for i, side in enumerate(("left", "right")):

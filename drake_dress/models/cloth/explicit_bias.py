@@ -65,6 +65,8 @@ from drake_dress.models.cloth.matrices import (
 
 # Solves of the motion, at most, while modes are corrected by the forces that they led to.
 _MOST_REVISIONS = 4
+# The same where solves are coarser than that: their forces say little more the second time.
+_COARSE, _COARSE_REVISIONS = 1e-3, 2
 INNER = ("one_step", "stationary", "conjugate_gradients", "direct")
 
 
@@ -176,6 +178,7 @@ class ExplicitBiasCloth:
         self.held = np.asarray(held, dtype=np.int32)
         self.gravity = np.asarray(gravity, dtype=np.float64)
         self.mass = lumped_mass(elements, material)
+        self._most_revisions = _COARSE_REVISIONS if tolerance > _COARSE else _MOST_REVISIONS
         self.layers = LayerSeparation(elements, self_collision) if self_collision else None
         self.held_mask = np.zeros(elements.node_count, dtype=np.bool_)
         self.held_mask[self.held] = True
@@ -249,7 +252,7 @@ class ExplicitBiasCloth:
                 None if types is None else (types.mode, types.velocity_mode),
             )
             binding = stick_binding
-            for _ in range(_MOST_REVISIONS):
+            for revision in range(self._most_revisions):
                 binding, _ = system.hold(
                     motion_unknown,
                     friction.mode,
@@ -259,7 +262,12 @@ class ExplicitBiasCloth:
                     binding,
                 )
                 if types is not None or not revise_modes(
-                    binding, contacts.normal, contacts.gap, m.friction, friction
+                    binding,
+                    contacts.normal,
+                    contacts.gap,
+                    m.friction,
+                    friction,
+                    slide=revision == 0,
                 ):
                     break
             # A lasting force r moves by ½h² r and hastens by h r.

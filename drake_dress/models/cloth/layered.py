@@ -31,6 +31,7 @@ class Integrator(Protocol):
     time_step: float
     held: IntArray
     mass: FloatArray
+    gravity: FloatArray
 
     def step(
         self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
@@ -56,6 +57,7 @@ class LayeredCloth:
         self.time_step = integrator.time_step
         self.held = integrator.held
         self.mass = integrator.mass
+        self.gravity = integrator.gravity
         self._integrator = integrator
         self._layers = LayerSeparation(integrator.elements, thickness)
 

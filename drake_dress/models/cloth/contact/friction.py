@@ -90,7 +90,12 @@ def find_modes(
 
 
 def revise_modes(
-    binding: FloatArray, normal: FloatArray, gap: FloatArray, mu: float, friction: Friction
+    binding: FloatArray,
+    normal: FloatArray,
+    gap: FloatArray,
+    mu: float,
+    friction: Friction,
+    slide: bool,
 ) -> bool:
     """Corrects the modes, in place, by the forces that they led to; returns if any changed.
 
@@ -106,6 +111,7 @@ def revise_modes(
         gap: (c,) at the start of the step, m.
         mu: friction coefficient.
         friction: modes, with the directions of all nodes.
+        slide: whether sticking nodes may be made to slip.
     """
     return bool(
         _revise(
@@ -117,12 +123,15 @@ def revise_modes(
             friction.mode,
             friction.velocity_mode,
             friction.push,
+            slide,
         )
     )
 
 
 @nb.njit(cache=True, nogil=True)
-def _revise(binding, normal, gap, mu, direction, mode, velocity_mode, push):  # type: ignore[no-untyped-def]
+def _revise(  # type: ignore[no-untyped-def]
+    binding, normal, gap, mu, direction, mode, velocity_mode, push, slide
+):
     changed = False
     excess = 0.0
     bound = 0.0
@@ -145,7 +154,7 @@ def _revise(binding, normal, gap, mu, direction, mode, velocity_mode, push):  # 
         if mode[i] == STICK and along > mu * p:
             over[i] = True
             excess += along - mu * p
-    if excess > _TOLERATED_EXCESS * bound:
+    if slide and excess > _TOLERATED_EXCESS * bound:
         for i in range(mode.shape[0]):
             if over[i]:
                 mode[i] = SLIP

@@ -15,6 +15,12 @@ from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP
 
 _MOST_PASSES = 60
+# With solves this coarse one pass with friction is as good as more.
+_COARSE = 1e-3
+# Passes end when forces change by so many times the tolerance of the solves: these start where the
+# last one ended and so do what is left. They also end when they come no closer.
+_COARSER = 10.0
+_NO_CLOSER = 0.7
 
 # target (c,3) and force (c,3) to binding (c,3) and motion (c,3)
 PlainHold = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
@@ -45,8 +51,9 @@ def hold_obliquely(
     slip = (mode == SLIP)[:, None]
     friction, shifted = nothing, target
     if push is not None and push.any():
-        for _ in range(_MOST_PASSES):
-            before = binding
+        change = np.inf
+        for _ in range(1 if tolerance > _COARSE else _MOST_PASSES):
+            before, last = binding, change
             if backward:
                 lack = np.einsum("ij,ij->i", push, target - z)
                 shifted = target + np.where(slip, lack[:, None] * normal, 0.0)
@@ -54,7 +61,9 @@ def hold_obliquely(
                 multiplier = np.einsum("ij,ij->i", binding, normal)
                 friction = np.where(slip, multiplier[:, None] * push, 0.0)
             binding, z = plain(shifted, friction)
-            if np.linalg.norm(binding - before) <= tolerance * np.linalg.norm(binding):
+            change = float(np.linalg.norm(binding - before))
+            close = change <= _COARSER * tolerance * np.linalg.norm(binding)
+            if close or change > _NO_CLOSER * last:
                 break
     multiplier = np.einsum("ij,ij->i", binding, normal)
     return binding + friction, z, multiplier
