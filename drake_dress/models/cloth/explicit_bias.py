@@ -261,7 +261,8 @@ class ExplicitBiasCloth:
                     friction.push,
                     binding,
                 )
-                if types is not None or not revise_modes(
+                last = types is not None or revision + 1 == self._most_revisions
+                if last or not revise_modes(
                     binding,
                     contacts.normal,
                     contacts.gap,
