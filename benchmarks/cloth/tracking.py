@@ -72,6 +72,8 @@ def measure(session: Session) -> Result:
         name: [] for name in ("sleeve", "left", "right", "target")
     }
     error, cost, contacts, deepest = [], [], [], 0.0
+    # nodes in a gripper go where it goes
+    free = np.setdiff1d(np.arange(len(x)), held)
     none = np.zeros((len(held), 3))
     for k in range(round(duration / _STEP)):
         if session.stop.is_set():
@@ -95,7 +97,7 @@ def measure(session: Session) -> Result:
         error.append(float(np.linalg.norm(target - sleeve)))
         near = find_proximity(x, arm, 0.0)
         contacts.append(int(np.count_nonzero(near.gap < SOFT.margin + 1e-3)))
-        deepest = max(deepest, -float(near.gap.min()))
+        deepest = max(deepest, -float(near.gap[free].min()))
     followed = error[round((_WAITING + _APPROACH) / _STEP) :] if not session.quick else error
     links = arm_linking_number(
         x[loop], shoulder, 0.5 * (hand + shoulder), hand, shoulder + 0.2 * along

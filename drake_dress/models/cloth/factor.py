@@ -7,12 +7,13 @@ up-looking factorisation of Davis, "Direct Methods for Sparse Linear Systems", c
 
 What contact asks of P⁻¹ is little: how the nodes in contact move under forces on those same nodes.
 The columns of L that this takes are the paths from these nodes to the root of the elimination tree
-(`reach`): a fifth to a third of the factor for an arm in a sleeve.
+(`part`): a fifth to a third of the factor for an arm in a sleeve.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -48,9 +49,24 @@ class Factor:
             self.permutation,
         )
 
-    def reach(self, nodes: IntArray) -> IntArray:
-        """Returns, ascending, the columns of L that P_ff⁻¹ between `nodes` (k,) needs."""
-        return _reach(self.parent, self.inverse_permutation, nodes)
+    def part(self, nodes: IntArray) -> tuple[Any, ...]:
+        """Returns what P_ff⁻¹ between `nodes` (k,) needs of L, for `restricted_solve`.
+
+        The columns that the nodes reach in the elimination tree, numbered anew: they fit in the
+        first cache. The last array is scratch.
+        """
+        columns = _reach(self.parent, self.inverse_permutation, nodes)
+        found: tuple[Any, ...] = _part(
+            self.column_start,
+            self.column_end,
+            self.row,
+            self.value,
+            self.inverse_diagonal,
+            self.inverse_permutation,
+            columns,
+            nodes,
+        )
+        return found
 
     def solve_pair(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns P_ff⁻¹ of two (n,3) right-hand sides in one pass over the factor."""
@@ -272,42 +288,64 @@ def _reach(parent, inverse_permutation, nodes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def restricted_solve(factor, columns, places, force, motion, work):  # type: ignore[no-untyped-def]
+def _part(  # type: ignore[no-untyped-def]
+    start, end, row, value, inverse_diagonal, inverse_permutation, columns, nodes
+):
+    count = columns.shape[0]
+    local = np.empty(inverse_diagonal.shape[0], dtype=np.int32)
+    size = 0
+    for s in range(count):
+        local[columns[s]] = s
+        size += end[columns[s]] - start[columns[s]]
+    part_start = np.empty(count + 1, dtype=np.int32)
+    part_row = np.empty(size, dtype=np.int32)
+    part_value = np.empty(size)
+    part_inverse = np.empty(count)
+    at = 0
+    for s in range(count):
+        i = columns[s]
+        part_start[s] = at
+        part_inverse[s] = inverse_diagonal[i]
+        for q in range(start[i], end[i]):
+            part_row[at] = local[row[q]]
+            part_value[at] = value[q]
+            at += 1
+    part_start[count] = at
+    places = np.empty(nodes.shape[0], dtype=np.int32)
+    for k in range(nodes.shape[0]):
+        places[k] = local[inverse_permutation[nodes[k]]]
+    return part_start, part_row, part_value, part_inverse, places, np.empty((count, 3))
+
+
+@nb.njit(cache=True, nogil=True)
+def restricted_solve(part, force, motion):  # type: ignore[no-untyped-def]
     """Writes to `motion` (k,3) the rows of P_ff⁻¹ E `force` at the nodes where `force` (k,3) acts.
 
     Args:
-        factor: `Factor.arrays`.
-        columns: of `Factor.reach`.
-        places: (k,) rows of the nodes in the order of elimination.
+        part: of `Factor.part`.
         force: (k,3).
         motion: (k,3), written.
-        work: (n,3) scratch.
     """
-    start, end, row, value, inverse_diagonal, _ = factor
-    for s in range(columns.shape[0]):
-        i = columns[s]
-        work[i, 0] = 0.0
-        work[i, 1] = 0.0
-        work[i, 2] = 0.0
+    start, row, value, inverse_diagonal, places, work = part
+    count = inverse_diagonal.shape[0]
+    work[:] = 0.0
     for k in range(places.shape[0]):
         i = places[k]
         work[i, 0] = force[k, 0]
         work[i, 1] = force[k, 1]
         work[i, 2] = force[k, 2]
-    for s in range(columns.shape[0]):
-        i = columns[s]
+    for i in range(count):
         w0, w1, w2 = work[i, 0], work[i, 1], work[i, 2]
-        for q in range(start[i], end[i]):
+        for q in range(start[i], start[i + 1]):
             r = row[q]
             v = value[q]
             work[r, 0] -= v * w0
             work[r, 1] -= v * w1
             work[r, 2] -= v * w2
-    for s in range(columns.shape[0] - 1, -1, -1):
-        i = columns[s]
+    for i in range(count - 1, -1, -1):
         d = inverse_diagonal[i]
         w0, w1, w2 = work[i, 0] * d, work[i, 1] * d, work[i, 2] * d
-        for q in range(start[i], end[i]):
+        for q in range(start[i], start[i + 1]):
             r = row[q]
             v = value[q]
             w0 -= v * work[r, 0]

@@ -8,6 +8,7 @@ cannot slip between them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -22,6 +23,8 @@ from drake_dress.models.cloth.contact.distance import (
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 
+# A way this short passes by no body unseen, m.
+_SHORT_WAY = 0.005
 # Farthest a node in contact is from the origin of a body, m.
 _LARGEST_ARM = 1.0
 
@@ -132,7 +135,7 @@ def find_contacts(
     near = _contacts(at, nodes, distance, owner, obstacles, margin)
     relative = motion[nodes] - time_step * near.surface_velocity
     met = owner.copy()
-    touched = first_touch(at, relative, shapes, margin, met)
+    touched = _met_on_the_way(at, relative, near, shapes, margin, met)
     if np.any(met != owner):
         distance_to(at, shapes, met, distance)
         near = _contacts(at, nodes, distance, met, obstacles, margin)
@@ -140,6 +143,35 @@ def find_contacts(
     ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
     touching = (near.gap < 0.0) | (touched & (ahead < 0.0))
     return _chosen(near, touching)
+
+
+def _met_on_the_way(
+    at: FloatArray,
+    relative: FloatArray,
+    near: Contacts,
+    shapes: Any,
+    margin: float,
+    met: IntArray,
+) -> BoolArray:
+    """Returns which nodes (c,) come to a body on their way; writes whose to `met` (c,).
+
+    Who ends inside of the body that was nearest has met it. Who ends outside of everything and does
+    not pass the plane of that body has met none, if it moved little. Only the others' ways are
+    looked at.
+    """
+    distance, who = np.empty(len(at)), np.empty(len(at), dtype=np.int32)
+    nearest_obstacle(at + relative, shapes, distance, who)
+    inside = distance < margin
+    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
+    far = np.einsum("ij,ij->i", relative, relative) > _SHORT_WAY**2
+    unclear = np.where(inside, who != near.owner, (ahead < 0.0) | far) & (near.gap > 0.0)
+    touched: BoolArray = inside | (near.gap <= 0.0)
+    if unclear.any():
+        rows = np.flatnonzero(unclear)
+        owners = met[rows]
+        touched[rows] = first_touch(at[rows], relative[rows], shapes, margin, owners)
+        met[rows] = owners
+    return touched
 
 
 def known_contacts(

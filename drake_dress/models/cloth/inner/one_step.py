@@ -116,10 +116,8 @@ class OneStepSystem:
         """See `StepSystem`."""
         s, m = self._scheme, self._scheme.matrix
         self._nodes = nodes
-        self._columns = s.factor.reach(nodes)
-        self._places = s.factor.inverse_permutation[nodes]
+        self._part = s.factor.part(nodes)
         self._block = _block(m.indptr, m.indices, m.data, nodes)
-        self._work = np.empty((s.node_count, 3))
 
     def hold(
         self,
@@ -143,12 +141,10 @@ class OneStepSystem:
         if guess is not None:
             project(bound, mode, normal)
             pushed = with_friction(bound, mode, normal, side) if oblique and not backward else bound
-            restricted_solve(
-                s.factor.arrays, self._columns, self._places, pushed, moved, self._work
-            )
+            restricted_solve(self._part, pushed, moved)
         solve = _bind_oblique if oblique else _bind
         iterations, _ = solve(
-            (s.factor.arrays, self._columns, self._places, self._work),
+            self._part,
             self._block,
             mode,
             normal,
@@ -199,12 +195,7 @@ class OneStepSystem:
             bound, moved = np.zeros((len(slip), 3)), np.zeros((len(slip), 3))
             solve = _bind_oblique if oblique else _bind
             iterations, _ = solve(
-                (
-                    factor.arrays,
-                    factor.reach(sliding),
-                    factor.inverse_permutation[sliding],
-                    self._work,
-                ),
+                factor.part(sliding),
                 _block(m.indptr, m.indices, m.data, sliding),
                 mode[slip],
                 normal[slip],
@@ -325,11 +316,10 @@ class OneStepSystem:
 
 @nb.njit(cache=True, nogil=True)
 def _bind(  # type: ignore[no-untyped-def]
-    factor, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
+    part, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
 ):
     """Conjugate gradients on Π S Π λ = Π lack; improves `binding` and its motion S λ in place."""
-    arrays, columns, places, work = factor
-    k = places.shape[0]
+    k = mode.shape[0]
     residual = lack.copy()
     project(residual, mode, normal)
     conditioned = np.empty((k, 3))
@@ -345,7 +335,7 @@ def _bind(  # type: ignore[no-untyped-def]
     step = np.empty((k, 3))
     iterations = 0
     while iterations < most and rho > tolerance * tolerance * floor:
-        restricted_solve(arrays, columns, places, direction, step, work)
+        restricted_solve(part, direction, step)
         curvature = _dot(direction, step)
         if curvature <= 0.0:
             break
@@ -371,15 +361,14 @@ def _bind(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _bind_oblique(  # type: ignore[no-untyped-def]
-    factor, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
+    part, block, mode, normal, push, backward, lack, binding, moved, tolerance, most
 ):
     """The same with friction, which makes the system unsymmetric: GMRES (Saad and Schultz 1986).
 
     Preconditioned from the right, in the inner product of the preconditioner, so that the residual
     is measured as in `_bind`. Vectors are as short as there are nodes in contact: all are kept.
     """
-    arrays, columns, places, work = factor
-    k = places.shape[0]
+    k = mode.shape[0]
     residual = lack.copy()
     _rows_of(residual, mode, normal, push, backward)
     conditioned = np.empty((k, 3))
@@ -411,10 +400,10 @@ def _bind_oblique(  # type: ignore[no-untyped-def]
         while count < _RESTART and iterations < most and abs(right[count]) > goal:
             j = count
             if backward:
-                restricted_solve(arrays, columns, places, along[j], motion[j], work)
+                restricted_solve(part, along[j], motion[j])
             else:
                 forces = with_friction(along[j], mode, normal, push)
-                restricted_solve(arrays, columns, places, forces, motion[j], work)
+                restricted_solve(part, forces, motion[j])
             residual[:] = motion[j]
             _rows_of(residual, mode, normal, push, backward)
             for i in range(j + 1):
