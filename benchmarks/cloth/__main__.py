@@ -97,6 +97,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="where fine references are kept",
     )
+    parser.add_argument(
+        "--no-reference",
+        action="store_const",
+        const=None,
+        dest="cache",
+        help="costs alone: do without fine references, which take minutes",
+    )
     return parser
 
 

@@ -33,14 +33,14 @@ class Session:
     Attributes:
         quick: small meshes and short times.
         limit: wall time that one engine may take for one run, s; then it is cut short.
-        cache: folder of references.
+        cache: folder of references; None to do without distances to them.
         say: prints a line of progress.
         stop: set by Ctrl-C; what was measured until then counts.
     """
 
     quick: bool = False
     limit: float = 10.0
-    cache: Path = Path("out/cloth_bench")
+    cache: Path | None = Path("out/cloth_bench")
     say: Callable[[str], None] = print
     stop: threading.Event = field(default_factory=threading.Event)
 

@@ -25,7 +25,7 @@ def measure_in_turn(
     names: Sequence[str],
     quick: bool,
     limit: float,
-    cache: Path,
+    cache: Path | None,
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
@@ -42,7 +42,7 @@ def measure_at_once(
     names: Sequence[str],
     quick: bool,
     limit: float,
-    cache: Path,
+    cache: Path | None,
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
@@ -57,7 +57,7 @@ def measure_at_once(
                 finish(name, future.result())
 
 
-def measure_alone(name: str, quick: bool, limit: float, cache: Path) -> Result:
+def measure_alone(name: str, quick: bool, limit: float, cache: Path | None) -> Result:
     """Returns the result of one scene; for a process of its own."""
     with caught_interrupt() as stop:
         session = Session(quick, limit, cache, _say, stop)

@@ -45,10 +45,12 @@ class Reference:
 
 
 def fine_reference(session: Session, scene: Scene) -> Reference | None:
-    """Returns the fine run of a scene, from its file if there is one; None if interrupted.
+    """Returns the fine run of a scene, from its file if there is one; None or not asked for.
 
     By Projective Dynamics, if the package has it and the fabric is not stiff; else implicit.
     """
+    if session.cache is None:
+        return None
     recipe, step = _choice(scene)
     if session.quick:
         step *= 4.0

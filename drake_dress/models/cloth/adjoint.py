@@ -76,14 +76,17 @@ def run_adjoint(
         motion_in += cloth.layers.rate_vjp(t.separation, np.where(pushed, v_bar / h, 0.0))
         v_bar = np.where(pushed, 0.0, v_bar)
 
-    # reaction of the held nodes: (2/h²) (A Δx − g)
-    seed = (2.0 / h**2) * held_reaction_bar
-    seeded = bool(np.any(seed))
+    # reaction of the held nodes: (2/h²) (A Δx − g), or k (Δp − 2 Δx) of springs
+    spring = cloth.spring
+    full_seed = np.zeros_like(x_bar)
+    seeded = spring is None and bool(np.any(held_reaction_bar))
     if seeded:
-        full_seed = np.zeros_like(x_bar)
-        full_seed[held] = seed
+        full_seed[held] = (2.0 / h**2) * held_reaction_bar
         motion_in = motion_in + system.product(full_seed)
-    nothing = np.zeros((len(held), 3))
+    elif spring is not None:
+        motion_in = motion_in.copy()
+        motion_in[held] -= 2.0 * spring * held_reaction_bar
+    nothing = np.zeros((0 if spring is not None else len(held), 3))
     back_motion, back_change = system.start((motion_in, nothing), (v_bar, nothing))
     back_stick = system.blank()
 
@@ -117,12 +120,17 @@ def run_adjoint(
             prescribed_in = prescribed_in + push
 
     g_in, rate_in = system.finish(back_motion, back_change, less=back_stick)
-    held_change = v_bar[held] - system.held_rows(rate_in)
-    held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
+    v_in = v_bar + (h * mass) * g_in
+    if spring is None:
+        held_change = v_bar[held] - system.held_rows(rate_in)
+        held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
+        v_in[held] -= held_change
+    else:
+        held_in = spring * (held_reaction_bar + 0.5 * h * h * g_in[held] + h * rate_in[held])
+        v_in[held] -= (0.5 * h * h * spring) * rate_in[held]
     if seeded:
         g_in = g_in - full_seed
-    v_in = v_bar + (h * mass) * g_in
-    v_in[held] -= held_change
+        v_in -= (h * mass) * full_seed
     force_in = (0.5 * h * h) * g_in + h * rate_in
     if touching:
         v_in[nodes] -= target_in

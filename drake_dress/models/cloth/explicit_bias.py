@@ -153,6 +153,9 @@ class ExplicitBiasCloth:
         self_collision: thickness, m, that layers of the garment keep; 0 lets them pass. Layers are
             kept apart after the step (layers/), by the pairs, weights and directions that the
             adjoint holds.
+        attachment_stiffness: of a spring from each held node to its gripper, N/m, as the paper has
+            it; None, the default, for nodes that move with the gripper. Springs yield by their
+            force, and by v h more in motion.
         inner: which inner iteration (`INNER`); by default `one_step` for 1 iteration and
             `conjugate_gradients` for more.
 
@@ -171,6 +174,7 @@ class ExplicitBiasCloth:
         iterations: int = 1,
         inner: str | None = None,
         self_collision: float = 0.0,
+        attachment_stiffness: float | None = None,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -182,6 +186,13 @@ class ExplicitBiasCloth:
         self.layers = LayerSeparation(elements, self_collision) if self_collision else None
         self.held_mask = np.zeros(elements.node_count, dtype=np.bool_)
         self.held_mask[self.held] = True
+        if attachment_stiffness is not None and not 0.0 < attachment_stiffness < np.inf:
+            raise ValueError(
+                f"attachment_stiffness is {attachment_stiffness} N/m, expected a number above 0"
+            )
+        self.spring = attachment_stiffness
+        # Springs leave all nodes free.
+        self._fixed = self.held if self.spring is None else self.held[:0]
         self.inner = self._make_inner(
             inner or ("one_step" if iterations == 1 else "conjugate_gradients"),
             iterations,
@@ -203,7 +214,8 @@ class ExplicitBiasCloth:
         Args:
             x: (n,3) positions, m.
             v: (n,3) velocities, m/s.
-            held_motion: (k,3) displacement of the held nodes over this step, m.
+            held_motion: (k,3) displacement of the held nodes over this step, m; with springs, from
+                where the nodes are to where the grippers' ends will be.
             obstacles: the person at the start of the step, with velocities.
             types: contact to hold instead of finding it (for derivative checks).
 
@@ -221,9 +233,14 @@ class ExplicitBiasCloth:
         weight = self.mass[:, None] * self.gravity
         total = force + weight
         system = self.inner.at(x)
+        g = self.mass[:, None] * (h * v) + (0.5 * h * h) * total
+        impulse = h * total - (0.5 * h * h) * rate
+        if self.spring is not None:
+            g[self.held] += (0.5 * h * h * self.spring) * held_motion
+            impulse[self.held] += self.spring * (h * held_motion - 0.5 * h * h * v[self.held])
+        fixed = slice(None) if self.spring is None else slice(0)
         motion_unknown, change_unknown = system.start(
-            (self.mass[:, None] * (h * v) + (0.5 * h * h) * total, held_motion),
-            (h * total - (0.5 * h * h) * rate, held_motion / h - v[self.held]),
+            (g, held_motion[fixed]), (impulse, (held_motion / h - v[self.held])[fixed])
         )
         free = motion_unknown.free
         if not np.isfinite(free).all():
@@ -289,7 +306,7 @@ class ExplicitBiasCloth:
         if self.layers is not None:
             mode = np.zeros(len(x), dtype=np.int32)
             mode[contacts.nodes] = friction.mode
-            mode[self.held] = HELD
+            mode[self._fixed] = HELD
             barred = np.zeros_like(x)
             barred[contacts.nodes] = contacts.normal
             motion, separation = self.layers.correct(
@@ -297,8 +314,11 @@ class ExplicitBiasCloth:
             )
 
         reaction = np.zeros_like(x)
-        g = self.mass[self.held, None] * (h * v[self.held]) + (0.5 * h * h) * total[self.held]
-        reaction[self.held] = (2.0 / h**2) * (system.held_rows(proposed) - g)
+        if self.spring is None:
+            reaction[self.held] = (2.0 / h**2) * (system.held_rows(proposed) - g[self.held])
+        else:
+            # Within P the spring yields by Δx twice: without that, k v h would be felt in motion.
+            reaction[self.held] = self.spring * (held_motion - 2.0 * proposed[self.held])
         if n_c:
             reaction[contacts.nodes] = (2.0 / h**2) * binding
         tape = Tape(
@@ -354,29 +374,35 @@ class ExplicitBiasCloth:
             raise ValueError(f"inner iteration is {name!r}, expected one of {', '.join(INNER)}")
         if name == "one_step" and iterations != 1:
             raise ValueError(f"one_step takes 1 iteration, not {iterations}")
-        mass, unit = sp.diags(self.mass), replace(m, stretch_stiffness=1.0, bending_stiffness=1.0)
+        attached = np.zeros(e.node_count)
+        if self.spring is not None:
+            attached[self.held] = h**2 * self.spring
+        mass, unit = (
+            sp.diags(self.mass + attached),
+            replace(m, stretch_stiffness=1.0, bending_stiffness=1.0),
+        )
         stretch, bound = h**2 * stretch_matrix(e, unit), h**2 * bending_bound(e, unit)
         p = sp.csc_matrix(mass + m.stretch_stiffness * stretch + m.bending_stiffness * bound)
         bending = h**2 * bending_matrix(e, unit)
         linear = mass + m.bending_stiffness * bending
         matrix = Filtered(e, m.stretch_stiffness, h, linear, bending)
         if name == "conjugate_gradients":
-            return ConjugateGradients(matrix, p, self.held, tolerance, iterations)
+            return ConjugateGradients(matrix, p, self._fixed, tolerance, iterations)
         if name == "direct":
-            return Direct(matrix, p, self.held)
+            return Direct(matrix, p, self._fixed)
         shares = {
             "stretch_stiffness": Csr.of(stretch),
             "bending_stiffness": Csr.of(bound),
             "surface_density": Csr.of(sp.diags(e.node_area)),
         }
-        one_step = OneStep(p, shares, self.held, tolerance)
+        one_step = OneStep(p, shares, self._fixed, tolerance)
         return one_step if name == "one_step" else Stationary(matrix, p, one_step, iterations)
 
     def _explain(self, x: FloatArray, v: FloatArray, held_motion: FloatArray) -> None:
         for name, value, nodes in (
             ("position", x, None),
             ("velocity", v, None),
-            ("motion of the held", held_motion, self.held),
+            ("motion of the held", held_motion, self._fixed),
         ):
             bad = np.flatnonzero(~np.isfinite(value).all(axis=1))
             if len(bad):

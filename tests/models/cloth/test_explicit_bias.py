@@ -28,17 +28,19 @@ def test_free_fall_is_exact_at_every_step_size(h: float) -> None:
     np.testing.assert_allclose(v[:, 2], -9.81 * 5 * h, rtol=1e-9)
 
 
+@pytest.mark.parametrize("spring", [None, 200.0])
 @pytest.mark.parametrize("h", [0.002, 0.02, 0.1])
-def test_gripper_that_moves_steadily_feels_the_weight(h: float) -> None:
-    """Prescribed nodes report no force that is not there, whatever the step (paper-notes)."""
+def test_gripper_that_moves_steadily_feels_the_weight(h: float, spring: float | None) -> None:
+    """Neither prescribed nodes nor springs report a force that is not there, whatever the step."""
     x, e = sheet_elements(12, 9, 0.03)
     start = np.column_stack([x[:, 1], np.zeros(len(x)), -x[:, 0]])
     held = np.arange(9, dtype=np.int32)
-    cloth = ExplicitBiasCloth(e, Material(), h, held)
+    cloth = ExplicitBiasCloth(e, Material(), h, held, attachment_stiffness=spring)
     x, v = start, np.tile([0.15, 0.0, 0.0], (len(x), 1))
     forces = []
-    for _ in range(max(200, int(3.0 / h))):
-        x, v, r, _ = cloth.step(x, v, np.tile([0.15 * h, 0.0, 0.0], (9, 1)), Obstacles.none())
+    for k in range(max(200, int(3.0 / h))):
+        grippers = start[held] + [0.15 * h * (k + 1), 0.0, 0.0]
+        x, v, r, _ = cloth.step(x, v, grippers - x[held], Obstacles.none())
         forces.append(r[held].sum(axis=0)[2])
     assert np.mean(forces[-50:]) == pytest.approx(cloth.mass.sum() * 9.81, rel=0.05)
 
@@ -63,10 +65,21 @@ def _in_contact(
     return cloth, x, v, motion, limb
 
 
-@pytest.mark.parametrize("h", [0.005, 0.02, 0.1])
-def test_derivative_of_a_contact_step_matches_finite_differences(h: float) -> None:
+@pytest.mark.parametrize(("h", "spring"), [(0.005, None), (0.02, None), (0.1, None), (0.02, 150.0)])
+def test_derivative_of_a_contact_step_matches_finite_differences(
+    h: float, spring: float | None
+) -> None:
     rng = np.random.default_rng(7)
     cloth, x, v, motion, limb = _in_contact(h)
+    if spring is not None:
+        cloth = ExplicitBiasCloth(
+            cloth.elements,
+            cloth.material,
+            h,
+            cloth.held,
+            tolerance=1e-10,
+            attachment_stiffness=spring,
+        )
     weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
     weight_r = 1e-3 * rng.normal(size=motion.shape)
 
