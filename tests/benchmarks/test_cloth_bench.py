@@ -120,6 +120,8 @@ def test_reference_is_computed_once_per_setting(session: Session) -> None:
 @pytest.mark.usefixtures("few_engines")
 def test_placement_tells_cost_in_contact(session: Session) -> None:
     scene = placement.sheet_scene(12, 0.02, "laid sheet")
+    # to the end, also where kernels are compiled on the way
+    session.limit = 120.0
     result = comparison.against_peers(session, scene, 0.02, 0.2, accuracy=False)
     for run in result["runs"]:
         assert run.keys() >= _RUN_KEYS | _CONTACT_KEYS
