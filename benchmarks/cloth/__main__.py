@@ -48,7 +48,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"\n{table.text()}\n", flush=True)
 
     with caught_interrupt() as stop:
-        settings = (names, options.quick, _limit(options), options.cache, stop, finish)
+        settings = (
+            names,
+            options.quick,
+            _limit(options),
+            options.cache,
+            tuple(options.engine),
+            stop,
+            finish,
+        )
         if options.jobs == 1:
             measure_in_turn(*settings)
         else:
@@ -75,6 +83,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--png", type=_folder, metavar="DIR", help="write plots as cloth_*.png")
     parser.add_argument(
         "--only", type=_names, metavar="NAME,…", help=f"of {', '.join(SCENES)} (default: all)"
+    )
+    parser.add_argument(
+        "--engine",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="only engines with this in their names; may be given again",
     )
     parser.add_argument("--quick", action="store_true", help="small meshes, within a minute")
     parser.add_argument(

@@ -85,11 +85,12 @@ def over_steps(
     """
     session.say(f"{scene.name}: {len(scene.position)} nodes, {scene.duration:g} s")
     reference = fine_reference(session, scene) if accuracy else None
+    chosen = [r for r in recipes or own_recipes() if session.wants(r.name)]
     rows: list[Result] = []
     for h in time_steps:
-        if session.stop.is_set():
+        if session.stop.is_set() or not chosen:
             break
-        for run in race(session, scene, recipes or own_recipes(), h):
+        for run in race(session, scene, chosen, h):
             rows.append(run.summary() | _accuracy(run, scene, reference) | _contact(run, scene))
     return {
         "scene": scene.name,
@@ -167,8 +168,9 @@ def against_peers(
     h = time_step
     session.say(f"{scene.name}: {len(scene.position)} nodes, {scene.duration:g} s, peers")
     reference = fine_reference(session, scene) if accuracy else None
+    chosen = [r for r in _recipes_beside_peers(scene) if session.wants(r.name)]
     patient = replace(session, limit=_PEER_PATIENCE * session.limit)
-    runs = race(patient, scene, _recipes_beside_peers(scene), h)
+    runs = race(patient, scene, chosen, h)
     elements = scene.elements()
     rows: list[Result] = []
     index = round(settle / SAMPLE_INTERVAL)

@@ -36,6 +36,7 @@ class Session:
         cache: folder of references; None to do without distances to them.
         say: prints a line of progress.
         stop: set by Ctrl-C; what was measured until then counts.
+        engines: parts of names of the engines that are compared; empty for all.
     """
 
     quick: bool = False
@@ -43,6 +44,11 @@ class Session:
     cache: Path | None = Path("out/cloth_bench")
     say: Callable[[str], None] = print
     stop: threading.Event = field(default_factory=threading.Event)
+    engines: tuple[str, ...] = ()
+
+    def wants(self, name: str) -> bool:
+        """Returns whether an engine is to be measured."""
+        return not self.engines or any(part in name for part in self.engines)
 
 
 @dataclass

@@ -26,11 +26,12 @@ def measure_in_turn(
     quick: bool,
     limit: float,
     cache: Path | None,
+    engines: tuple[str, ...],
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
     """Measures scenes one after the other and hands each result to `finish`."""
-    session = Session(quick, limit, cache, _say, stop)
+    session = Session(quick, limit, cache, _say, stop, engines)
     for name in names:
         if stop.is_set():
             break
@@ -43,6 +44,7 @@ def measure_at_once(
     quick: bool,
     limit: float,
     cache: Path | None,
+    engines: tuple[str, ...],
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
@@ -51,16 +53,20 @@ def measure_at_once(
     Ctrl-C reaches all processes of a terminal, and each ends with what it has.
     """
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        pending = {name: pool.submit(measure_alone, name, quick, limit, cache) for name in names}
+        pending = {
+            name: pool.submit(measure_alone, name, quick, limit, cache, engines) for name in names
+        }
         for name, future in pending.items():
             if not (stop.is_set() and future.cancel()):
                 finish(name, future.result())
 
 
-def measure_alone(name: str, quick: bool, limit: float, cache: Path | None) -> Result:
+def measure_alone(
+    name: str, quick: bool, limit: float, cache: Path | None, engines: tuple[str, ...]
+) -> Result:
     """Returns the result of one scene; for a process of its own."""
     with caught_interrupt() as stop:
-        session = Session(quick, limit, cache, _say, stop)
+        session = Session(quick, limit, cache, _say, stop, engines)
         result: Result = scene_module(name).measure(session)
     return result
 

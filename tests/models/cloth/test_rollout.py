@@ -110,3 +110,41 @@ def test_input_that_is_not_finite_names_its_node_and_changes_nothing(name: str) 
         cloth.step(bad["position"], bad["velocity"], motions[0], limb())
     for key, value in bad.items():
         np.testing.assert_array_equal(value, kept[key])
+
+
+@pytest.mark.parametrize("h", [0.005, 0.02])
+def test_gradient_through_twenty_steps_in_contact_matches_finite_differences(h: float) -> None:
+    """Contact types are held at every step, as the adjoint holds them."""
+    cloth, x, v, _ = _scene(h)
+    rng = np.random.default_rng(6)
+    motion = h * np.tile([0.05, 0.02, -0.1], (4, 1))
+    weight = rng.normal(size=x.shape)
+    types, tapes = [], []
+    x1, v1 = x, v
+    for _ in range(20):
+        x1, v1, _, tape = cloth.step(x1, v1, motion, limb())
+        types.append(tape.types)
+    assert min(np.count_nonzero(t.mode) for t in types) > 3
+
+    def loss(x: FloatArray, v: FloatArray, motion: FloatArray) -> float:
+        tapes.clear()
+        for known in types:
+            x, v, _, tape = cloth.step(x, v, motion, limb(), known)
+            tapes.append(tape)
+        return float(np.sum(weight * x))
+
+    loss(x, v, motion)
+    x_bar, v_bar, held_in = weight, np.zeros_like(x), np.zeros_like(motion)
+    for tape in reversed(list(tapes)):
+        g = cloth.vector_jacobian_product(tape, x_bar, v_bar, np.zeros_like(motion))
+        x_bar, v_bar, held_in = g.x, g.v, held_in + g.held_motion
+    at = {"x": x, "v": v, "motion": motion}
+    for name, slope, step in (("x", x_bar, 1e-9), ("v", v_bar, 1e-8), ("motion", held_in, 1e-9)):
+        numeric, exact = [], []
+        for _ in range(6):
+            d = rng.normal(size=at[name].shape)
+            high, low = (loss(**{**at, name: at[name] + s * step * d}) for s in (1.0, -1.0))
+            numeric.append((high - low) / (2.0 * step))
+            exact.append(float(np.sum(slope * d)))
+        a, b = np.array(numeric), np.array(exact)
+        assert np.linalg.norm(a - b) < 1e-3 * np.linalg.norm(a), name
