@@ -6,15 +6,16 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK
-from drake_dress.models.cloth.inner.conjugate_gradients import Solved
 from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.interface import directions_of_exact
-from drake_dress.models.cloth.inner.oblique import hold_obliquely
+from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
+
+# Of passes with friction; solves themselves are exact.
+_TOLERANCE = 1e-13
 
 
-class Direct:
+class Direct(FilteredScheme):
     """The limit; see `InnerIteration`.
 
     Args:
@@ -23,139 +24,22 @@ class Direct:
         held: (k,) nodes with prescribed motion.
     """
 
-    depends_on_position = True
-
     def __init__(self, matrix: Filtered, p: sp.csc_matrix, held: IntArray) -> None:
-        self.matrix = matrix
-        self.held = held
-        self.node_count = p.shape[0]
-        self.system = matrix.system(p)
-
-    def derivative(self, x: FloatArray, w: FloatArray, z: FloatArray) -> FloatArray:
-        """Returns ∂(wᵀ A(x) z)/∂x (n,3)."""
-        return self.matrix.derivative(x, w, z)
+        super().__init__(matrix, p, held, _TOLERANCE)
 
     def at(self, x: FloatArray) -> DirectSystem:
         """Returns the system at positions `x` (n,3), m."""
         return DirectSystem(self, self.matrix.block(x))
 
 
-class DirectSystem:
+class DirectSystem(FilteredSystem):
     """(M + h² K₊) z = rhs of one step; see `StepSystem`."""
 
     def __init__(self, scheme: Direct, block: FloatArray) -> None:
+        super().__init__(scheme, block)
         self._scheme = scheme
-        self._block = block
-        self._nodes = np.zeros(0, dtype=np.int32)
         self._matrix = scheme.matrix.assemble(block)
         self._factors: dict[tuple[bytes, bytes, bytes], tuple[sp.csc_matrix, spla.SuperLU]] = {}
-
-    def start(
-        self, motion: tuple[FloatArray, FloatArray], change: tuple[FloatArray, FloatArray]
-    ) -> tuple[Solved, Solved]:
-        """See `StepSystem`."""
-        return self._free(*motion), self._free(*change)
-
-    def touch(self, nodes: IntArray) -> None:
-        """See `StepSystem`."""
-        self._nodes = nodes
-
-    def hold(
-        self,
-        unknown: Solved,
-        mode: IntArray,
-        normal: FloatArray,
-        target: FloatArray,
-        push: FloatArray | None = None,
-        guess: FloatArray | None = None,
-        backward: bool = False,
-    ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`; there is nothing to guess."""
-
-        def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-            return self._hold(unknown, mode, normal, target, force)
-
-        force, z, unknown.multiplier = hold_obliquely(
-            plain, mode, normal, target, push, backward, 1e-13
-        )
-        return force, z
-
-    def finish(
-        self, motion: Solved, change: Solved, less: Solved | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`."""
-        return (motion.z if less is None else motion.z - less.z), change.z
-
-    def blank(self) -> Solved:
-        """See `StepSystem`."""
-        zero = np.zeros((self._scheme.node_count, 3))
-        return Solved(zero, np.zeros((len(self._scheme.held), 3)), zero, zero)
-
-    def by_directions(
-        self, forward: Solved, backward: Solved, target: FloatArray, slip: BoolArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`."""
-        assert forward.multiplier is not None and backward.multiplier is not None
-        nodes = self._nodes
-        return directions_of_exact(
-            forward.multiplier,
-            forward.z[nodes],
-            backward.multiplier,
-            backward.z[nodes],
-            target,
-            slip,
-        )
-
-    def again(self, unknown: Solved) -> Solved:
-        """See `StepSystem`."""
-        return Solved(unknown.rhs, unknown.held, unknown.free, unknown.z)
-
-    def pairs(self, forward: Solved, backward: Solved) -> list[tuple[FloatArray, FloatArray]]:
-        """See `StepSystem`."""
-        return [(backward.z, forward.z)]
-
-    def by_parameter(self, name: str, forward: Solved, backward: Solved) -> float:
-        """See `StepSystem`."""
-        pairs = self.pairs(forward, backward)
-        change = -sum(float(np.sum(w * self.share(name, z))) for w, z in pairs)
-        return change
-
-    def share(self, name: str, z: FloatArray) -> FloatArray:
-        """See `StepSystem`."""
-        return self._scheme.matrix.share(name, self._block, z)
-
-    def product(self, z: FloatArray) -> FloatArray:
-        """See `StepSystem`."""
-        return self._scheme.system.product(z, self._block)
-
-    def held_rows(self, z: FloatArray) -> FloatArray:
-        """See `StepSystem`."""
-        rows: FloatArray = self.product(z)[self._scheme.held]
-        return rows
-
-    def _hold(
-        self,
-        unknown: Solved,
-        mode: IntArray,
-        normal: FloatArray,
-        target: FloatArray,
-        force: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Binds without friction; returns what binds and z at the nodes."""
-        nodes, scheme = self._nodes, self._scheme
-        rhs = unknown.rhs.copy()
-        rhs[nodes] += force
-        slip, stick = mode == SLIP, mode == STICK
-        fixed = np.zeros_like(rhs)
-        fixed[scheme.held] = unknown.held
-        fixed[nodes[stick]] = target[stick]
-        n = normal[slip]
-        fixed[nodes[slip]] = np.einsum("ij,ij->i", target[slip], n)[:, None] * n
-        unknown.z = self._solve(rhs, fixed, nodes[stick], nodes[slip], n)
-        binding = (self.product(unknown.z) - rhs)[nodes]
-        binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
-        binding[~(stick | slip)] = 0.0
-        return binding, unknown.z[nodes]
 
     def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
         fixed = np.zeros_like(rhs)
@@ -163,6 +47,18 @@ class DirectSystem:
         none = np.zeros(0, dtype=np.int32)
         z = self._solve(rhs, fixed, none, none, np.zeros((0, 3)))
         return Solved(rhs, held, z, z)
+
+    def _bind(
+        self,
+        unknown: Solved,
+        rhs: FloatArray,
+        mode: IntArray,
+        normal: FloatArray,
+        target: FloatArray,
+    ) -> None:
+        stick, slip = mode == STICK, mode == SLIP
+        fixed = self._prescribed(unknown.held, mode, normal, target)
+        unknown.z = self._solve(rhs, fixed, self._nodes[stick], self._nodes[slip], normal[slip])
 
     def _solve(
         self,
