@@ -143,7 +143,10 @@ class ClothPlant(LeafSystem):
         held = state.x[self.cloth.held]
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
         held_velocity = (target[self._side] + self._offset - held) / h
-        after, _ = self.cloth.step(state, self.obstacles(context), held_velocity)
+        try:
+            after, _ = self.cloth.step(state, self.obstacles(context), held_velocity)
+        except ValueError as error:
+            raise ValueError(f"garment at {context.get_time():.3f} s: {error}") from error
         discrete.set_value(self._x, after.x.ravel())
         discrete.set_value(self._v, after.v.ravel())
         discrete.set_value(self._mode, after.mode.astype(np.float64))

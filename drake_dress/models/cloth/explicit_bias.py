@@ -44,6 +44,7 @@ from drake_dress.models.cloth.contact.friction import (
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import HELD, STICK
+from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import force_and_product
 from drake_dress.models.cloth.implicit import GRAVITY
 from drake_dress.models.cloth.inner.conjugate_gradients import ConjugateGradients
@@ -244,7 +245,7 @@ class ExplicitBiasCloth:
         )
         free = motion_unknown.free
         if not np.isfinite(free).all():
-            self._explain(x, v, held_motion)
+            explain_not_finite(x, v, held_motion, self.held)
 
         if types is None:
             contacts = find_contacts(x, free, obstacles, m.margin, h, self.held_mask)
@@ -397,15 +398,3 @@ class ExplicitBiasCloth:
         }
         one_step = OneStep(p, shares, self._fixed, tolerance)
         return one_step if name == "one_step" else Stationary(matrix, p, one_step, iterations)
-
-    def _explain(self, x: FloatArray, v: FloatArray, held_motion: FloatArray) -> None:
-        for name, value, nodes in (
-            ("position", x, None),
-            ("velocity", v, None),
-            ("motion of the held", held_motion, self._fixed),
-        ):
-            bad = np.flatnonzero(~np.isfinite(value).all(axis=1))
-            if len(bad):
-                node = int(bad[0] if nodes is None else nodes[bad[0]])
-                raise ValueError(f"{name} node {node} is {value[bad[0]]}, expected finite numbers")
-        raise ValueError("the step has no finite solution, expected positions of moderate size")

@@ -29,6 +29,7 @@ from drake_dress.models.cloth.filtered_cg import (
     project,
 )
 from drake_dress.models.cloth.filtered_stiffness import no_stretch, prepare_filtered
+from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
@@ -159,6 +160,9 @@ class ImplicitCloth:
             state: now.
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
+
+        Raises:
+            ValueError: something is not finite; the message names it.
         """
         e, m, h = self.elements, self.material, self.time_step
         x, v = state.x, state.v
@@ -234,6 +238,9 @@ class ImplicitCloth:
                 and residual <= self._tolerance
             ):
                 break
+        if not np.isfinite(x + h * velocity).all():
+            self._factor = None
+            explain_not_finite(x, v, held_velocity, self.held)
         if residual > 0.1:
             self._factor = None
         # What conjugate gradients left over along a slip is no force of the person.

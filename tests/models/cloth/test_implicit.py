@@ -167,3 +167,19 @@ def test_thin_finger_does_not_slip_between_nodes() -> None:
         state, _ = cloth.step(state, finger, np.zeros((len(held), 3)))
     near = np.linalg.norm(state.x[:, :2] - tip[:2], axis=1) < 0.02
     assert state.x[near, 2].min() > p[0, 2] - 0.004
+
+
+@pytest.mark.parametrize("name", ["position", "velocity"])
+def test_input_that_is_not_finite_names_its_node_and_changes_nothing(name: str) -> None:
+    x, e = sheet_elements(6, 6, 0.02)
+    held = np.array([0, 5], dtype=np.int32)
+    cloth = ImplicitCloth(e, Material(), H, held)
+    state = ClothState.at_rest(x)
+    (state.x if name == "position" else state.v)[17, 2] = np.nan
+    kept = state.x.copy(), state.v.copy()
+    with pytest.raises(ValueError, match=f"{name} node 17 is"):
+        cloth.step(state, Obstacles.none(), np.zeros((2, 3)))
+    np.testing.assert_array_equal(state.x, kept[0])
+    np.testing.assert_array_equal(state.v, kept[1])
+    good, _ = cloth.step(ClothState.at_rest(x), Obstacles.none(), np.zeros((2, 3)))
+    assert np.isfinite(good.x).all()
