@@ -47,7 +47,7 @@ class Reference:
 def fine_reference(session: Session, scene: Scene) -> Reference | None:
     """Returns the fine run of a scene, from its file if there is one; None or not asked for.
 
-    By Projective Dynamics, if the package has it and the fabric is not stiff; else implicit.
+    By Projective Dynamics where the fabric is not stiff, else implicit.
     """
     if session.cache is None:
         return None
@@ -80,9 +80,8 @@ def fine_reference(session: Session, scene: Scene) -> Reference | None:
 
 
 def _choice(scene: Scene) -> tuple[Recipe, float]:
-    recipe = projective_dynamics()
-    if recipe.missing() is None and scene.material.stretch_stiffness <= STIFF_FROM:
-        return recipe, _PD_STEP
+    if scene.material.stretch_stiffness <= STIFF_FROM:
+        return projective_dynamics(), _PD_STEP
     return implicit(), _IMPLICIT_STEP
 
 

@@ -10,11 +10,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import Elements, FloatArray
-
-# Below this det S the force takes another isometry than this energy's: see forces.py.
-_SMALLEST_STRETCH = 1e-3
-# Below this share of the rest curvature the force goes to zero with the curvature: see forces.py.
-_LEAST_CURVATURE = 0.1
+from drake_dress.models.cloth.forces import LEAST_CURVATURE, SMALLEST_STRETCH
 
 
 def elastic_energy(elements: Elements, stretch: float, bending: float, x: FloatArray) -> float:
@@ -51,7 +47,7 @@ def _stretch(x, triangle, gradient, area, stretch):  # type: ignore[no-untyped-d
             c00 += p * p
             c01 += p * q
             c11 += q * q
-        s = np.sqrt(max(c00 * c11 - c01 * c01, _SMALLEST_STRETCH * _SMALLEST_STRETCH))
+        s = np.sqrt(max(c00 * c11 - c01 * c01, SMALLEST_STRETCH * SMALLEST_STRETCH))
         trace = c00 + c11
         total += area[e] * (trace - 2.0 * np.sqrt(trace + 2.0 * s) + 2.0)
     return 0.5 * stretch * total
@@ -68,10 +64,10 @@ def _bending(x, hinge, coefficient, weight, rest, bending):  # type: ignore[no-u
                 s += coefficient[e, m] * x[hinge[e, m], c]
             length2 += s * s
         length = np.sqrt(length2)
-        if length >= _LEAST_CURVATURE * rest[e]:
+        if length >= LEAST_CURVATURE * rest[e]:
             total += weight[e] * (length - rest[e]) ** 2
         else:
             total += weight[e] * (
-                (1.0 - _LEAST_CURVATURE) * rest[e] ** 2 + (1.0 - 1.0 / _LEAST_CURVATURE) * length2
+                (1.0 - LEAST_CURVATURE) * rest[e] ** 2 + (1.0 - 1.0 / LEAST_CURVATURE) * length2
             )
     return 0.5 * bending * total

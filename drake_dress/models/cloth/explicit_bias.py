@@ -39,6 +39,7 @@ from drake_dress.models.cloth.contact.friction import (
     NO_CONTACT,
     Friction,
     find_modes,
+    most_revisions,
     revise_modes,
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -57,17 +58,12 @@ from drake_dress.models.cloth.layered import inverse_mass, pushed_nodes
 from drake_dress.models.cloth.layers.separation import LayerSeparation, SeparationRecord
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
-    Csr,
     bending_bound,
     bending_matrix,
     lumped_mass,
     stretch_matrix,
 )
 
-# Solves of the motion, at most, while modes are corrected by the forces that they led to.
-_MOST_REVISIONS = 4
-# The same where solves are coarser than that: their forces say little more the second time.
-_COARSE, _COARSE_REVISIONS = 1e-3, 2
 INNER = ("one_step", "stationary", "conjugate_gradients", "direct")
 
 
@@ -92,24 +88,20 @@ class Tape:
     """What a step leaves for its adjoint: n nodes, k held ones, c in contact.
 
     Attributes:
-        x, v, held_motion, obstacles: the inputs of the step.
-        force, stiffness_rate: (n,3) f and K v at x.
+        x, v, obstacles: of the inputs of the step.
         system: the linear system; motion_unknown, change_unknown: of Δx and Δv; stick_unknown: of
             Δx with all contact nodes sticking, None without contact.
         contacts: nodes that touch something; prescribed: (c,3) Δx of sticking, m;
             target_change: (c,3) its Δv, m/s.
         friction: their modes and what follows from the sticking force.
         stick_reaction: (c,3) the force that sticking would take, N.
-        binding: (c,3) λ of the motion, kg·m. motion, change: (n,3) Δx, Δv.
+        motion, change: (n,3) Δx, Δv.
         separation: how layers were kept apart, which changed Δx and Δv once more; None where off.
     """
 
     x: FloatArray
     v: FloatArray
-    held_motion: FloatArray
     obstacles: Obstacles
-    force: FloatArray
-    stiffness_rate: FloatArray
     system: StepSystem
     motion_unknown: Unknown
     change_unknown: Unknown
@@ -119,7 +111,6 @@ class Tape:
     target_change: FloatArray
     friction: Friction
     stick_reaction: FloatArray
-    binding: FloatArray
     motion: FloatArray
     change: FloatArray
     separation: SeparationRecord | None
@@ -183,7 +174,7 @@ class ExplicitBiasCloth:
         self.held = np.asarray(held, dtype=np.int32)
         self.gravity = np.asarray(gravity, dtype=np.float64)
         self.mass = lumped_mass(elements, material)
-        self._most_revisions = _COARSE_REVISIONS if tolerance > _COARSE else _MOST_REVISIONS
+        self._most_revisions = most_revisions(tolerance)
         self.layers = LayerSeparation(elements, self_collision) if self_collision else None
         self.held_mask = np.zeros(elements.node_count, dtype=np.bool_)
         self.held_mask[self.held] = True
@@ -325,10 +316,7 @@ class ExplicitBiasCloth:
         tape = Tape(
             x=x,
             v=v,
-            held_motion=held_motion,
             obstacles=obstacles,
-            force=force,
-            stiffness_rate=rate,
             system=system,
             motion_unknown=motion_unknown,
             change_unknown=change_unknown,
@@ -338,7 +326,6 @@ class ExplicitBiasCloth:
             target_change=target_change,
             friction=friction,
             stick_reaction=stick_reaction,
-            binding=binding,
             motion=proposed,
             change=change,
             separation=separation,
@@ -384,6 +371,13 @@ class ExplicitBiasCloth:
         )
         stretch, bound = h**2 * stretch_matrix(e, unit), h**2 * bending_bound(e, unit)
         p = sp.csc_matrix(mass + m.stretch_stiffness * stretch + m.bending_stiffness * bound)
+        shares = {
+            "stretch_stiffness": stretch,
+            "bending_stiffness": bound,
+            "surface_density": sp.diags(e.node_area),
+        }
+        if name == "one_step":
+            return OneStep(p, shares, self._fixed, tolerance)
         bending = h**2 * bending_matrix(e, unit)
         linear = mass + m.bending_stiffness * bending
         matrix = Filtered(e, m.stretch_stiffness, h, linear, bending)
@@ -391,10 +385,4 @@ class ExplicitBiasCloth:
             return ConjugateGradients(matrix, p, self._fixed, tolerance, iterations)
         if name == "direct":
             return Direct(matrix, p, self._fixed)
-        shares = {
-            "stretch_stiffness": Csr.of(stretch),
-            "bending_stiffness": Csr.of(bound),
-            "surface_density": Csr.of(sp.diags(e.node_area)),
-        }
-        one_step = OneStep(p, shares, self._fixed, tolerance)
-        return one_step if name == "one_step" else Stationary(matrix, p, one_step, iterations)
+        return Stationary(matrix, p, OneStep(p, shares, self._fixed, tolerance), iterations)

@@ -134,7 +134,8 @@ def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
 
 
 @nb.njit(cache=True, nogil=True)
-def _dot(a: FloatArray, b: FloatArray) -> float:
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Returns Σ a b of two (k,3) arrays, summed in order."""
     s = 0.0
     for i in range(a.shape[0]):
         s += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
@@ -155,7 +156,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     residual = rhs.copy()
     project(residual, mode, normal)
     _precondition(preconditioner, residual, preconditioned)
-    floor = max(_dot(residual, preconditioned), 1e-300)
+    floor = max(dot(residual, preconditioned), 1e-300)
 
     _apply(operator, z, residual)
     for i in range(n):
@@ -163,13 +164,13 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
             residual[i, c] = rhs[i, c] - residual[i, c]
     project(residual, mode, normal)
     _precondition(preconditioner, residual, preconditioned)
-    rho = _dot(residual, preconditioned)
+    rho = dot(residual, preconditioned)
     direction[:] = preconditioned
     iterations = 0
     while iterations < max_iterations and rho > tolerance * tolerance * floor:
         _apply(operator, direction, product)
         project(product, mode, normal)
-        curvature = _dot(direction, product)
+        curvature = dot(direction, product)
         if curvature <= 0.0:
             break
         alpha = rho / curvature
@@ -178,7 +179,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
                 z[i, c] += alpha * direction[i, c]
                 residual[i, c] -= alpha * product[i, c]
         _precondition(preconditioner, residual, preconditioned)
-        new = _dot(residual, preconditioned)
+        new = dot(residual, preconditioned)
         beta = new / rho
         rho = new
         for i in range(n):

@@ -18,9 +18,9 @@ import numpy as np
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
 
 # Smallest value det S is taken at: a triangle crushed to a line has no normal.
-_SMALLEST_STRETCH = 1e-3
+SMALLEST_STRETCH = 1e-3
 # A hinge's rest curvature pushes with no more than at this share of it: its direction is lost at 0.
-_LEAST_CURVATURE = 0.1
+LEAST_CURVATURE = 0.1
 
 
 def internal_force(elements: Elements, stretch: float, bending: float, x: FloatArray) -> FloatArray:
@@ -83,7 +83,7 @@ def polar(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
     c00 = f00 * f00 + f10 * f10 + f20 * f20
     c01 = f00 * f01 + f10 * f11 + f20 * f21
     c11 = f01 * f01 + f11 * f11 + f21 * f21
-    s = np.sqrt(max(c00 * c11 - c01 * c01, _SMALLEST_STRETCH * _SMALLEST_STRETCH))
+    s = np.sqrt(max(c00 * c11 - c01 * c01, SMALLEST_STRETCH * SMALLEST_STRETCH))
     # S = (C + s I) / t, det S = s up to the floor
     t = 1.0 / np.sqrt(c00 + c11 + 2.0 * s)
     s00 = (c00 + s) * t
@@ -281,7 +281,7 @@ def bending_force(x, nodes, bend, bending, force):  # type: ignore[no-untyped-de
         for l in range(LANES):
             s0, s1, s2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             rest = bend[b, 5, l]
-            least = _LEAST_CURVATURE * rest
+            least = LEAST_CURVATURE * rest
             length2 = max(s0 * s0 + s1 * s1 + s2 * s2, least * least + 1e-300)
             scale = -bending * bend[b, 4, l] * (1.0 - rest / np.sqrt(length2))
             tile[l] = scale * s0
@@ -301,7 +301,7 @@ def _bending_both(x, z, nodes, bend, bending, force, product):  # type: ignore[n
             s0, s1, s2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             t0, t1, t2 = other[l], other[LANES + l], other[2 * LANES + l]
             rest = bend[b, 5, l]
-            least = _LEAST_CURVATURE * rest
+            least = LEAST_CURVATURE * rest
             length2 = s0 * s0 + s1 * s1 + s2 * s2
             bounded = max(length2, least * least + 1e-300)
             share = rest / np.sqrt(bounded)
@@ -329,7 +329,7 @@ def _bending_product(x, z, nodes, bend, bending, product):  # type: ignore[no-un
         for l in range(LANES):
             s0, s1, s2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             rest = bend[b, 5, l]
-            least = _LEAST_CURVATURE * rest
+            least = LEAST_CURVATURE * rest
             length2 = s0 * s0 + s1 * s1 + s2 * s2
             bounded = max(length2, least * least + 1e-300)
             share = rest / np.sqrt(bounded)
@@ -357,7 +357,7 @@ def _bending_products(x, y, z, nodes, bend, bending, of_y, of_z):  # type: ignor
         for l in range(LANES):
             s0, s1, s2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             rest = bend[b, 5, l]
-            least = _LEAST_CURVATURE * rest
+            least = LEAST_CURVATURE * rest
             length2 = s0 * s0 + s1 * s1 + s2 * s2
             bounded = max(length2, least * least + 1e-300)
             share = rest / np.sqrt(bounded)

@@ -238,7 +238,8 @@ class ImplicitCloth:
                 and residual <= self._tolerance
             ):
                 break
-        if not np.isfinite(x + h * velocity).all():
+        end = x + h * velocity
+        if not np.isfinite(end).all():
             self._factor = None
             explain_not_finite(x, v, held_velocity, self.held)
         if residual > 0.1:
@@ -250,7 +251,7 @@ class ImplicitCloth:
         reaction = np.where((mode != FREE)[:, None], impulse / h, 0.0)
         touching = (mode == STICK) | (mode == SLIP)
         after = ClothState(
-            x + h * velocity,
+            end,
             velocity,
             mode,
             reaction,

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import warp as wp
 
+from drake_dress.models.cloth.contact.detection import fastest
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 
 wp.set_module_options({"enable_backward": False})
@@ -18,8 +19,6 @@ _ZERO = wp.constant(wp.float64(0.0))
 _ONE = wp.constant(wp.float64(1.0))
 _FAR = wp.constant(wp.float64(1e9))
 _SMALLEST_RADIUS = wp.constant(wp.float64(1e-12))
-# Farthest a node in contact is from the origin of a body, m; as in `contact.detection`.
-_LARGEST_ARM = 1.0
 
 
 @wp.struct
@@ -83,15 +82,9 @@ def make_bodies(
     bodies.radius = on_device(radii, wp.float64)
     bodies.velocity = on_device([o.twists()[0] for o in sets], wp.vec3d)
     bodies.angular_velocity = on_device([o.twists()[1] for o in sets], wp.vec3d)
-    bodies.fastest = wp.array([_fastest(o) for o in sets], dtype=wp.float64, device=device)
+    bodies.fastest = wp.array([fastest(o) for o in sets], dtype=wp.float64, device=device)
     bodies.sets, bodies.count, bodies.capsules = len(sets), capsules + planes, capsules
     return bodies
-
-
-def _fastest(obstacles: Obstacles) -> float:
-    v, w = obstacles.twists()
-    speed = np.linalg.norm(v, axis=1) + _LARGEST_ARM * np.linalg.norm(w, axis=1)
-    return float(speed.max(initial=0.0))
 
 
 @wp.func

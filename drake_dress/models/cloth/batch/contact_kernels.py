@@ -20,6 +20,8 @@ from drake_dress.models.cloth.batch.bodies import (
     surface_velocity,
 )
 from drake_dress.models.cloth.batch.parameters import Parameters
+from drake_dress.models.cloth.contact.detection import SHORT_WAY
+from drake_dress.models.cloth.contact.distance import MOST_MARCHES, TOUCH
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
 
 wp.set_module_options({"enable_backward": False})
@@ -28,12 +30,9 @@ _FREE = wp.constant(FREE)
 _STICK = wp.constant(STICK)
 _HELD = wp.constant(HELD)
 _ZERO = wp.constant(wp.float64(0.0))
-# As in `contact.distance`: a point this close on its way has touched, m; a grazing one is given up
-# after so many marches.
-_TOUCH = wp.constant(wp.float64(1e-5))
-_MOST_MARCHES = wp.constant(64)
-# As in `contact.detection`: a way this short passes by no body unseen, m.
-_SHORT_WAY = wp.constant(wp.float64(0.005))
+_TOUCH = wp.constant(wp.float64(TOUCH))
+_MOST_MARCHES = wp.constant(MOST_MARCHES)
+_SHORT_WAY = wp.constant(wp.float64(SHORT_WAY))
 
 
 @wp.struct

@@ -18,11 +18,7 @@ from drake_dress.models.cloth.batch.parameters import Parameters
 from drake_dress.models.cloth.batch.projected_cg import SKIP, iterate_where
 from drake_dress.models.cloth.batch.reduction import add_sums
 from drake_dress.models.cloth.batch.tape import Contact, ContactTypes
-
-# Solves of the motion, at most, while modes are corrected, and where solves are coarser than that;
-# as in `explicit_bias`.
-_MOST_SOLVES = 4
-_COARSE, _COARSE_SOLVES = 1e-3, 2
+from drake_dress.models.cloth.contact.friction import most_revisions
 
 
 def find_contact(
@@ -108,7 +104,7 @@ def bind_motion(
     )
     motion = wp.clone(stick_motion)
     bonds = make_bonds(friction.mode, near.normal, friction.push)
-    most = _COARSE_SOLVES if engine.solver.tolerance > _COARSE else _MOST_SOLVES
+    most = most_revisions(engine.solver.tolerance)
     for solves in range(1, most + 1):
         engine.oblique.solve(parameters, active, bonds, g, motion, cold=False)
         if types is not None or solves == most:

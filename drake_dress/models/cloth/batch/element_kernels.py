@@ -13,15 +13,16 @@ import warp as wp
 
 from drake_dress.models.cloth.batch.mesh import Mesh
 from drake_dress.models.cloth.batch.parameters import Parameters
+from drake_dress.models.cloth.forces import LEAST_CURVATURE, SMALLEST_STRETCH
 
 wp.set_module_options({"enable_backward": False})
 
 _ZERO = wp.constant(wp.float64(0.0))
 _ONE = wp.constant(wp.float64(1.0))
 _TWO = wp.constant(wp.float64(2.0))
-# As in `forces`: det C of a triangle crushed to a line, and how far a hinge's vector may shrink.
-_SMALLEST_DETERMINANT = wp.constant(wp.float64(1e-6))
-_SMALLEST_SHARE = wp.constant(wp.float64(0.1))
+# det C of a triangle crushed to a line, and how far a hinge's vector may shrink.
+_SMALLEST_DETERMINANT = wp.constant(wp.float64(SMALLEST_STRETCH * SMALLEST_STRETCH))
+_SMALLEST_SHARE = wp.constant(wp.float64(LEAST_CURVATURE))
 
 
 @wp.func

@@ -14,6 +14,7 @@ import warp as wp
 from drake_dress.models.cloth.batch.contact_kernels import Proximity
 from drake_dress.models.cloth.batch.parameters import Parameters
 from drake_dress.models.cloth.batch.system import System, row_product
+from drake_dress.models.cloth.contact.friction import LYING, TOLERATED_EXCESS
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 
 wp.set_module_options({"enable_backward": False})
@@ -23,10 +24,8 @@ _STICK = wp.constant(STICK)
 _SLIP = wp.constant(SLIP)
 _ZERO = wp.constant(wp.float64(0.0))
 _TWO = wp.constant(wp.float64(2.0))
-# As in `contact.friction`: a node within this gap lies on the surface, m; friction beyond the cone,
-# in sum and relative to what the cone allows, that is let be.
-_LYING = wp.constant(wp.float64(1e-4))
-_TOLERATED_EXCESS = wp.constant(wp.float64(0.01))
+_LYING = wp.constant(wp.float64(LYING))
+_TOLERATED_EXCESS = wp.constant(wp.float64(TOLERATED_EXCESS))
 
 
 @wp.struct

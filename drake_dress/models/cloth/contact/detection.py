@@ -24,7 +24,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 
 # A way this short passes by no body unseen, m.
-_SHORT_WAY = 0.005
+SHORT_WAY = 0.005
 # Farthest a node in contact is from the origin of a body, m.
 _LARGEST_ARM = 1.0
 
@@ -66,12 +66,7 @@ def find_proximity(
         _lend_depth(x, edge, shapes, gap, lent)
         _lend_depth(x, triangle, shapes, gap, lent)
         gap = lent
-    normal = np.empty((n, 3))
-    slope = np.empty(n)
-    velocity = np.empty((n, 3))
-    twist = obstacles.twists()
-    surface_frame(x, shapes, obstacles.origins(), *twist, owner, normal, slope, velocity)
-    return Proximity(gap - margin, owner, normal, slope, velocity)
+    return Proximity(gap - margin, owner, *_surface(x, obstacles, owner))
 
 
 @dataclass(frozen=True)
@@ -129,7 +124,7 @@ def find_contacts(
         return NO_CONTACTS
     shapes = obstacles.packed
     nodes, distance, owner = may_touch(
-        x, motion, shapes, margin, time_step * _fastest(obstacles), excluded
+        x, motion, shapes, margin, time_step * fastest(obstacles), excluded
     )
     at = x[nodes]
     near = _contacts(at, nodes, distance, owner, obstacles, margin)
@@ -163,7 +158,7 @@ def _met_on_the_way(
     nearest_obstacle(at + relative, shapes, distance, who)
     inside = distance < margin
     ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
-    far = np.einsum("ij,ij->i", relative, relative) > _SHORT_WAY**2
+    far = np.einsum("ij,ij->i", relative, relative) > SHORT_WAY**2
     unclear = np.where(inside, who != near.owner, (ahead < 0.0) | far) & (near.gap > 0.0)
     touched: BoolArray = inside | (near.gap <= 0.0)
     if unclear.any():
@@ -191,19 +186,17 @@ def _contacts(
     obstacles: Obstacles,
     margin: float,
 ) -> Contacts:
-    normal, slope = np.empty((len(nodes), 3)), np.empty(len(nodes))
-    velocity = np.empty((len(nodes), 3))
-    surface_frame(
-        at,
-        obstacles.packed,
-        obstacles.origins(),
-        *obstacles.twists(),
-        owner,
-        normal,
-        slope,
-        velocity,
-    )
-    return Contacts(nodes, distance - margin, owner, normal, slope, velocity)
+    return Contacts(nodes, distance - margin, owner, *_surface(at, obstacles, owner))
+
+
+def _surface(
+    x: FloatArray, obstacles: Obstacles, owner: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns normals (k,3), slopes (k,) and velocities (k,3) of the owners' surfaces at `x`."""
+    normal, slope, velocity = np.empty_like(x), np.empty(len(x)), np.empty_like(x)
+    twists = obstacles.twists()
+    surface_frame(x, obstacles.packed, obstacles.origins(), *twists, owner, normal, slope, velocity)
+    return normal, slope, velocity
 
 
 def _chosen(near: Contacts, chosen: BoolArray) -> Contacts:
@@ -217,13 +210,11 @@ def _chosen(near: Contacts, chosen: BoolArray) -> Contacts:
     )
 
 
-def _fastest(obstacles: Obstacles) -> float:
+def fastest(obstacles: Obstacles) -> float:
     """Returns a bound on the speed of surfaces near the garment, m/s."""
-    if not obstacles.count:
-        return 0.0
     v, w = obstacles.twists()
     speed = np.linalg.norm(v, axis=1) + _LARGEST_ARM * np.linalg.norm(w, axis=1)
-    return float(speed.max())
+    return float(speed.max(initial=0.0))
 
 
 @nb.njit(cache=True, nogil=True)

@@ -16,8 +16,8 @@ from drake_dress.models.cloth.elements import FloatArray, IntArray
 # Farther than any garment is from anything, m.
 _FAR = 1e9
 # A point this close on its way has touched, m; a grazing one is given up after so many marches.
-_TOUCH = 1e-5
-_MOST_MARCHES = 64
+TOUCH = 1e-5
+MOST_MARCHES = 64
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -234,13 +234,13 @@ def first_touch(  # type: ignore[no-untyped-def]
     for i in range(x.shape[0]):
         way = np.sqrt(motion[i, 0] ** 2 + motion[i, 1] ** 2 + motion[i, 2] ** 2)
         gone = 0.0
-        for _ in range(_MOST_MARCHES):
+        for _ in range(MOST_MARCHES):
             share = gone / way if way > 0.0 else 0.0
             for c in range(3):
                 point[0, c] = x[i, c] + share * motion[i, c]
             nearest_obstacle(point, shapes, distance, who)
             gap = distance[0] - margin
-            if gap <= _TOUCH:
+            if gap <= TOUCH:
                 touched[i] = True
                 owner[i] = who[0]
                 break

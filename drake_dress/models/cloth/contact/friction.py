@@ -15,9 +15,13 @@ from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 
 # A node within this gap lies on the surface, m.
-_LYING = 1e-4
+LYING = 1e-4
 # Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
-_TOLERATED_EXCESS = 0.01
+TOLERATED_EXCESS = 0.01
+# Solves of the motion, at most, while modes are corrected by the forces that they led to; fewer
+# where solves are so coarse that their forces say little more the second time.
+_MOST_REVISIONS = 4
+_COARSE, _COARSE_REVISIONS = 1e-3, 2
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,11 @@ class Friction:
 _NONE, _NONE_3 = np.zeros(0), np.zeros((0, 3))
 _NO_MODE = np.zeros(0, dtype=np.int32)
 NO_CONTACT = Friction(_NO_MODE, _NO_MODE, _NONE, _NONE, _NONE_3, _NONE_3)
+
+
+def most_revisions(tolerance: float) -> int:
+    """Returns how often at most the motion is solved, by the relative tolerance of solves."""
+    return _COARSE_REVISIONS if tolerance > _COARSE else _MOST_REVISIONS
 
 
 def find_modes(
@@ -144,7 +153,7 @@ def _revise(  # type: ignore[no-untyped-def]
         for c in range(3):
             p += binding[i, c] * normal[i, c]
             along += binding[i, c] * direction[i, c]
-        if p < 0.0 and gap[i] > _LYING:
+        if p < 0.0 and gap[i] > LYING:
             mode[i] = FREE
             velocity_mode[i] = FREE
             changed = True
@@ -154,7 +163,7 @@ def _revise(  # type: ignore[no-untyped-def]
         if mode[i] == STICK and along > mu * p:
             over[i] = True
             excess += along - mu * p
-    if slide and excess > _TOLERATED_EXCESS * bound:
+    if slide and excess > TOLERATED_EXCESS * bound:
         for i in range(mode.shape[0]):
             if over[i]:
                 mode[i] = SLIP

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor import Factor, SymbolicFactor, restricted_solve
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK, dot, matrix_product
 from drake_dress.models.cloth.inner.interface import directions_of_exact
 from drake_dress.models.cloth.matrices import Csr
 
@@ -59,7 +59,7 @@ class OneStep:
     def __init__(
         self,
         p: sp.csc_matrix,
-        shares: dict[str, Csr],
+        shares: dict[str, sp.csc_matrix],
         held: IntArray,
         tolerance: float,
         max_iterations: int = 300,
@@ -69,7 +69,7 @@ class OneStep:
         masked = np.zeros(n, dtype=np.bool_)
         masked[held] = True
         self.matrix = Csr.of(p)
-        self.shares = shares
+        self.shares = {name: Csr.of(share) for name, share in shares.items()}
         self.held = held
         self.masked = masked
         self.symbolic = SymbolicFactor(p)
@@ -324,19 +324,19 @@ def _bind(  # type: ignore[no-untyped-def]
     project(residual, mode, normal)
     conditioned = np.empty((k, 3))
     _precondition(block, mode, normal, residual, conditioned)
-    floor = max(_dot(residual, conditioned), 1e-300)
+    floor = max(dot(residual, conditioned), 1e-300)
     for i in range(k):
         for c in range(3):
             residual[i, c] = lack[i, c] - moved[i, c]
     project(residual, mode, normal)
     _precondition(block, mode, normal, residual, conditioned)
-    rho = _dot(residual, conditioned)
+    rho = dot(residual, conditioned)
     direction = conditioned.copy()
     step = np.empty((k, 3))
     iterations = 0
     while iterations < most and rho > tolerance * tolerance * floor:
         restricted_solve(part, direction, step)
-        curvature = _dot(direction, step)
+        curvature = dot(direction, step)
         if curvature <= 0.0:
             break
         alpha = rho / curvature
@@ -349,7 +349,7 @@ def _bind(  # type: ignore[no-untyped-def]
             for c in range(3):
                 residual[i, c] -= alpha * step[i, c]
         _precondition(block, mode, normal, residual, conditioned)
-        new = _dot(residual, conditioned)
+        new = dot(residual, conditioned)
         beta = new / rho
         rho = new
         for i in range(k):
@@ -373,7 +373,7 @@ def _bind_oblique(  # type: ignore[no-untyped-def]
     _rows_of(residual, mode, normal, push, backward)
     conditioned = np.empty((k, 3))
     _precondition(block, mode, normal, residual, conditioned)
-    goal = tolerance * np.sqrt(max(_dot(residual, conditioned), 1e-300))
+    goal = tolerance * np.sqrt(max(dot(residual, conditioned), 1e-300))
     basis = np.empty((_RESTART + 1, k, 3))
     along = np.empty((_RESTART + 1, k, 3))
     motion = np.empty((_RESTART, k, 3))
@@ -388,7 +388,7 @@ def _bind_oblique(  # type: ignore[no-untyped-def]
                 residual[i, c] = lack[i, c] - moved[i, c]
         _rows_of(residual, mode, normal, push, backward)
         _precondition(block, mode, normal, residual, conditioned)
-        size = np.sqrt(max(_dot(residual, conditioned), 0.0))
+        size = np.sqrt(max(dot(residual, conditioned), 0.0))
         if size <= goal or iterations >= most:
             break
         for i in range(k):
@@ -407,13 +407,13 @@ def _bind_oblique(  # type: ignore[no-untyped-def]
             residual[:] = motion[j]
             _rows_of(residual, mode, normal, push, backward)
             for i in range(j + 1):
-                h = _dot(residual, along[i])
+                h = dot(residual, along[i])
                 hessenberg[i, j] = h
                 for q in range(k):
                     for c in range(3):
                         residual[q, c] -= h * basis[i, q, c]
             _precondition(block, mode, normal, residual, conditioned)
-            h = np.sqrt(max(_dot(residual, conditioned), 0.0))
+            h = np.sqrt(max(dot(residual, conditioned), 0.0))
             for i in range(j):
                 u, w = hessenberg[i, j], hessenberg[i + 1, j]
                 hessenberg[i, j] = cosine[i] * u + sine[i] * w
@@ -494,14 +494,6 @@ def _precondition(block, mode, normal, residual, out):  # type: ignore[no-untype
     indptr, indices, data = block
     matrix_product(indptr, indices, data, residual, out)
     project(out, mode, normal)
-
-
-@nb.njit(cache=True, nogil=True)
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    s = 0.0
-    for i in range(a.shape[0]):
-        s += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
-    return s
 
 
 @nb.njit(cache=True, nogil=True)
