@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
-from drake_dress.models.cloth.factor import Factor, solve_into
+from drake_dress.models.cloth.factor.masked import Factor, solve_into
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
 from drake_dress.models.cloth.matrices import Csr
 
@@ -76,7 +76,7 @@ class SystemMatrix:
         f = factor
         return _filtered_cg(
             (*self._operator, block, self._scale),
-            (f.column_start, f.column_end, f.row, f.value, f.inverse_diagonal, f.permutation),
+            (f.blocks, f.pattern.permutation),
             f.masked,
             self._inverse_diagonal,
             mode,
@@ -147,7 +147,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     operator, factor, masked, masked_scale, mode, normal, rhs, z, tolerance, max_iterations
 ):
     n = rhs.shape[0]
-    work = np.empty((n, 3))
+    work = np.empty((n, 4))
     direction = np.empty((n, 3))
     product = np.empty((n, 3))
     preconditioned = np.empty((n, 3))
@@ -192,19 +192,8 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _precondition(preconditioner, residual, out):  # type: ignore[no-untyped-def]
     factor, masked, masked_scale, mode, normal, work = preconditioner
-    column_start, column_end, row, value, inverse_diagonal, permutation = factor
-    solve_into(
-        column_start,
-        column_end,
-        row,
-        value,
-        inverse_diagonal,
-        permutation,
-        masked,
-        residual,
-        out,
-        work,
-    )
+    blocks, permutation = factor
+    solve_into(blocks, permutation, residual, out, work)
     for i in range(residual.shape[0]):
         if masked[i]:
             out[i, 0] = masked_scale[i] * residual[i, 0]

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
-from drake_dress.models.cloth.factor import Factor, SymbolicFactor
+from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import (
     FREE,
     HELD,

@@ -3,7 +3,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from drake_dress.models.cloth.factor import SymbolicFactor
+from drake_dress.models.cloth.factor.masked import SymbolicFactor, restricted_solve
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     bending_bound,
@@ -27,6 +27,24 @@ def test_masked_factor_solves_the_free_block(share: float) -> None:
     expected = spla.spsolve(sp.csc_matrix(p[free][:, free]), rhs[free])
     np.testing.assert_allclose(solution[free], expected, rtol=1e-9, atol=1e-9)
     assert np.all(solution[masked] == 0.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_part_of_a_factor_solves_between_its_nodes(share: float) -> None:
+    rng = np.random.default_rng(6)
+    _, e = sheet_elements(12, 15, 0.03)
+    material = Material()
+    p = sp.csc_matrix(sp.diags(lumped_mass(e, material)) + 1e-3 * stretch_matrix(e, material))
+    masked = rng.random(e.node_count) < share
+    factor = SymbolicFactor(p).factorize(masked)
+    free = np.flatnonzero(~masked).astype(np.int32)
+    nodes = rng.choice(free, size=len(free) // 4, replace=False)
+    force = rng.normal(size=(len(nodes), 3))
+    motion = np.empty_like(force)
+    restricted_solve(factor.part(nodes), force, motion)
+    rhs = np.zeros((e.node_count, 3))
+    rhs[nodes] = force
+    np.testing.assert_allclose(motion, factor.solve(rhs)[nodes], rtol=1e-9, atol=1e-12)
 
 
 def test_indefinite_matrix_is_refused() -> None:

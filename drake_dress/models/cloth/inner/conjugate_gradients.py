@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import FloatArray, IntArray
-from drake_dress.models.cloth.factor import Factor, SymbolicFactor
+from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved

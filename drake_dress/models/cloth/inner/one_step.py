@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
-from drake_dress.models.cloth.factor import Factor, SymbolicFactor, restricted_solve
+from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor, restricted_solve
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, dot, matrix_product
 from drake_dress.models.cloth.inner.interface import directions_of_exact
 from drake_dress.models.cloth.matrices import Csr

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import BoolArray, FloatArray
-from drake_dress.models.cloth.factor import Factor, SymbolicFactor
+from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact

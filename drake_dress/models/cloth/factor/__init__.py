@@ -1,0 +1,1 @@
+"""A sparse LDLᵀ factor of P that can leave nodes out."""

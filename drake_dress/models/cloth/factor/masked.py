@@ -1,0 +1,206 @@
+"""A sparse LDLᵀ factor of P that can leave nodes out.
+
+P's pattern never changes, the set of nodes with a prescribed motion does at every step. So order
+and blocks are found once (`symbolic`); a numeric factor then treats masked nodes as identity rows,
+which is the factor of P_ff with the order of all nodes kept.
+
+What contact asks of P⁻¹ is little: how the nodes in contact move under forces on those same nodes.
+The columns of L that this takes are the paths from these nodes to the root of the elimination tree
+(`part`): a fifth to a third of the factor for an arm in a sleeve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.factor.kernels import eliminate, factorize, substitute
+from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern, permuted_upper
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Numeric LDLᵀ of P with some nodes left out; made by `SymbolicFactor.factorize`."""
+
+    pattern: Pattern
+    blocks: tuple[Any, ...]
+    masked: BoolArray
+
+    def part(self, nodes: IntArray) -> tuple[Any, ...]:
+        """Returns what P_ff⁻¹ between `nodes` (k,) needs of L, for `restricted_solve`.
+
+        The blocks that the nodes reach in the elimination tree, numbered anew: they fit in the
+        first caches. The last array is scratch.
+        """
+        p = self.pattern
+        found: tuple[Any, ...] = _part(self.blocks, p.block_of, p.inverse_permutation, nodes)
+        return found
+
+    def solve_pair(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns P_ff⁻¹ of two (n,3) right-hand sides."""
+        return self.solve(first), self.solve(second)
+
+    def solve(self, rhs: FloatArray) -> FloatArray:
+        """Returns P_ff⁻¹ rhs_f for (n,3) `rhs`, with zeros in masked rows."""
+        out = np.empty_like(rhs)
+        solve_into(self.blocks, self.pattern.permutation, rhs, out, np.empty((len(rhs), 4)))
+        return out
+
+
+class SymbolicFactor:
+    """Order and blocks of a symmetric sparse matrix, and its numeric factors.
+
+    Args:
+        matrix: (n,n) symmetric positive definite, CSR or CSC.
+    """
+
+    def __init__(self, matrix: sp.csc_array) -> None:
+        p = self.pattern = find_pattern(matrix)
+        upper = permuted_upper(matrix, p.permutation)
+        self._upper = (
+            upper.indptr.astype(np.int32),
+            upper.indices.astype(np.int32),
+            upper.data.astype(np.float64),
+        )
+        self.node_count = matrix.shape[0]
+
+    @property
+    def fill(self) -> int:
+        """Values of a factor, zeros of blocks counted."""
+        return int(self.pattern.value_start[-1])
+
+    def factorize(self, masked: BoolArray) -> Factor:
+        """Returns the factor with the nodes where `masked` (n,) is True left out.
+
+        Raises:
+            ValueError: a pivot is not positive: the matrix is not positive definite.
+        """
+        p = self.pattern
+        blocks = (
+            p.first,
+            p.width,
+            p.row_start,
+            np.empty_like(p.first),
+            np.empty_like(p.row),
+            p.value_start,
+            np.empty(self.fill),
+            np.empty(self.node_count),
+        )
+        failed = factorize(blocks, p.reach_start, p.reach, *self._upper, masked[p.permutation])
+        if failed >= 0:
+            raise ValueError(f"pivot of node {int(p.permutation[failed])} is not positive")
+        return Factor(p, blocks, masked.copy())
+
+
+@nb.njit(cache=True, nogil=True)
+def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-def]
+    """Writes P_ff⁻¹ rhs_f (n,3) into `out`, zeros in masked rows; `work` (n,4) is scratch."""
+    n = rhs.shape[0]
+    for i in range(n):
+        p = permutation[i]
+        work[i, 0] = rhs[p, 0]
+        work[i, 1] = rhs[p, 1]
+        work[i, 2] = rhs[p, 2]
+        work[i, 3] = 0.0
+    eliminate(blocks, work)
+    substitute(blocks, work)
+    for i in range(n):
+        p = permutation[i]
+        out[p, 0] = work[i, 0]
+        out[p, 1] = work[i, 1]
+        out[p, 2] = work[i, 2]
+
+
+@nb.njit(cache=True, nogil=True)
+def restricted_solve(part, force, motion):  # type: ignore[no-untyped-def]
+    """Writes to `motion` (k,3) the rows of P_ff⁻¹ E `force` at the nodes where `force` (k,3) acts.
+
+    Args:
+        part: of `Factor.part`.
+        force: (k,3).
+        motion: (k,3), written.
+    """
+    blocks, places, work = part
+    work[:] = 0.0
+    for k in range(places.shape[0]):
+        i = places[k]
+        work[i, 0] = force[k, 0]
+        work[i, 1] = force[k, 1]
+        work[i, 2] = force[k, 2]
+    eliminate(blocks, work)
+    substitute(blocks, work)
+    for k in range(places.shape[0]):
+        i = places[k]
+        motion[k, 0] = work[i, 0]
+        motion[k, 1] = work[i, 1]
+        motion[k, 2] = work[i, 2]
+
+
+@nb.njit(cache=True, nogil=True)
+def _part(blocks, block_of, inverse_permutation, nodes):  # type: ignore[no-untyped-def]
+    first, width, row_start, row_end, row, value_start, value, inverse = blocks
+    marked = np.zeros(first.shape[0], dtype=np.bool_)
+    for k in range(nodes.shape[0]):
+        marked[block_of[inverse_permutation[nodes[k]]]] = True
+    count, columns, rows, values = 0, 0, 0, 0
+    for b in range(first.shape[0]):
+        if not marked[b]:
+            continue
+        for q in range(row_start[b], row_end[b]):
+            marked[block_of[row[q]]] = True
+        count += 1
+        columns += width[b]
+        rows += row_end[b] - row_start[b]
+        values += (width[b] * (width[b] - 1)) // 2 + width[b] * (row_end[b] - row_start[b])
+    local = np.empty(inverse.shape[0], dtype=np.int32)
+    part_first = np.empty(count, dtype=np.int32)
+    part_width = np.empty(count, dtype=np.int32)
+    part_row_start = np.zeros(count + 1, dtype=np.int32)
+    part_value_start = np.zeros(count + 1, dtype=np.int32)
+    part_row = np.empty(rows, dtype=np.int32)
+    part_value = np.empty(values)
+    part_inverse = np.empty(columns)
+    count, columns = 0, 0
+    for b in range(first.shape[0]):
+        if not marked[b]:
+            continue
+        part_first[count] = columns
+        part_width[count] = width[b]
+        for i in range(first[b], first[b] + width[b]):
+            local[i] = columns
+            part_inverse[columns] = inverse[i]
+            columns += 1
+        count += 1
+    rows, values, count = 0, 0, 0
+    for b in range(first.shape[0]):
+        if not marked[b]:
+            continue
+        for q in range(row_start[b], row_end[b]):
+            part_row[rows] = local[row[q]]
+            rows += 1
+        size = (width[b] * (width[b] - 1)) // 2 + width[b] * (row_end[b] - row_start[b])
+        for q in range(value_start[b], value_start[b] + size):
+            part_value[values] = value[q]
+            values += 1
+        count += 1
+        part_row_start[count] = rows
+        part_value_start[count] = values
+    places = np.empty(nodes.shape[0], dtype=np.int32)
+    for k in range(nodes.shape[0]):
+        places[k] = local[inverse_permutation[nodes[k]]]
+    found = (
+        part_first,
+        part_width,
+        part_row_start,
+        part_row_start[1:],
+        part_row,
+        part_value_start,
+        part_value,
+        part_inverse,
+    )
+    return found, places, np.empty((columns, 4))
