@@ -76,18 +76,16 @@ def run_adjoint(
         motion_in += cloth.layers.rate_vjp(t.separation, np.where(pushed, v_bar / h, 0.0))
         v_bar = np.where(pushed, 0.0, v_bar)
 
-    # reaction of the held nodes: (2/h²) (A Δx − g), or k (Δp − 2 Δx) of springs
+    # reaction of the held nodes: (2/h²) (A Δx − g) seeds what is prescribed there, or k (Δp − 2 Δx)
+    # of springs
     spring = cloth.spring
-    full_seed = np.zeros_like(x_bar)
-    seeded = spring is None and bool(np.any(held_reaction_bar))
-    if seeded:
-        full_seed[held] = (2.0 / h**2) * held_reaction_bar
-        motion_in = motion_in + system.product(full_seed)
-    elif spring is not None:
+    nothing = seed = np.zeros((0, 3))
+    if spring is None:
+        nothing, seed = np.zeros((len(held), 3)), (-2.0 / h**2) * held_reaction_bar
+    else:
         motion_in = motion_in.copy()
         motion_in[held] -= 2.0 * spring * held_reaction_bar
-    nothing = np.zeros((0 if spring is not None else len(held), 3))
-    back_motion, back_change = system.start((motion_in, nothing), (v_bar, nothing))
+    back_motion, back_change = system.start((motion_in, seed), (v_bar, nothing))
     back_stick = system.blank()
 
     prescribed_in = normal_in = np.zeros((0, 3))
@@ -128,9 +126,6 @@ def run_adjoint(
     else:
         held_in = spring * (held_reaction_bar + 0.5 * h * h * g_in[held] + h * rate_in[held])
         v_in[held] -= (0.5 * h * h * spring) * rate_in[held]
-    if seeded:
-        g_in = g_in - full_seed
-        v_in -= (h * mass) * full_seed
     force_in = (0.5 * h * h) * g_in + h * rate_in
     if touching:
         v_in[nodes] -= target_in
@@ -150,16 +145,12 @@ def run_adjoint(
         for sign, forward, backward in solves:
             for w, z in system.pairs(forward, backward):
                 x_in -= sign * cloth.inner.derivative(t.x, w, z)
-        if seeded:
-            x_in += cloth.inner.derivative(t.x, full_seed, t.motion)
     material: dict[str, float] = {}
     if by_material:
         material = _material_derivative(cloth, t, g_in, rate_in, force_in)
         for name in material:
             for sign, forward, backward in solves:
                 material[name] += sign * system.by_parameter(name, forward, backward)
-            if seeded:
-                material[name] += float(np.sum(full_seed * system.share(name, t.motion)))
         material["friction"] = friction_in
         material["margin"] = float(np.sum(prescribed_in * normal)) if touching else 0.0
     origin, rotation, velocity, angular_velocity = bodies

@@ -22,6 +22,9 @@ from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.kernels import eliminate, factorize, substitute
 from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern, permuted_upper
 
+# A part is made for fewer nodes than all by this.
+_MANY = 3
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -35,9 +38,12 @@ class Factor:
         """Returns what P_ff⁻¹ between `nodes` (k,) needs of L, for `restricted_solve`.
 
         The blocks that the nodes reach in the elimination tree, numbered anew: they fit in the
-        first caches. The last array is scratch.
+        first caches. For a third of all nodes it is the factor itself. The last array is scratch.
         """
         p = self.pattern
+        if _MANY * len(nodes) > len(self.masked):
+            places = p.inverse_permutation[nodes]
+            return self.blocks, places, np.empty((len(self.masked), 4))
         found: tuple[Any, ...] = _part(self.blocks, p.block_of, p.inverse_permutation, nodes)
         return found
 

@@ -1,0 +1,361 @@
+"""The forces that bind nodes in contact: S λ = lack on the rows that their modes bind.
+
+S = E P⁻¹ Eᵀ gives the motion of the nodes under forces on them. A sticking node has three unknowns,
+a slipping one the size ν of its normal force: its force is ν times `along`, its row the motion
+along `across`. Forward `along` is n + μ d and `across` is n, backward it is the other way round;
+where they are the same the system is symmetric.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+
+from drake_dress.models.cloth.elements import IntArray
+from drake_dress.models.cloth.factor.masked import Factor, restricted_solve, solve_into
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
+from drake_dress.models.cloth.matrices import Csr
+
+# Vectors that GMRES keeps before it starts anew.
+_RESTART = 60
+_SUMS = {"reassoc", "contract"}
+# Whether all of P is looked at, P or its block between the nodes, the nodes, a factor and scratch.
+Conditioner = tuple[Any, ...]
+
+
+def by_neighbours(matrix: Csr, factor: Factor, nodes: IntArray) -> Conditioner:
+    """Returns the preconditioner P_cc: what moves nodes (c,) while all others stay.
+
+    Args:
+        matrix: P.
+        factor: any; it is not looked at.
+        nodes: (c,).
+    """
+    block = _block(matrix.indptr, matrix.indices, matrix.data, nodes)
+    scratch = np.empty((0, 3))
+    order = factor.pattern.permutation
+    return False, block, nodes, factor.blocks, order, scratch, scratch, np.empty((0, 4))
+
+
+def by_all(matrix: Csr, factor: Factor, nodes: IntArray) -> Conditioner:
+    """Returns the preconditioner P_cc − P_cf P_ff⁻¹ P_fc: what moves nodes while others follow.
+
+    The inverse of S, were all directions of the nodes bound; where the normals are all alike the
+    solver needs one iteration.
+
+    Args:
+        matrix: P.
+        factor: with `nodes` and all that stay left out.
+        nodes: (c,).
+    """
+    n = len(matrix.indptr) - 1
+    whole = matrix.indptr, matrix.indices, matrix.data
+    order = factor.pattern.permutation
+    scratch = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4))
+    return True, whole, nodes, factor.blocks, order, *scratch
+
+
+@nb.njit(cache=True, nogil=True)
+def bind(  # type: ignore[no-untyped-def]
+    part, conditioner, mode, normal, push, backward, lack, guess, tolerance, most
+):
+    """Returns force (c,3), motion S λ (c,3), ν (c,) of slipping nodes, and iterations done.
+
+    Args:
+        part: of the factor, for the nodes.
+        conditioner: of `by_neighbours` or `by_all`.
+        mode: (c,) STICK takes all of `lack`, SLIP one row, others none.
+        normal: (c,3) unit.
+        push: (c,3) friction of slipping nodes per normal force, or (0,3) for none.
+        backward: solve the transposed system.
+        lack: (c,3) the motion that is asked for.
+        guess: (c,3) forces to start from, without friction, or (0,3).
+        tolerance: relative, of what is lacking, in the preconditioner's norm.
+        most: iterations.
+    """
+    c = mode.shape[0]
+    oblique = False
+    for i in range(push.shape[0]):
+        oblique = oblique or push[i, 0] != 0.0 or push[i, 1] != 0.0 or push[i, 2] != 0.0
+    if not oblique:
+        along, across = normal, normal
+    elif backward:
+        along, across = normal, normal + push
+    else:
+        along, across = normal + push, normal
+    size = 0
+    for i in range(c):
+        size += 3 if mode[i] == STICK else 1 if mode[i] == SLIP else 0
+    unknown = np.zeros(size)
+    moved = np.zeros((c, 3))
+    if guess.shape[0]:
+        force = np.empty((c, 3))
+        _reduce(guess, mode, normal, unknown)
+        _expand(unknown, mode, along, force)
+        restricted_solve(part, force, moved)
+    system = part, conditioner, mode, normal, along, across
+    started = guess.shape[0] > 0
+    if oblique:
+        iterations = _generalised_residuals(system, lack, unknown, moved, started, tolerance, most)
+    else:
+        iterations = _conjugate_gradients(system, lack, unknown, moved, started, tolerance, most)
+    force = np.empty((c, 3))
+    _expand(unknown, mode, along, force)
+    multiplier = np.zeros(c)
+    at = 0
+    for i in range(c):
+        if mode[i] == STICK:
+            for k in range(3):
+                multiplier[i] += force[i, k] * normal[i, k]
+            at += 3
+        elif mode[i] == SLIP:
+            multiplier[i] = unknown[at]
+            at += 1
+    return force, moved, multiplier, iterations
+
+
+@nb.njit(cache=True, nogil=True)
+def _conjugate_gradients(  # type: ignore[no-untyped-def]
+    system, lack, unknown, moved, started, tolerance, most
+):
+    """Improves `unknown` and its motion in place; returns the iterations."""
+    part, conditioner, mode, normal, along, across = system
+    residual = np.empty_like(unknown)
+    conditioned = np.empty_like(unknown)
+    rows = np.empty_like(unknown)
+    force = np.empty_like(moved)
+    step = np.empty_like(moved)
+    _reduce(lack, mode, across, residual)
+    _condition(conditioner, mode, normal, residual, conditioned, force, step)
+    rho = _dot(residual, conditioned)
+    goal = tolerance * tolerance * max(rho, 1e-300)
+    if started:
+        _reduce(moved, mode, across, rows)
+        _add(residual, -1.0, rows)
+        _condition(conditioner, mode, normal, residual, conditioned, force, step)
+        rho = _dot(residual, conditioned)
+    direction = conditioned.copy()
+    iterations = 0
+    while iterations < most and rho > goal:
+        _expand(direction, mode, along, force)
+        restricted_solve(part, force, step)
+        _reduce(step, mode, across, rows)
+        curvature = _dot(direction, rows)
+        if curvature <= 0.0:
+            break
+        alpha = rho / curvature
+        _add(unknown, alpha, direction)
+        _add(moved.reshape(-1), alpha, step.reshape(-1))
+        _add(residual, -alpha, rows)
+        _condition(conditioner, mode, normal, residual, conditioned, force, step)
+        new = _dot(residual, conditioned)
+        beta = new / rho
+        rho = new
+        for i in range(direction.shape[0]):
+            direction[i] = conditioned[i] + beta * direction[i]
+        iterations += 1
+    return iterations
+
+
+@nb.njit(cache=True, nogil=True)
+def _generalised_residuals(  # type: ignore[no-untyped-def]
+    system, lack, unknown, moved, started, tolerance, most
+):
+    """The same for along ≠ across: GMRES (Saad and Schultz 1986).
+
+    Preconditioned from the right, in the inner product of the preconditioner, so that the residual
+    is measured as by conjugate gradients. Vectors are as short as there are nodes in contact: all
+    are kept.
+    """
+    part, conditioner, mode, normal, along, across = system
+    size = unknown.shape[0]
+    wanted = np.empty(size)
+    residual = np.empty(size)
+    conditioned = np.empty(size)
+    force = np.empty_like(moved)
+    scratch = np.empty_like(moved)
+    _reduce(lack, mode, across, wanted)
+    _condition(conditioner, mode, normal, wanted, conditioned, force, scratch)
+    length = np.sqrt(max(_dot(wanted, conditioned), 0.0))
+    goal = tolerance * max(length, 1e-150)
+    basis = np.empty((_RESTART + 1, size))
+    ahead = np.empty((_RESTART + 1, size))
+    motion = np.empty((_RESTART, moved.shape[0], 3))
+    hessenberg = np.zeros((_RESTART + 1, _RESTART))
+    cosine, sine = np.empty(_RESTART), np.empty(_RESTART)
+    right = np.empty(_RESTART + 1)
+    iterations = 0
+    residual[:] = wanted
+    while iterations < most:
+        if started or iterations:
+            _reduce(moved, mode, across, residual)
+            for i in range(size):
+                residual[i] = wanted[i] - residual[i]
+            _condition(conditioner, mode, normal, residual, conditioned, force, scratch)
+            length = np.sqrt(max(_dot(residual, conditioned), 0.0))
+        if length <= goal:
+            break
+        for i in range(size):
+            basis[0, i] = residual[i] / length
+            ahead[0, i] = conditioned[i] / length
+        right[0] = length
+        count = 0
+        while count < _RESTART and iterations < most and abs(right[count]) > goal:
+            j = count
+            _expand(ahead[j], mode, along, force)
+            restricted_solve(part, force, motion[j])
+            _reduce(motion[j], mode, across, residual)
+            for i in range(j + 1):
+                h = _dot(residual, ahead[i])
+                hessenberg[i, j] = h
+                _add(residual, -h, basis[i])
+            _condition(conditioner, mode, normal, residual, conditioned, force, scratch)
+            h = np.sqrt(max(_dot(residual, conditioned), 0.0))
+            for i in range(j):
+                u, w = hessenberg[i, j], hessenberg[i + 1, j]
+                hessenberg[i, j] = cosine[i] * u + sine[i] * w
+                hessenberg[i + 1, j] = cosine[i] * w - sine[i] * u
+            u = hessenberg[j, j]
+            length = np.sqrt(u * u + h * h)
+            iterations += 1
+            if length == 0.0:
+                break
+            cosine[j], sine[j] = u / length, h / length
+            hessenberg[j, j] = length
+            right[j + 1] = -sine[j] * right[j]
+            right[j] = cosine[j] * right[j]
+            count += 1
+            if h <= 1e-14 * length:
+                break
+            for i in range(size):
+                basis[j + 1, i] = residual[i] / h
+                ahead[j + 1, i] = conditioned[i] / h
+        if count == 0:
+            break
+        for i in range(count - 1, -1, -1):
+            for j in range(i + 1, count):
+                right[i] -= hessenberg[i, j] * right[j]
+            right[i] /= hessenberg[i, i]
+        for j in range(count):
+            _add(unknown, right[j], ahead[j])
+            _add(moved.reshape(-1), right[j], motion[j].reshape(-1))
+        if abs(right[count]) <= goal:
+            break
+    return iterations
+
+
+@nb.njit(cache=True, nogil=True)
+def _condition(conditioner, mode, normal, residual, out, z, force):  # type: ignore[no-untyped-def]
+    """Writes the forces that nearly take the motions `residual`; `z`, `force` (c,3) are scratch."""
+    around, (indptr, indices, data), nodes, blocks, permutation, moved, others, work = conditioner
+    _expand(residual, mode, normal, z)
+    if not around:
+        matrix_product(indptr, indices, data, z, force)
+    else:
+        others[:] = 0.0
+        for k in range(nodes.shape[0]):
+            i = nodes[k]
+            for q in range(indptr[i], indptr[i + 1]):
+                for c in range(3):
+                    others[indices[q], c] -= data[q] * z[k, c]
+        solve_into(blocks, permutation, others, moved, work)
+        for k in range(nodes.shape[0]):
+            for c in range(3):
+                moved[nodes[k], c] = z[k, c]
+        for k in range(nodes.shape[0]):
+            i = nodes[k]
+            f0, f1, f2 = 0.0, 0.0, 0.0
+            for q in range(indptr[i], indptr[i + 1]):
+                j = indices[q]
+                f0 += data[q] * moved[j, 0]
+                f1 += data[q] * moved[j, 1]
+                f2 += data[q] * moved[j, 2]
+            force[k, 0] = f0
+            force[k, 1] = f1
+            force[k, 2] = f2
+    _reduce(force, mode, normal, out)
+
+
+@nb.njit(cache=True, nogil=True)
+def _expand(unknown, mode, direction, out):  # type: ignore[no-untyped-def]
+    """Writes vectors (c,3): three values of sticking nodes, `direction` times others'."""
+    at = 0
+    for i in range(mode.shape[0]):
+        if mode[i] == SLIP:
+            size = unknown[at]
+            out[i, 0] = size * direction[i, 0]
+            out[i, 1] = size * direction[i, 1]
+            out[i, 2] = size * direction[i, 2]
+            at += 1
+        elif mode[i] == STICK:
+            out[i, 0] = unknown[at]
+            out[i, 1] = unknown[at + 1]
+            out[i, 2] = unknown[at + 2]
+            at += 3
+        else:
+            out[i, 0] = 0.0
+            out[i, 1] = 0.0
+            out[i, 2] = 0.0
+
+
+@nb.njit(cache=True, nogil=True)
+def _reduce(z, mode, direction, out):  # type: ignore[no-untyped-def]
+    """Writes the rows of (c,3): all three of sticking nodes, along `direction` of others."""
+    at = 0
+    for i in range(mode.shape[0]):
+        if mode[i] == SLIP:
+            out[at] = (
+                z[i, 0] * direction[i, 0] + z[i, 1] * direction[i, 1] + z[i, 2] * direction[i, 2]
+            )
+            at += 1
+        elif mode[i] == STICK:
+            out[at] = z[i, 0]
+            out[at + 1] = z[i, 1]
+            out[at + 2] = z[i, 2]
+            at += 3
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def _add(a, scale, b):  # type: ignore[no-untyped-def]
+    """Adds `scale` times `b` to `a`, in place."""
+    for i in range(a.shape[0]):
+        a[i] += scale * b[i]
+
+
+@nb.njit(cache=True, nogil=True)
+def _block(indptr, indices, data, nodes):  # type: ignore[no-untyped-def]
+    """Returns the block of a CSR matrix between `nodes` (c,), as CSR."""
+    k = nodes.shape[0]
+    local = np.full(indptr.shape[0] - 1, -1, dtype=np.int32)
+    for a in range(k):
+        local[nodes[a]] = a
+    start = np.zeros(k + 1, dtype=np.int32)
+    for a in range(k):
+        i = nodes[a]
+        for q in range(indptr[i], indptr[i + 1]):
+            if local[indices[q]] >= 0:
+                start[a + 1] += 1
+    for a in range(k):
+        start[a + 1] += start[a]
+    column = np.empty(start[k], dtype=np.int32)
+    value = np.empty(start[k])
+    at = 0
+    for a in range(k):
+        i = nodes[a]
+        for q in range(indptr[i], indptr[i + 1]):
+            b = local[indices[q]]
+            if b >= 0:
+                column[at] = b
+                value[at] = data[q]
+                at += 1
+    return start, column, value
