@@ -212,9 +212,19 @@ def _chosen(near: Contacts, chosen: BoolArray) -> Contacts:
 
 def fastest(obstacles: Obstacles) -> float:
     """Returns a bound on the speed of surfaces near the garment, m/s."""
-    v, w = obstacles.twists()
-    speed = np.linalg.norm(v, axis=1) + _LARGEST_ARM * np.linalg.norm(w, axis=1)
-    return float(speed.max(initial=0.0))
+    return float(_fastest(*obstacles.twists()))
+
+
+@nb.njit(cache=True, nogil=True)
+def _fastest(velocity, angular_velocity):  # type: ignore[no-untyped-def]
+    most = 0.0
+    for i in range(velocity.shape[0]):
+        v, w = 0.0, 0.0
+        for c in range(3):
+            v += velocity[i, c] ** 2
+            w += angular_velocity[i, c] ** 2
+        most = max(most, np.sqrt(v) + _LARGEST_ARM * np.sqrt(w))
+    return most
 
 
 @nb.njit(cache=True, nogil=True)

@@ -7,9 +7,9 @@ own triangle it has one list of rows for all its columns, and their values row b
     row[row_start[b]:row_end[b]]   rows below the block, ascending
     value[value_start[b] ...]      the triangle by columns, then `width` values for each row
 
-Where one column of a block lacks a row it has a zero. Right-hand sides are four wide, so that a row
-is a vector of the processor: three coordinates and nothing, or, in the factorisation, four rows of
-P.
+Where one column of a block lacks a row it has a zero. Right-hand sides are four or eight wide, so
+that a row is a vector of the processor: three coordinates and nothing, twice that, or, in the
+factorisation, four rows of P.
 """
 
 from __future__ import annotations
@@ -17,120 +17,100 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from drake_dress.models.cloth.factor.lanes import FOUR, less, load, store, times
 from drake_dress.models.vectorised import vectorised
 
 _INDICES, _VALUES, _LANES = nb.int32[::1], nb.float64[::1], nb.float64[:, ::1]
 # first, width, row_start, row_end, row, value_start, value, inverse_diagonal
 BLOCKS = nb.types.Tuple((_INDICES,) * 6 + (_VALUES,) * 2)
-_NOTHING = (0.0, 0.0, 0.0, 0.0)
-
-
-@nb.njit(nogil=True, cache=True)
-def _load(work, i):  # type: ignore[no-untyped-def]
-    return work[i, 0], work[i, 1], work[i, 2], work[i, 3]
-
-
-@nb.njit(nogil=True, cache=True)
-def _store(work, i, a):  # type: ignore[no-untyped-def]
-    work[i, 0], work[i, 1], work[i, 2], work[i, 3] = a
+_WIDTHS = [nb.void(BLOCKS, _LANES, nb.types.UniTuple(nb.float64, w)) for w in (4, 8)]
 
 
 @nb.njit(inline="always", fastmath={"contract"})
-def _times(s, a):  # type: ignore[no-untyped-def]
-    return s * a[0], s * a[1], s * a[2], s * a[3]
-
-
-@nb.njit(inline="always", fastmath={"contract"})
-def _less(a, s, b):  # type: ignore[no-untyped-def]
-    """Returns a − s b."""
-    return a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2], a[3] - s * b[3]
-
-
-@nb.njit(inline="always", fastmath={"contract"})
-def _eliminate_block(blocks, b, end, work):  # type: ignore[no-untyped-def]
-    """Eliminates the columns of block `b` from `work` (n,4), in its rows before `end`."""
+def _eliminate_block(blocks, b, end, work, like):  # type: ignore[no-untyped-def]
+    """Eliminates the columns of block `b` from `work` (n,w), in its rows before `end`."""
     first, width, row_start, _, row, value_start, value, _ = blocks
     i = first[b]
     p = value_start[b]
-    w = _load(work, i)
+    w = load(work, i, like)
     if width[b] == 1:
         for q in range(row_start[b], end):
             r = row[q]
-            _store(work, r, _less(_load(work, r), value[p], w))
+            store(work, r, less(load(work, r, like), value[p], w))
             p += 1
         return
-    x = _less(_load(work, i + 1), value[p], w)
-    _store(work, i + 1, x)
+    x = less(load(work, i + 1, like), value[p], w)
+    store(work, i + 1, x)
     if width[b] == 2:
         p += 1
         for q in range(row_start[b], end):
             r = row[q]
-            a = _less(_load(work, r), value[p], w)
-            _store(work, r, _less(a, value[p + 1], x))
+            a = less(load(work, r, like), value[p], w)
+            store(work, r, less(a, value[p + 1], x))
             p += 2
         return
-    y = _less(_less(_load(work, i + 2), value[p + 1], w), value[p + 3], x)
-    z = _less(_less(_load(work, i + 3), value[p + 2], w), value[p + 4], x)
-    z = _less(z, value[p + 5], y)
-    _store(work, i + 2, y)
-    _store(work, i + 3, z)
+    y = less(less(load(work, i + 2, like), value[p + 1], w), value[p + 3], x)
+    z = less(less(load(work, i + 3, like), value[p + 2], w), value[p + 4], x)
+    z = less(z, value[p + 5], y)
+    store(work, i + 2, y)
+    store(work, i + 3, z)
     p += 6
     for q in range(row_start[b], end):
         r = row[q]
-        a = _less(_less(_load(work, r), value[p], w), value[p + 1], x)
-        _store(work, r, _less(_less(a, value[p + 2], y), value[p + 3], z))
+        a = less(less(load(work, r, like), value[p], w), value[p + 1], x)
+        store(work, r, less(less(a, value[p + 2], y), value[p + 3], z))
         p += 4
 
 
-@vectorised(nb.void(BLOCKS, _LANES))
-def eliminate(blocks, work):  # type: ignore[no-untyped-def]
-    """Overwrites `work` (n,4) by L⁻¹ `work`."""
+@vectorised(_WIDTHS)
+def eliminate(blocks, work, like):  # type: ignore[no-untyped-def]
+    """Overwrites `work` (n,w) by L⁻¹ `work`, `like` a tuple of w."""
     row_end = blocks[3]
     for b in range(row_end.shape[0]):
-        _eliminate_block(blocks, b, row_end[b], work)
+        _eliminate_block(blocks, b, row_end[b], work, like)
 
 
-@vectorised(nb.void(BLOCKS, _LANES))
-def substitute(blocks, work):  # type: ignore[no-untyped-def]
-    """Overwrites `work` (n,4) by L⁻ᵀ D⁻¹ `work`."""
+@vectorised(_WIDTHS)
+def substitute(blocks, work, like):  # type: ignore[no-untyped-def]
+    """Overwrites `work` (n,w) by L⁻ᵀ D⁻¹ `work`, `like` a tuple of w."""
     first, width, row_start, row_end, row, value_start, value, inverse = blocks
     for b in range(first.shape[0] - 1, -1, -1):
         i = first[b]
         begin = value_start[b]
-        w = _times(inverse[i], _load(work, i))
+        w = times(inverse[i], load(work, i, like))
         if width[b] == 1:
             p = begin
             for q in range(row_start[b], row_end[b]):
-                w = _less(w, value[p], _load(work, row[q]))
+                w = less(w, value[p], load(work, row[q], like))
                 p += 1
-            _store(work, i, w)
+            store(work, i, w)
             continue
-        x = _times(inverse[i + 1], _load(work, i + 1))
+        x = times(inverse[i + 1], load(work, i + 1, like))
         if width[b] == 2:
             p = begin + 1
             for q in range(row_start[b], row_end[b]):
-                a = _load(work, row[q])
-                w = _less(w, value[p], a)
-                x = _less(x, value[p + 1], a)
+                a = load(work, row[q], like)
+                w = less(w, value[p], a)
+                x = less(x, value[p + 1], a)
                 p += 2
         else:
-            y = _times(inverse[i + 2], _load(work, i + 2))
-            z = _times(inverse[i + 3], _load(work, i + 3))
+            y = times(inverse[i + 2], load(work, i + 2, like))
+            z = times(inverse[i + 3], load(work, i + 3, like))
             p = begin + 6
             for q in range(row_start[b], row_end[b]):
-                a = _load(work, row[q])
-                w = _less(w, value[p], a)
-                x = _less(x, value[p + 1], a)
-                y = _less(y, value[p + 2], a)
-                z = _less(z, value[p + 3], a)
+                a = load(work, row[q], like)
+                w = less(w, value[p], a)
+                x = less(x, value[p + 1], a)
+                y = less(y, value[p + 2], a)
+                z = less(z, value[p + 3], a)
                 p += 4
-            y = _less(y, value[begin + 5], z)
-            x = _less(_less(x, value[begin + 3], y), value[begin + 4], z)
-            w = _less(_less(w, value[begin + 1], y), value[begin + 2], z)
-            _store(work, i + 2, y)
-            _store(work, i + 3, z)
-        _store(work, i, _less(w, value[begin], x))
-        _store(work, i + 1, x)
+            y = less(y, value[begin + 5], z)
+            x = less(less(x, value[begin + 3], y), value[begin + 4], z)
+            w = less(less(w, value[begin + 1], y), value[begin + 2], z)
+            store(work, i + 2, y)
+            store(work, i + 3, z)
+        store(work, i, less(w, value[begin], x))
+        store(work, i + 1, x)
 
 
 @vectorised(nb.int32(BLOCKS, _INDICES, _INDICES, _INDICES, _INDICES, _VALUES, nb.boolean[::1]))
@@ -163,7 +143,7 @@ def factorize(  # type: ignore[no-untyped-def]
     for b in range(count):
         k = first[b]
         for c in range(4):
-            _store(own, c, _NOTHING)
+            store(own, c, FOUR)
         for c in range(width[b]):
             if masked[k + c]:
                 continue
@@ -180,17 +160,17 @@ def factorize(  # type: ignore[no-untyped-def]
             i = first[a]
             empty = True
             for j in range(i, i + width[a]):
-                empty = empty and _load(y, j) == _NOTHING
+                empty = empty and load(y, j, FOUR) == FOUR
             if empty:
                 continue
-            _eliminate_block(blocks, a, row_end[a], y)
+            _eliminate_block(blocks, a, row_end[a], y, FOUR)
             for j in range(width[a]):
-                w = _load(y, i + j)
-                _store(y, i + j, _NOTHING)
-                ell = _times(inverse[i + j], w)
-                _store(scaled, j, ell)
+                w = load(y, i + j, FOUR)
+                store(y, i + j, FOUR)
+                ell = times(inverse[i + j], w)
+                store(scaled, j, ell)
                 for c in range(4):
-                    _store(own, c, _less(_load(own, c), w[c], ell))
+                    store(own, c, less(load(own, c, FOUR), w[c], ell))
             p = value_start[a] + (width[a] * (width[a] - 1)) // 2
             p += width[a] * (row_end[a] - row_start[a])
             for c in range(width[b]):
