@@ -231,7 +231,7 @@ class ExplicitBiasCloth:
             impulse[self.held] += self.spring * (h * held_motion - 0.5 * h * h * v[self.held])
         fixed = slice(None) if self.spring is None else slice(0)
         motion_unknown, change_unknown = system.start(
-            (g, held_motion[fixed]), (impulse, (held_motion / h - v[self.held])[fixed])
+            (g, held_motion[fixed]), (impulse, (held_motion / h - v[self.held])[fixed]), h * v
         )
         free = motion_unknown.free
         if not np.isfinite(free).all():

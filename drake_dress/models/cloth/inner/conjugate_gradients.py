@@ -64,8 +64,8 @@ class ConjugateGradientSystem(FilteredSystem):
         masked[nodes] = True
         self._factor = self._scheme.symbolic.factorize(masked)
 
-    def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
-        z = np.zeros_like(rhs)
+    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Solved:
+        z = np.zeros_like(rhs) if guess is None else guess.copy()
         z[self._scheme.held] = held
         modes = np.where(self._scheme.masked, HELD, 0).astype(np.int32)
         self._solve(self._scheme.held_factor, modes, z, rhs, z)

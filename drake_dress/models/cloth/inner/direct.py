@@ -41,7 +41,7 @@ class DirectSystem(FilteredSystem):
         self._matrix = scheme.matrix.assemble(block)
         self._factors: dict[tuple[bytes, bytes, bytes], tuple[sp.csc_matrix, spla.SuperLU]] = {}
 
-    def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
+    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Solved:
         fixed = np.zeros_like(rhs)
         fixed[self._scheme.held] = held
         none = np.zeros(0, dtype=np.int32)

@@ -34,12 +34,14 @@ class StepSystem(Protocol):
         self,
         motion: tuple[FloatArray, FloatArray],
         change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
     ) -> tuple[Unknown, Unknown]:
         """Returns both unknowns without contact.
 
         Args:
             motion: right-hand side (n,3) and values at the held nodes (k,3) of Δx.
             change: those of Δv.
+            guess: (n,3) of Δx, for schemes that improve one until it is good enough.
         """
 
     def touch(self, nodes: IntArray) -> None:

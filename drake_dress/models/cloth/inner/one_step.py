@@ -99,9 +99,12 @@ class OneStepSystem:
         self.iterations = 0
 
     def start(
-        self, motion: tuple[FloatArray, FloatArray], change: tuple[FloatArray, FloatArray]
+        self,
+        motion: tuple[FloatArray, FloatArray],
+        change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
     ) -> tuple[ForcedUnknown, ForcedUnknown]:
-        """See `StepSystem`."""
+        """See `StepSystem`; there is nothing to guess."""
         s, m = self._scheme, self._scheme.matrix
         rhs = []
         for right, held in (motion, change):

@@ -70,10 +70,13 @@ class FilteredSystem(ABC):
         self._nodes = np.zeros(0, dtype=np.int32)
 
     def start(
-        self, motion: tuple[FloatArray, FloatArray], change: tuple[FloatArray, FloatArray]
+        self,
+        motion: tuple[FloatArray, FloatArray],
+        change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
     ) -> tuple[Any, Any]:
         """See `StepSystem`."""
-        return self._free(*motion), self._free(*change)
+        return self._free(*motion, guess), self._free(*change, None)
 
     def touch(self, nodes: IntArray) -> None:
         """See `StepSystem`."""
@@ -174,8 +177,8 @@ class FilteredSystem(ABC):
         return Solved(rhs, held, free, z)
 
     @abstractmethod
-    def _free(self, rhs: FloatArray, held: FloatArray) -> Any:
-        """Returns an unknown, solved without contact."""
+    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Any:
+        """Returns an unknown, solved without contact; `guess` (n,3) may be a start."""
 
     @abstractmethod
     def _bind(

@@ -106,7 +106,7 @@ class StationarySystem(FilteredSystem):
     ) -> Iterates:
         return Iterates(rhs, held, free, z)
 
-    def _free(self, rhs: FloatArray, held: FloatArray) -> Iterates:
+    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Iterates:
         start = np.zeros_like(rhs)
         start[self._held] = held
         unknown = Iterates(rhs, held, rhs, rhs)
