@@ -73,11 +73,13 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
         faces: (F,3) node indices, consistently oriented, manifold.
 
     Raises:
-        ValueError: a triangle has no area.
+        ValueError: a triangle has no area, a node of one is not there or not finite, a triangle is
+            inverted, or an edge has more than two.
     """
     x = np.ascontiguousarray(rest_position, dtype=np.float64)
     triangle = np.ascontiguousarray(faces, dtype=np.int32)
     n = len(x)
+    _check(x, triangle)
     e1 = x[triangle[:, 1]] - x[triangle[:, 0]]
     e2 = x[triangle[:, 2]] - x[triangle[:, 0]]
     normal = np.cross(e1, e2)
@@ -135,6 +137,35 @@ def in_lanes(rows: npt.NDArray) -> npt.NDArray:
     padded = np.zeros((tiles * LANES, columns), dtype=rows.dtype)
     padded[:count] = rows
     return np.ascontiguousarray(padded.reshape(tiles, LANES, columns).transpose(0, 2, 1))
+
+
+def _check(x: FloatArray, triangle: IntArray) -> None:
+    """Raises an error that names what is wrong with a mesh."""
+    n = len(x)
+    if triangle.size and not 0 <= triangle.min() <= triangle.max() < n:
+        wrong = int(np.flatnonzero(((triangle < 0) | (triangle >= n)).any(axis=1))[0])
+        raise ValueError(
+            f"triangle {wrong} has nodes {triangle[wrong].tolist()}, expected 0 to {n - 1}"
+        )
+    bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
+    if len(bad):
+        raise ValueError(f"node {int(bad[0])} rests at {x[bad[0]]}, expected finite numbers")
+    directed = triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    face = np.repeat(np.arange(len(triangle)), 3)
+    key = directed[:, 0] * n + directed[:, 1]
+    order = np.argsort(key, kind="stable")
+    twice = np.flatnonzero(key[order][1:] == key[order][:-1])
+    if not len(twice):
+        return
+    one, other = order[twice[0]], order[twice[0] + 1]
+    i, j = directed[one]
+    count = int(np.count_nonzero((key == i * n + j) | (key == j * n + i)))
+    if count > 2:
+        raise ValueError(f"the edge of nodes {i} and {j} has {count} triangles, expected 1 or 2")
+    raise ValueError(
+        f"triangles {face[one]} and {face[other]} both pass from node {i} to node {j}: "
+        "one of them is inverted, expected the same side of all to face outward"
+    )
 
 
 def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:

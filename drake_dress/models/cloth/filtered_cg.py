@@ -14,11 +14,12 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
-from drake_dress.models.cloth.factor.masked import Factor, solve_into
+from drake_dress.models.cloth.factor.masked import Factor, solve_into, solve_pair_into
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
 from drake_dress.models.cloth.matrices import Csr
 
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
+_SUMS = {"reassoc", "contract"}
 
 
 class SystemMatrix:
@@ -87,6 +88,32 @@ class SystemMatrix:
             max_iterations,
         )
 
+    def solve_pair(
+        self,
+        factor: Factor,
+        block: FloatArray,
+        rhs: tuple[FloatArray, FloatArray],
+        z: tuple[FloatArray, FloatArray],
+        tolerance: float,
+        max_iterations: int,
+    ) -> tuple[int, int]:
+        """Improves both `z` as `solve` does where nothing but what `factor` leaves out is bound.
+
+        The factor is read once for both.
+
+        Returns:
+            Iterations done for each.
+        """
+        return _filtered_cg_pair(
+            (*self._operator, block, self._scale),
+            (factor.blocks, factor.pattern.permutation),
+            factor.masked,
+            *rhs,
+            *z,
+            tolerance,
+            max_iterations,
+        )
+
 
 @nb.njit(cache=True, nogil=True)
 def _apply(operator, z, out):  # type: ignore[no-untyped-def]
@@ -133,13 +160,30 @@ def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
             z[i, 2] -= d * normal[i, 2]
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
 def dot(a: FloatArray, b: FloatArray) -> float:
-    """Returns Σ a b of two (k,3) arrays, summed in order."""
+    """Returns Σ a b of two (k,3) arrays."""
+    p, q = a.reshape(-1), b.reshape(-1)
     s = 0.0
-    for i in range(a.shape[0]):
-        s += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
+    for i in range(p.shape[0]):
+        s += p[i] * q[i]
     return s
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def _add(a, scale, b):  # type: ignore[no-untyped-def]
+    """Adds `scale` times `b` to `a` (k,3), in place."""
+    p, q = a.reshape(-1), b.reshape(-1)
+    for i in range(p.shape[0]):
+        p[i] += scale * q[i]
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def _turn(direction, beta, ahead):  # type: ignore[no-untyped-def]
+    """Writes ahead + β direction to `direction` (k,3)."""
+    p, q = direction.reshape(-1), ahead.reshape(-1)
+    for i in range(p.shape[0]):
+        p[i] = q[i] + beta * p[i]
 
 
 @nb.njit(cache=True, nogil=True)
@@ -174,19 +218,78 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
         if curvature <= 0.0:
             break
         alpha = rho / curvature
-        for i in range(n):
-            for c in range(3):
-                z[i, c] += alpha * direction[i, c]
-                residual[i, c] -= alpha * product[i, c]
+        _add(z, alpha, direction)
+        _add(residual, -alpha, product)
         _precondition(preconditioner, residual, preconditioned)
         new = dot(residual, preconditioned)
         beta = new / rho
         rho = new
-        for i in range(n):
-            for c in range(3):
-                direction[i, c] = preconditioned[i, c] + beta * direction[i, c]
+        _turn(direction, beta, preconditioned)
         iterations += 1
     return iterations, np.sqrt(max(rho, 0.0) / floor)
+
+
+@nb.njit(cache=True, nogil=True)
+def _filtered_cg_pair(  # type: ignore[no-untyped-def]
+    operator, factor, masked, rhs, other_rhs, z, other_z, tolerance, most
+):
+    n = rhs.shape[0]
+    blocks, permutation = factor
+    sides = (rhs, other_rhs)
+    solutions = (z, other_z)
+    residual = np.empty((2, n, 3))
+    direction = np.empty((2, n, 3))
+    ahead = np.empty((2, n, 3))
+    product = np.empty((n, 3))
+    rho, goal = np.empty(2), np.empty(2)
+    iterations = np.zeros(2, dtype=np.int64)
+    for s in range(2):
+        residual[s] = sides[s]
+        _release(residual[s], masked)
+    solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
+    for s in range(2):
+        goal[s] = tolerance * tolerance * max(dot(residual[s], ahead[s]), 1e-300)
+        _apply(operator, solutions[s], product)
+        residual[s] = sides[s]
+        _add(residual[s], -1.0, product)
+        _release(residual[s], masked)
+    solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
+    for s in range(2):
+        rho[s] = dot(residual[s], ahead[s])
+        direction[s] = ahead[s]
+    while True:
+        running = False
+        for s in range(2):
+            if iterations[s] >= most or rho[s] <= goal[s]:
+                continue
+            _apply(operator, direction[s], product)
+            _release(product, masked)
+            curvature = dot(direction[s], product)
+            if curvature <= 0.0:
+                rho[s] = 0.0
+                continue
+            alpha = rho[s] / curvature
+            _add(solutions[s], alpha, direction[s])
+            _add(residual[s], -alpha, product)
+            iterations[s] += 1
+            running = True
+        if not running:
+            return iterations[0], iterations[1]
+        solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
+        for s in range(2):
+            new = dot(residual[s], ahead[s])
+            _turn(direction[s], new / rho[s] if rho[s] > 0.0 else 0.0, ahead[s])
+            rho[s] = new if rho[s] > goal[s] else rho[s]
+
+
+@nb.njit(cache=True, nogil=True)
+def _release(z, masked):  # type: ignore[no-untyped-def]
+    """Sets rows of masked nodes of `z` (n,3) to zero."""
+    for i in range(z.shape[0]):
+        if masked[i]:
+            z[i, 0] = 0.0
+            z[i, 1] = 0.0
+            z[i, 2] = 0.0
 
 
 @nb.njit(cache=True, nogil=True)

@@ -31,6 +31,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, project
+from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.implicit import GRAVITY, ClothState
 from drake_dress.models.cloth.material import Material
@@ -122,8 +123,13 @@ class ProjectiveDynamicsCloth:
             state: now.
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
+
+        Raises:
+            ValueError: something in the input is not finite.
         """
         h, n = self.time_step, len(state.x)
+        if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):
+            explain_not_finite(state.x, state.v, held_velocity, self.held)
         material = self.material
         contact = IteratedContact(
             state.x,

@@ -436,3 +436,16 @@ def test_sheet_on_a_closed_mesh_that_rises_rests_on_its_top(h: float) -> None:
     np.testing.assert_allclose(state.v, np.tile(rise, (25, 1)), atol=2e-3)
     weight = cloth.mass.sum() * 9.81
     assert state.reaction.sum(axis=0)[2] == pytest.approx(weight, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity"])
+def test_input_that_is_not_finite_names_its_node_and_changes_nothing(name: str) -> None:
+    x, e = sheet_elements(6, 6, 0.02)
+    cloth = ProjectiveDynamicsCloth(e, Material(), 0.01, np.array([0, 5], dtype=np.int32))
+    state = ClothState.at_rest(x)
+    (state.x if name == "position" else state.v)[17, 2] = np.nan
+    kept = state.x.copy(), state.v.copy()
+    with pytest.raises(ValueError, match=f"{name} node 17 is"):
+        cloth.step(state, Obstacles.none(), np.zeros((2, 3)))
+    np.testing.assert_array_equal(state.x, kept[0])
+    np.testing.assert_array_equal(state.v, kept[1])

@@ -51,7 +51,7 @@ class Factor:
     def solve_pair(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns P_ff⁻¹ of two (n,3) right-hand sides, in the time of little more than one."""
         out = np.empty_like(first), np.empty_like(second)
-        _solve_pair(self.blocks, self.pattern.permutation, first, second, *out)
+        solve_pair_into(self.blocks, self.pattern.permutation, first, second, *out)
         return out
 
     def solve(self, rhs: FloatArray) -> FloatArray:
@@ -126,7 +126,8 @@ def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-
 
 
 @nb.njit(cache=True, nogil=True)
-def _solve_pair(blocks, permutation, first, second, x, y):  # type: ignore[no-untyped-def]
+def solve_pair_into(blocks, permutation, first, second, x, y):  # type: ignore[no-untyped-def]
+    """Writes P_ff⁻¹ of two right-hand sides (n,3) into `x` and `y`."""
     n = first.shape[0]
     work = np.zeros((n, 8))
     for i in range(n):

@@ -64,12 +64,27 @@ class ConjugateGradientSystem(FilteredSystem):
         masked[nodes] = True
         self._factor = self._scheme.symbolic.factorize(masked)
 
-    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Solved:
-        z = np.zeros_like(rhs) if guess is None else guess.copy()
-        z[self._scheme.held] = held
-        modes = np.where(self._scheme.masked, HELD, 0).astype(np.int32)
-        self._solve(self._scheme.held_factor, modes, z, rhs, z)
-        return Solved(rhs, held, z, z)
+    def start(
+        self,
+        motion: tuple[FloatArray, FloatArray],
+        change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
+    ) -> tuple[Solved, Solved]:
+        """See `StepSystem`."""
+        s = self._scheme
+        first = np.zeros_like(motion[0]) if guess is None else guess.copy()
+        second = np.zeros_like(first)
+        first[s.held], second[s.held] = motion[1], change[1]
+        iterations = s.system.solve_pair(
+            s.held_factor,
+            self._block,
+            (motion[0], change[0]),
+            (first, second),
+            s.tolerance,
+            s.max_iterations,
+        )
+        self.iterations += sum(iterations)
+        return Solved(*motion, first, first), Solved(*change, second, second)
 
     def _bind(
         self,

@@ -41,7 +41,16 @@ class DirectSystem(FilteredSystem):
         self._matrix = scheme.matrix.assemble(block)
         self._factors: dict[tuple[bytes, bytes, bytes], tuple[sp.csc_matrix, spla.SuperLU]] = {}
 
-    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Solved:
+    def start(
+        self,
+        motion: tuple[FloatArray, FloatArray],
+        change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
+    ) -> tuple[Solved, Solved]:
+        """See `StepSystem`; there is nothing to guess."""
+        return self._free(*motion), self._free(*change)
+
+    def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
         fixed = np.zeros_like(rhs)
         fixed[self._scheme.held] = held
         none = np.zeros(0, dtype=np.int32)

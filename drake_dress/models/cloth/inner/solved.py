@@ -69,6 +69,7 @@ class FilteredSystem(ABC):
         self._block = block
         self._nodes = np.zeros(0, dtype=np.int32)
 
+    @abstractmethod
     def start(
         self,
         motion: tuple[FloatArray, FloatArray],
@@ -76,7 +77,6 @@ class FilteredSystem(ABC):
         guess: FloatArray | None = None,
     ) -> tuple[Any, Any]:
         """See `StepSystem`."""
-        return self._free(*motion, guess), self._free(*change, None)
 
     def touch(self, nodes: IntArray) -> None:
         """See `StepSystem`."""
@@ -175,10 +175,6 @@ class FilteredSystem(ABC):
 
     def _unknown(self, rhs: FloatArray, held: FloatArray, free: FloatArray, z: FloatArray) -> Any:
         return Solved(rhs, held, free, z)
-
-    @abstractmethod
-    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Any:
-        """Returns an unknown, solved without contact; `guess` (n,3) may be a start."""
 
     @abstractmethod
     def _bind(

@@ -58,6 +58,15 @@ class StationarySystem(FilteredSystem):
         self._held = scheme.held
         self._p: OneStepSystem = scheme.one_step.at(np.zeros((0, 3)))
 
+    def start(
+        self,
+        motion: tuple[FloatArray, FloatArray],
+        change: tuple[FloatArray, FloatArray],
+        guess: FloatArray | None = None,
+    ) -> tuple[Iterates, Iterates]:
+        """See `StepSystem`; there is nothing to guess."""
+        return self._free(*motion), self._free(*change)
+
     def touch(self, nodes: IntArray) -> None:
         """See `StepSystem`."""
         super().touch(nodes)
@@ -106,7 +115,7 @@ class StationarySystem(FilteredSystem):
     ) -> Iterates:
         return Iterates(rhs, held, free, z)
 
-    def _free(self, rhs: FloatArray, held: FloatArray, guess: FloatArray | None) -> Iterates:
+    def _free(self, rhs: FloatArray, held: FloatArray) -> Iterates:
         start = np.zeros_like(rhs)
         start[self._held] = held
         unknown = Iterates(rhs, held, rhs, rhs)
