@@ -11,13 +11,14 @@ turned by its grippers hardly turns in the prediction.
 Contact and grasp prescribe motions instead of adding forces (paper-notes: the printed contact
 force is an elastic bounce, springs at the grippers report forces that are not there):
 
-1. all nodes in reach stick, Δx = h u_surface − gap n, which takes the force r;
-2. nodes with r·n < 0 take off; those with ‖r_T‖ > μ r_N slip: they keep their normal motion and
+1. of the nodes that would enter a surface those count that still do once what lies on it is held;
+2. all nodes in contact stick, Δx = h u_surface − gap n, which takes the force r;
+3. nodes with r·n < 0 take off; those with ‖r_T‖ > μ r_N slip: they keep their normal motion and
    feel friction along r_T, μ times the normal force that they then have; the rest sticks. The
    reduced system (three rows for stick, one for slip) is solved for Δx: it stays bounded for tight
    sleeves and large steps. Nodes that it would have to draw to a surface are let go and sticking
    ones that friction cannot hold slip, and it is solved again;
-3. sticking nodes take the velocity of the surface, slipping ones do so along its normal and feel
+4. sticking nodes take the velocity of the surface, slipping ones do so along its normal and feel
    the same friction, unless it stops them within the step; all others follow
    A Δv = h f + ½h² df/dt. (With the velocity Δx/h instead, a node that starts to slide gains only
    half of its speed.)
@@ -35,7 +36,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.adjoint import Gradient, run_adjoint
-from drake_dress.models.cloth.contact.detection import Contacts, find_contacts, known_contacts
+from drake_dress.models.cloth.contact.detection import (
+    ATTEMPTS,
+    CLOSE,
+    ENTERED,
+    FEW,
+    Contacts,
+    find_contacts,
+    known_contacts,
+)
 from drake_dress.models.cloth.contact.friction import (
     NO_CONTACT,
     Friction,
@@ -44,8 +53,8 @@ from drake_dress.models.cloth.contact.friction import (
     revise_modes,
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import HELD, STICK
+from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import force_and_product
 from drake_dress.models.cloth.implicit import GRAVITY
@@ -130,6 +139,21 @@ class Tape:
         mode[self.contacts.nodes] = self.friction.mode
         mode[self.held] = HELD
         return mode
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """How c nodes in contact were bound; see `Tape`. `binding` (c,3) is what binds Δx."""
+
+    prescribed: FloatArray
+    target_change: FloatArray
+    friction: Friction
+    stick_reaction: FloatArray
+    binding: FloatArray
+
+
+_NO_VECTORS = np.zeros((0, 3))
+_NOTHING_BOUND = _Bound(_NO_VECTORS, _NO_VECTORS, NO_CONTACT, _NO_VECTORS, _NO_VECTORS)
 
 
 class ExplicitBiasCloth:
@@ -238,61 +262,34 @@ class ExplicitBiasCloth:
             explain_not_finite(x, v, held_motion, self.held)
 
         if types is None:
-            contacts = find_contacts(x, free, obstacles, m.margin, h, self.held_mask)
+            near = find_contacts(x, free, obstacles, m.margin, h, self.held_mask)
         else:
-            contacts = known_contacts(x, types.nodes, types.owner, obstacles, m.margin)
-        n_c = len(contacts.nodes)
-        # New contacts close their gap, deep ones leave by it: both in one step.
-        prescribed = h * contacts.surface_velocity - contacts.gap[:, None] * contacts.normal
-        if n_c:
-            system.touch(contacts.nodes)
-            everything = np.full(n_c, STICK, dtype=np.int32)
-            stick_unknown = system.again(motion_unknown)
-            stick_binding, _ = system.hold(stick_unknown, everything, contacts.normal, prescribed)
-            stick_reaction = (2.0 / h**2) * stick_binding
-            target_change = contacts.surface_velocity - v[contacts.nodes]
-            friction = find_modes(
-                stick_reaction,
-                contacts.normal,
-                m.friction,
-                -self.mass[contacts.nodes, None] * target_change,
-                h,
-                None if types is None else (types.mode, types.velocity_mode),
-            )
-            binding = stick_binding
-            for revision in range(self._most_revisions):
-                binding, _ = system.hold(
-                    motion_unknown,
-                    friction.mode,
-                    contacts.normal,
-                    prescribed,
-                    friction.push,
-                    binding,
+            near = known_contacts(x, types.nodes, types.owner, obstacles, m.margin)
+        stick_unknown = system.again(motion_unknown) if len(near.nodes) else None
+        kept, guess = np.ones(len(near.nodes), dtype=np.bool_), None
+        if types is None and stick_unknown is not None:
+            kept, guess = self._who_touches(system, stick_unknown, near)
+        for attempt in range(ATTEMPTS):
+            contacts = near.chosen(kept)
+            bound = _NOTHING_BOUND
+            if stick_unknown is not None:
+                bound = self._bind(
+                    system,
+                    (stick_unknown, motion_unknown, change_unknown),
+                    contacts,
+                    v,
+                    guess,
+                    types,
                 )
-                last = types is not None or revision + 1 == self._most_revisions
-                if last or not revise_modes(
-                    binding,
-                    contacts.normal,
-                    contacts.gap,
-                    m.friction,
-                    friction,
-                    slide=revision == 0,
-                ):
-                    break
-            # A lasting force r moves by ½h² r and hastens by h r.
-            system.hold(
-                change_unknown,
-                friction.velocity_mode,
-                contacts.normal,
-                target_change,
-                friction.push,
-                (2.0 / h) * binding,
-            )
-        else:
-            stick_unknown, stick_reaction, binding = None, prescribed, prescribed
-            target_change = prescribed
-            friction = NO_CONTACT
-        motion, change = system.finish(motion_unknown, change_unknown)
+            motion, change = system.finish(motion_unknown, change_unknown)
+            if kept.all():
+                break
+            entered = ~kept & (_ahead(near, motion[near.nodes], h) < -ENTERED)
+            if not entered.any():
+                break
+            kept = kept | entered if attempt + 2 < ATTEMPTS else np.ones_like(kept)
+            guess = None
+        friction = bound.friction
         proposed, separation = motion, None
         if self.layers is not None:
             mode = np.zeros(len(x), dtype=np.int32)
@@ -310,8 +307,7 @@ class ExplicitBiasCloth:
         else:
             # Within P the spring yields by Δx twice: without that, k v h would be felt in motion.
             reaction[self.held] = self.spring * (held_motion - 2.0 * proposed[self.held])
-        if n_c:
-            reaction[contacts.nodes] = (2.0 / h**2) * binding
+        reaction[contacts.nodes] = (2.0 / h**2) * bound.binding
         tape = Tape(
             x=x,
             v=v,
@@ -321,10 +317,10 @@ class ExplicitBiasCloth:
             change_unknown=change_unknown,
             stick_unknown=stick_unknown,
             contacts=contacts,
-            prescribed=prescribed,
-            target_change=target_change,
+            prescribed=bound.prescribed,
+            target_change=bound.target_change,
             friction=friction,
-            stick_reaction=stick_reaction,
+            stick_reaction=bound.stick_reaction,
             motion=proposed,
             change=change,
             separation=separation,
@@ -354,6 +350,81 @@ class ExplicitBiasCloth:
             by_material: also by the material's values, which takes two more solves.
         """
         return run_adjoint(self, tape, x_bar, v_bar, held_reaction_bar, by_material)
+
+    def _who_touches(
+        self, system: StepSystem, unknown: Unknown, near: Contacts
+    ) -> tuple[BoolArray, FloatArray | None]:
+        """Returns which of the nodes near a surface (c,) touch it, and a guess at what binds them.
+
+        Without contact all of a garment falls, and at large steps far more of it would enter than
+        when what lies already is held. So that is held first; nodes that then stay out are let be.
+        """
+        lying = near.gap <= CLOSE
+        everyone = np.ones(len(lying), dtype=np.bool_)
+        if not lying.any() or np.count_nonzero(~lying) <= FEW:
+            return everyone, None
+        system.touch(near.nodes)
+        mode = np.where(lying, STICK, FREE).astype(np.int32)
+        target = _closing(near, self.time_step)
+        binding, there = system.hold(unknown, mode, near.normal, target)
+        kept = lying | (_ahead(near, there, self.time_step) < 0.0)
+        return kept, binding[kept]
+
+    def _bind(
+        self,
+        system: StepSystem,
+        unknowns: tuple[Unknown, Unknown, Unknown],
+        contacts: Contacts,
+        v: FloatArray,
+        guess: FloatArray | None,
+        types: ContactTypes | None,
+    ) -> _Bound:
+        """Binds the unknowns at the nodes in contact.
+
+        Args:
+            system: of the step.
+            unknowns: of Δx with all of them sticking, of Δx, of Δv.
+            contacts: c of them.
+            v: (n,3) velocities, m/s.
+            guess: (c,3) at what binds sticking nodes.
+            types: contact to hold instead of finding it.
+        """
+        h, m, normal = self.time_step, self.material, contacts.normal
+        stick_unknown, motion_unknown, change_unknown = unknowns
+        prescribed = _closing(contacts, h)
+        system.touch(contacts.nodes)
+        everything = np.full(len(contacts.nodes), STICK, dtype=np.int32)
+        stick_binding, _ = system.hold(stick_unknown, everything, normal, prescribed, guess=guess)
+        stick_reaction = (2.0 / h**2) * stick_binding
+        target_change = contacts.surface_velocity - v[contacts.nodes]
+        friction = find_modes(
+            stick_reaction,
+            normal,
+            m.friction,
+            -self.mass[contacts.nodes, None] * target_change,
+            h,
+            None if types is None else (types.mode, types.velocity_mode),
+        )
+        binding = stick_binding
+        for revision in range(self._most_revisions):
+            binding, _ = system.hold(
+                motion_unknown, friction.mode, normal, prescribed, friction.push, binding
+            )
+            last = types is not None or revision + 1 == self._most_revisions
+            if last or not revise_modes(
+                binding, normal, contacts.gap, m.friction, friction, slide=revision == 0
+            ):
+                break
+        # A lasting force r moves by ½h² r and hastens by h r.
+        system.hold(
+            change_unknown,
+            friction.velocity_mode,
+            normal,
+            target_change,
+            friction.push,
+            (2.0 / h) * binding,
+        )
+        return _Bound(prescribed, target_change, friction, stick_reaction, binding)
 
     def _make_inner(self, name: str, iterations: int, tolerance: float) -> InnerIteration:
         e, m, h = self.elements, self.material, self.time_step
@@ -395,3 +466,16 @@ def _right_hand_sides(mass, gravity, v, force, rate, h, motion, change):  # type
             total = force[i, c] + mass[i] * gravity[c]
             motion[i, c] = mass[i] * h * v[i, c] + 0.5 * h * h * total
             change[i, c] = h * total - 0.5 * h * h * rate[i, c]
+
+
+def _closing(near: Contacts, time_step: float) -> FloatArray:
+    """Returns Δx (c,3) of sticking: new contacts close their gap, deep ones leave by it."""
+    closing: FloatArray = time_step * near.surface_velocity - near.gap[:, None] * near.normal
+    return closing
+
+
+def _ahead(near: Contacts, motion: FloatArray, time_step: float) -> FloatArray:
+    """Returns the gap (c,) that is left after `motion` (c,3), m."""
+    relative = motion - time_step * near.surface_velocity
+    ahead: FloatArray = near.gap + np.einsum("ij,ij->i", near.normal, relative)
+    return ahead

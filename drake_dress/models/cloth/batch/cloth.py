@@ -26,7 +26,12 @@ from drake_dress.models.cloth.batch.adjoint import pull_back
 from drake_dress.models.cloth.batch.arrays import array_out, kind_of, scalars_in, vectors_in
 from drake_dress.models.cloth.batch.bodies import Bodies, make_bodies
 from drake_dress.models.cloth.batch.contact_kernels import prescribe_held
-from drake_dress.models.cloth.batch.contact_step import bind_change, bind_motion, find_contact
+from drake_dress.models.cloth.batch.contact_step import (
+    bind_change,
+    bind_motion,
+    find_contact,
+    take_back,
+)
 from drake_dress.models.cloth.batch.device import find_device
 from drake_dress.models.cloth.batch.element_kernels import (
     hinge_response,
@@ -42,6 +47,7 @@ from drake_dress.models.cloth.batch.parameters import (
 )
 from drake_dress.models.cloth.batch.projected_cg import DIRECT, ITERATE, skip_where
 from drake_dress.models.cloth.batch.tape import ContactTypes, Gradient, Tape
+from drake_dress.models.cloth.contact.detection import ATTEMPTS
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.implicit import GRAVITY
@@ -189,11 +195,21 @@ class BatchCloth:
         engine.launch(prescribe_held, [engine.held_index, held_motion, mode, prescribed, motion])
         engine.solver.solve(parameters, base_solve, mode, g, motion)
         stick_mode, contact = wp.clone(mode), None
-        found = find_contact(engine, parameters, bodies, x, motion, stick_mode, types)
+        found = find_contact(engine, parameters, bodies, x, motion, g, stick_mode, types)
         if found is not None:
-            contact, motion = bind_motion(
-                engine, parameters, found, stick_mode, prescribed, v, g, motion, types
-            )
+            near, touches, spared = found
+            free = motion
+            for attempt in range(ATTEMPTS):
+                # As much as needed is solved anew: the garments keep their numbers.
+                start, followed = wp.clone(free), wp.clone(prescribed)
+                contact, motion = bind_motion(
+                    engine, parameters, near, touches, stick_mode, followed, v, g, start, types
+                )
+                everyone = attempt + 2 == ATTEMPTS
+                if spared is None or attempt + 1 == ATTEMPTS:
+                    break
+                if not take_back(engine, near, motion, spared, stick_mode, everyone):
+                    break
 
         # reaction and velocities
         reaction, change, x_next, v_next = (engine.vectors() for _ in range(4))

@@ -20,7 +20,7 @@ from drake_dress.models.cloth.batch.bodies import (
     surface_velocity,
 )
 from drake_dress.models.cloth.batch.parameters import Parameters
-from drake_dress.models.cloth.contact.detection import SHORT_WAY
+from drake_dress.models.cloth.contact.detection import CLOSE, ENTERED, FEW, SHORT_WAY
 from drake_dress.models.cloth.contact.distance import MOST_MARCHES, TOUCH
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
 
@@ -33,6 +33,9 @@ _ZERO = wp.constant(wp.float64(0.0))
 _TOUCH = wp.constant(wp.float64(TOUCH))
 _MOST_MARCHES = wp.constant(MOST_MARCHES)
 _SHORT_WAY = wp.constant(wp.float64(SHORT_WAY))
+_CLOSE = wp.constant(wp.float64(CLOSE))
+_FEW = wp.constant(FEW)
+_ENTERED = wp.constant(wp.float64(ENTERED))
 
 
 @wp.struct
@@ -221,3 +224,105 @@ def prescribe_touching(
         prescribed[b, i] = u
         motion[b, i] = u
         target_change[b, i] = near.velocity[b, i] - v[b, i]
+
+
+@wp.kernel
+def count_touching(near: Proximity, mode: wp.array2d[wp.int32], count: wp.array2d[wp.int32]):
+    """Adds to `count` (B,2) how many touching nodes lie on a surface, and how many do not."""
+    b, i = wp.tid()
+    if mode[b, i] == _STICK:
+        if near.gap[b, i] <= _CLOSE:
+            wp.atomic_add(count, b, 0, 1)
+        else:
+            wp.atomic_add(count, b, 1, 1)
+
+
+@wp.kernel
+def doubt_contact(count: wp.array2d[wp.int32], doubtful: wp.array[wp.int32]):
+    """Writes which garments (B,) have contact that is worth a second look."""
+    b = wp.tid()
+    doubtful[b] = wp.where(count[b, 0] > 0 and count[b, 1] > _FEW, 1, 0)
+
+
+@wp.kernel
+def hold_lying(
+    near: Proximity,
+    h: wp.float64,
+    mode: wp.array2d[wp.int32],
+    lying_mode: wp.array2d[wp.int32],
+    motion: wp.array2d[wp.vec3d],
+):
+    """Lets only those touching nodes stick that lie on a surface."""
+    b, i = wp.tid()
+    lying_mode[b, i] = mode[b, i]
+    if mode[b, i] != _STICK:
+        return
+    if near.gap[b, i] <= _CLOSE:
+        motion[b, i] = h * near.velocity[b, i] - near.gap[b, i] * near.normal[b, i]
+    else:
+        lying_mode[b, i] = _FREE
+
+
+@wp.kernel
+def let_be(
+    doubtful: wp.array[wp.int32],
+    h: wp.float64,
+    motion: wp.array2d[wp.vec3d],
+    near: Proximity,
+    mode: wp.array2d[wp.int32],
+    spared: wp.array2d[wp.int32],
+):
+    """Takes those from the touching nodes that stay out once what lies on a surface is held.
+
+    `spared` becomes the body that such a node was thought to touch, -1 for all others.
+    """
+    b, i = wp.tid()
+    spared[b, i] = -1
+    if doubtful[b] == 0 or mode[b, i] != _STICK or near.gap[b, i] <= _CLOSE:
+        return
+    if _ahead(near, b, i, h, motion[b, i]) >= _ZERO:
+        spared[b, i] = near.owner[b, i]
+        mode[b, i] = _FREE
+        near.owner[b, i] = -1
+
+
+@wp.kernel
+def find_entered(
+    near: Proximity,
+    h: wp.float64,
+    motion: wp.array2d[wp.vec3d],
+    spared: wp.array2d[wp.int32],
+    entered: wp.array[wp.int32],
+):
+    """Flags garments (B,) with nodes that were let be and enter: all threads write the same."""
+    b, i = wp.tid()
+    if spared[b, i] >= 0 and _ahead(near, b, i, h, motion[b, i]) < -_ENTERED:
+        entered[b] = 1
+
+
+@wp.kernel
+def take_back(
+    near: Proximity,
+    h: wp.float64,
+    motion: wp.array2d[wp.vec3d],
+    entered: wp.array[wp.int32],
+    everyone: wp.int32,
+    spared: wp.array2d[wp.int32],
+    mode: wp.array2d[wp.int32],
+):
+    """Lets nodes that enter touch again, or all that were let be, of garments with any."""
+    b, i = wp.tid()
+    if entered[b] == 0 or spared[b, i] < 0:
+        return
+    if everyone == 1 or _ahead(near, b, i, h, motion[b, i]) < -_ENTERED:
+        near.owner[b, i] = spared[b, i]
+        mode[b, i] = _STICK
+        spared[b, i] = -1
+
+
+@wp.func
+def _ahead(
+    near: Proximity, b: wp.int32, i: wp.int32, h: wp.float64, motion: wp.vec3d
+) -> wp.float64:
+    """Returns the gap that is left after a motion."""
+    return near.gap[b, i] + wp.dot(near.normal[b, i], motion - h * near.velocity[b, i])

@@ -27,10 +27,13 @@ def find_contact(
     bodies: Bodies,
     x: wp.array,
     free_motion: wp.array,
+    g: wp.array,
     mode: wp.array,
     types: ContactTypes | None,
-) -> tuple[Proximity, wp.array] | None:
-    """Sets touching nodes to stick; returns what they touch and (B,) flags of garments that do.
+) -> tuple[Proximity, wp.array, wp.array | None] | None:
+    """Sets touching nodes to stick; returns what they touch, and (B,) flags of garments that do.
+
+    And, (B,n), the body of each node that was let be, -1 for the others; None where none was.
 
     Args:
         engine: of the step.
@@ -38,6 +41,7 @@ def find_contact(
         bodies: to touch.
         x: (B,n) positions.
         free_motion: (B,n) Δx without contact.
+        g: (B,n) right-hand side of Δx.
         mode: (B,n) HELD or FREE, changed.
         types: contact to take, or None.
 
@@ -56,13 +60,70 @@ def find_contact(
     else:
         near = make_proximity(wp.array(types.owner, dtype=wp.int32, device=engine.device))
         engine.launch(contact_kernels.take_touching, [bodies, parameters, x, near, mode, touches])
-    return (near, touches) if touches.numpy().any() else None
+    if not touches.numpy().any():
+        return None
+    spared = None
+    if types is None:
+        spared = _let_be(engine, parameters, near, free_motion, g, mode)
+    return near, touches, spared
+
+
+def _let_be(
+    engine: Engine,
+    parameters: Parameters,
+    near: Proximity,
+    free_motion: wp.array,
+    g: wp.array,
+    mode: wp.array,
+) -> wp.array | None:
+    """Takes nodes from `near` and `mode` that stay out once what lies on a surface is held."""
+    count = wp.zeros((engine.batch, 2), dtype=wp.int32, device=engine.device)
+    engine.launch(contact_kernels.count_touching, [near, mode, count])
+    doubtful = engine.flags()
+    wp.launch(contact_kernels.doubt_contact, engine.batch, [count, doubtful], device=engine.device)
+    if not doubtful.numpy().any():
+        return None
+    h, lying_mode, motion = engine.time_step, engine.integers(), wp.clone(free_motion)
+    engine.launch(contact_kernels.hold_lying, [near, h, mode, lying_mode, motion])
+    kinds = iterate_where(doubtful, solve_kinds(engine, SKIP))
+    engine.solver.solve(parameters, kinds, lying_mode, g, motion, cold=False)
+    spared = engine.integers()
+    engine.launch(contact_kernels.let_be, [doubtful, h, motion, near, mode, spared])
+    return spared
+
+
+def take_back(
+    engine: Engine,
+    near: Proximity,
+    motion: wp.array,
+    spared: wp.array,
+    mode: wp.array,
+    everyone: bool,
+) -> bool:
+    """Lets nodes touch after all that were let be and enter; returns whether there are any.
+
+    Args:
+        engine: of the step.
+        near: what nodes touch.
+        motion: (B,n) Δx with contact.
+        spared: (B,n) of `find_contact`.
+        mode: (B,n) of all touching nodes sticking.
+        everyone: of a garment with such nodes all that were let be.
+    """
+    h, entered = engine.time_step, engine.flags()
+    engine.launch(contact_kernels.find_entered, [near, h, motion, spared, entered])
+    if not entered.numpy().any():
+        return False
+    inputs = [near, h, motion, entered, int(everyone), spared, mode]
+    engine.launch(contact_kernels.take_back, inputs)
+    return True
 
 
 def bind_motion(
     engine: Engine,
     parameters: Parameters,
-    found: tuple[Proximity, wp.array],
+    near: Proximity,
+    touches: wp.array,
     stick_mode: wp.array,
     prescribed: wp.array,
     v: wp.array,
@@ -75,7 +136,8 @@ def bind_motion(
     Args:
         engine: of the step.
         parameters: the fabrics.
-        found: of `find_contact`.
+        near: of `find_contact`.
+        touches: likewise.
         stick_mode: (B,n) HELD, FREE or, of all touching nodes, STICK.
         prescribed: (B,n) motions of held nodes; those of touching ones are added.
         v: (B,n) velocities.
@@ -83,7 +145,6 @@ def bind_motion(
         motion: (B,n) Δx without contact; becomes that with all touching nodes sticking.
         types: contact types to take, or None.
     """
-    near, touches = found
     system = [engine.system, parameters]
     h = engine.time_step
     target_change = engine.vectors(zero=True)

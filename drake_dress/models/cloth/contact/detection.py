@@ -23,6 +23,11 @@ from drake_dress.models.cloth.contact.distance import (
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 
+# A node so near to a surface, m, lies there while others are judged (those that slide on something
+# round are left with up to 0.2 mm), and so few others are taken as they seem without contact.
+CLOSE, FEW = 3e-4, 20
+# A node that was let be may end so deep, m, else all is solved again with it; so often at most.
+ENTERED, ATTEMPTS = 1e-6, 3
 # A way this short passes by no body unseen, m.
 SHORT_WAY = 0.005
 # Farthest a node in contact is from the origin of a body, m.
@@ -88,6 +93,19 @@ class Contacts:
     slope: FloatArray
     surface_velocity: FloatArray
 
+    def chosen(self, some: BoolArray) -> Contacts:
+        """Returns those where `some` (c,) is True."""
+        if some.all():
+            return self
+        return Contacts(
+            self.nodes[some],
+            self.gap[some],
+            self.owner[some],
+            self.normal[some],
+            self.slope[some],
+            self.surface_velocity[some],
+        )
+
 
 NO_CONTACTS = Contacts(
     np.zeros(0, dtype=np.int32),
@@ -137,7 +155,7 @@ def find_contacts(
         relative = motion[nodes] - time_step * near.surface_velocity
     ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
     touching = (near.gap < 0.0) | (touched & (ahead < 0.0))
-    return _chosen(near, touching)
+    return near.chosen(touching)
 
 
 def _met_on_the_way(
@@ -197,17 +215,6 @@ def _surface(
     twists = obstacles.twists()
     surface_frame(x, obstacles.packed, obstacles.origins(), *twists, owner, normal, slope, velocity)
     return normal, slope, velocity
-
-
-def _chosen(near: Contacts, chosen: BoolArray) -> Contacts:
-    return Contacts(
-        near.nodes[chosen],
-        near.gap[chosen],
-        near.owner[chosen],
-        near.normal[chosen],
-        near.slope[chosen],
-        near.surface_velocity[chosen],
-    )
 
 
 def fastest(obstacles: Obstacles) -> float:
