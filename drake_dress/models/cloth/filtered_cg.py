@@ -17,9 +17,9 @@ from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntAr
 from drake_dress.models.cloth.factor.masked import Factor, solve_into, solve_pair_into
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
 from drake_dress.models.cloth.matrices import Csr
+from drake_dress.models.cloth.vectors import add, dot, turn
 
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
-_SUMS = {"reassoc", "contract"}
 
 
 class SystemMatrix:
@@ -161,32 +161,6 @@ def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
             z[i, 2] -= d * normal[i, 2]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
-def dot(a: FloatArray, b: FloatArray) -> float:
-    """Returns Σ a b of two (k,3) arrays."""
-    p, q = a.reshape(-1), b.reshape(-1)
-    s = 0.0
-    for i in range(p.shape[0]):
-        s += p[i] * q[i]
-    return s
-
-
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
-def _add(a, scale, b):  # type: ignore[no-untyped-def]
-    """Adds `scale` times `b` to `a` (k,3), in place."""
-    p, q = a.reshape(-1), b.reshape(-1)
-    for i in range(p.shape[0]):
-        p[i] += scale * q[i]
-
-
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
-def _turn(direction, beta, ahead):  # type: ignore[no-untyped-def]
-    """Writes ahead + β direction to `direction` (k,3)."""
-    p, q = direction.reshape(-1), ahead.reshape(-1)
-    for i in range(p.shape[0]):
-        p[i] = q[i] + beta * p[i]
-
-
 @nb.njit(cache=True, nogil=True)
 def _filtered_cg(  # type: ignore[no-untyped-def]
     operator, factor, masked, masked_scale, mode, normal, rhs, z, tolerance, max_iterations
@@ -219,13 +193,13 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
         if curvature <= 0.0:
             break
         alpha = rho / curvature
-        _add(z, alpha, direction)
-        _add(residual, -alpha, product)
+        add(z, alpha, direction)
+        add(residual, -alpha, product)
         _precondition(preconditioner, residual, preconditioned)
         new = dot(residual, preconditioned)
         beta = new / rho
         rho = new
-        _turn(direction, beta, preconditioned)
+        turn(direction, beta, preconditioned)
         iterations += 1
     return iterations, np.sqrt(max(rho, 0.0) / floor)
 
@@ -247,7 +221,7 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
     for s in range(2):
         _apply(operator, solutions[s], product)
         residual[s] = sides[s]
-        _add(residual[s], -1.0, product)
+        add(residual[s], -1.0, product)
         _release(residual[s], masked)
     solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
     for s in range(2):
@@ -266,8 +240,8 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
                 rho[s] = 0.0
                 continue
             alpha = rho[s] / curvature
-            _add(solutions[s], alpha, direction[s])
-            _add(residual[s], -alpha, product)
+            add(solutions[s], alpha, direction[s])
+            add(residual[s], -alpha, product)
             iterations[s] += 1
             running = True
         if not running:
@@ -275,7 +249,7 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
         solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
         for s in range(2):
             new = dot(residual[s], ahead[s])
-            _turn(direction[s], new / rho[s] if rho[s] > 0.0 else 0.0, ahead[s])
+            turn(direction[s], new / rho[s] if rho[s] > 0.0 else 0.0, ahead[s])
             rho[s] = new if rho[s] > goal[s] else rho[s]
 
 

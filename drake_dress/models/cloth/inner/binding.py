@@ -17,10 +17,10 @@ from drake_dress.models.cloth.elements import IntArray
 from drake_dress.models.cloth.factor.masked import Factor, restricted_solve, solve_into
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
 from drake_dress.models.cloth.matrices import Csr
+from drake_dress.models.cloth.vectors import add, dot, turn
 
 # Vectors that GMRES keeps before it starts anew.
 _RESTART = 60
-_SUMS = {"reassoc", "contract"}
 # Whether all of P is looked at, P or its block between the nodes, the nodes, a factor and scratch.
 Conditioner = tuple[Any, ...]
 
@@ -129,32 +129,31 @@ def _conjugate_gradients(  # type: ignore[no-untyped-def]
     step = np.empty_like(moved)
     _reduce(lack, mode, across, residual)
     _condition(conditioner, mode, normal, residual, conditioned, force, step)
-    rho = _dot(residual, conditioned)
+    rho = dot(residual, conditioned)
     goal = tolerance * tolerance * max(rho, 1e-300)
     if started:
         _reduce(moved, mode, across, rows)
-        _add(residual, -1.0, rows)
+        add(residual, -1.0, rows)
         _condition(conditioner, mode, normal, residual, conditioned, force, step)
-        rho = _dot(residual, conditioned)
+        rho = dot(residual, conditioned)
     direction = conditioned.copy()
     iterations = 0
     while iterations < most and rho > goal:
         _expand(direction, mode, along, force)
         restricted_solve(part, force, step)
         _reduce(step, mode, across, rows)
-        curvature = _dot(direction, rows)
+        curvature = dot(direction, rows)
         if curvature <= 0.0:
             break
         alpha = rho / curvature
-        _add(unknown, alpha, direction)
-        _add(moved.reshape(-1), alpha, step.reshape(-1))
-        _add(residual, -alpha, rows)
+        add(unknown, alpha, direction)
+        add(moved, alpha, step)
+        add(residual, -alpha, rows)
         _condition(conditioner, mode, normal, residual, conditioned, force, step)
-        new = _dot(residual, conditioned)
+        new = dot(residual, conditioned)
         beta = new / rho
         rho = new
-        for i in range(direction.shape[0]):
-            direction[i] = conditioned[i] + beta * direction[i]
+        turn(direction, beta, conditioned)
         iterations += 1
     return iterations
 
@@ -178,7 +177,7 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
     scratch = np.empty_like(moved)
     _reduce(lack, mode, across, wanted)
     _condition(conditioner, mode, normal, wanted, conditioned, force, scratch)
-    length = np.sqrt(max(_dot(wanted, conditioned), 0.0))
+    length = np.sqrt(max(dot(wanted, conditioned), 0.0))
     goal = tolerance * max(length, 1e-150)
     basis = np.empty((_RESTART + 1, size))
     ahead = np.empty((_RESTART + 1, size))
@@ -194,7 +193,7 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
             for i in range(size):
                 residual[i] = wanted[i] - residual[i]
             _condition(conditioner, mode, normal, residual, conditioned, force, scratch)
-            length = np.sqrt(max(_dot(residual, conditioned), 0.0))
+            length = np.sqrt(max(dot(residual, conditioned), 0.0))
         if length <= goal:
             break
         for i in range(size):
@@ -208,11 +207,11 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
             restricted_solve(part, force, motion[j])
             _reduce(motion[j], mode, across, residual)
             for i in range(j + 1):
-                h = _dot(residual, ahead[i])
+                h = dot(residual, ahead[i])
                 hessenberg[i, j] = h
-                _add(residual, -h, basis[i])
+                add(residual, -h, basis[i])
             _condition(conditioner, mode, normal, residual, conditioned, force, scratch)
-            h = np.sqrt(max(_dot(residual, conditioned), 0.0))
+            h = np.sqrt(max(dot(residual, conditioned), 0.0))
             for i in range(j):
                 u, w = hessenberg[i, j], hessenberg[i + 1, j]
                 hessenberg[i, j] = cosine[i] * u + sine[i] * w
@@ -239,8 +238,8 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
                 right[i] -= hessenberg[i, j] * right[j]
             right[i] /= hessenberg[i, i]
         for j in range(count):
-            _add(unknown, right[j], ahead[j])
-            _add(moved.reshape(-1), right[j], motion[j].reshape(-1))
+            add(unknown, right[j], ahead[j])
+            add(moved, right[j], motion[j])
         if abs(right[count]) <= goal:
             break
     return iterations
@@ -315,21 +314,6 @@ def _reduce(z, mode, direction, out):  # type: ignore[no-untyped-def]
             out[at + 1] = z[i, 1]
             out[at + 2] = z[i, 2]
             at += 3
-
-
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return total
-
-
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
-def _add(a, scale, b):  # type: ignore[no-untyped-def]
-    """Adds `scale` times `b` to `a`, in place."""
-    for i in range(a.shape[0]):
-        a[i] += scale * b[i]
 
 
 @nb.njit(cache=True, nogil=True)

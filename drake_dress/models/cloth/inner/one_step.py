@@ -152,7 +152,7 @@ class OneStepSystem:
             s.max_iterations,
         )
         self.iterations += iterations
-        unknown.at_nodes = free + moved
+        unknown.at_nodes, unknown.change = free + moved, None
         return unknown.force, unknown.at_nodes
 
     def _hold_many(
