@@ -328,7 +328,7 @@ def _reference(result: Result) -> str:
 
 
 # Engine → Matplotlib colour map; light to dark is small to large time step, as in the paper.
-_MAPS = ("Blues", "Purples", "Greens", "Reds")
+_MAPS = ("Blues", "Purples", "Greens", "Reds", "Oranges", "Greys")
 
 
 def steps_panels(result: Result) -> list[Panel]:

@@ -1,0 +1,35 @@
+"""Sums of arrays of vectors on whole vector registers; the order of summation is the compiler's."""
+
+from __future__ import annotations
+
+import numba as nb
+
+from drake_dress.models.cloth.elements import FloatArray
+
+_SUMS = {"reassoc", "contract"}
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Returns Σ a b of two C-contiguous arrays of one shape."""
+    p, q = a.reshape(-1), b.reshape(-1)
+    total = 0.0
+    for i in range(p.shape[0]):
+        total += p[i] * q[i]
+    return total
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def add(a: FloatArray, scale: float, b: FloatArray) -> None:
+    """Adds `scale` times `b` to `a`, in place."""
+    p, q = a.reshape(-1), b.reshape(-1)
+    for i in range(p.shape[0]):
+        p[i] += scale * q[i]
+
+
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+def turn(direction: FloatArray, beta: float, ahead: FloatArray) -> None:
+    """Writes `ahead` + β `direction` to `direction`: the next one of conjugate gradients."""
+    p, q = direction.reshape(-1), ahead.reshape(-1)
+    for i in range(p.shape[0]):
+        p[i] = q[i] + beta * p[i]
