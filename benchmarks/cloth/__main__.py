@@ -20,7 +20,7 @@ from drake_dress.interrupt import caught_interrupt
 
 UNUSABLE, INTERRUPTED = 2, 130
 # In the order of the paper, then what it does not have.
-SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying")
+SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying", "layers")
 _PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
 _QUICK_LIMIT = 1.0
 

@@ -49,11 +49,19 @@ class ExplicitBiasEngine:
         scene: what is simulated.
         time_step: h, s.
         iterations: 1 for the paper's scheme, else the most iterations of the inner solve.
+        thickness: that layers of the garment keep, m; 0 lets them pass.
     """
 
-    def __init__(self, scene: Scene, time_step: float, iterations: int = 1) -> None:
+    def __init__(
+        self, scene: Scene, time_step: float, iterations: int = 1, thickness: float = 0.0
+    ) -> None:
         self.cloth = ExplicitBiasCloth(
-            scene.elements(), scene.material, time_step, scene.held, iterations=iterations
+            scene.elements(),
+            scene.material,
+            time_step,
+            scene.held,
+            iterations=iterations,
+            self_collision=thickness,
         )
         self._obstacles = scene.obstacles
         self.x = scene.first_position().copy()
@@ -108,11 +116,14 @@ class StateEngine:
         return np.asarray(self.state.reaction[self._held])
 
 
-def explicit_bias(iterations: int = 1) -> Recipe:
-    """Returns the controller's scheme with so many inner iterations at most."""
+def explicit_bias(iterations: int = 1, thickness: float = 0.0) -> Recipe:
+    """Returns the controller's scheme with so many inner iterations at most.
+
+    With a thickness, m, it keeps the garment's layers so far apart.
+    """
     return Recipe(
-        f"explicit bias, {iterations} it.",
-        lambda scene, h: ExplicitBiasEngine(scene, h, iterations),
+        f"explicit bias, {iterations} it." + (", layers" if thickness else ""),
+        lambda scene, h: ExplicitBiasEngine(scene, h, iterations, thickness),
     )
 
 

@@ -21,6 +21,7 @@ from benchmarks.cloth import (
     draping,
     garments,
     growth,
+    layers,
     measure,
     motions,
     placement,
@@ -346,3 +347,13 @@ def test_bad_arguments_are_one_line_and_status_2(
 def test_numbers_are_shown_with_three_digits() -> None:
     cells = (0.01234, 1.234, 123.4, float("nan"), None, 0.0, 7)
     assert [shown(cell) for cell in cells] == ["0.0123", "1.23", "123", "–", "–", "0", "7"]
+
+
+def test_layers_are_timed_with_and_without(session: Session) -> None:
+    result = layers.measure(session)
+    assert len(result["runs"]) == 3
+    for run in result["runs"]:
+        assert run["step_s"] > 0.0
+        assert run["ratio"] > 0.0
+    assert "two sheets" in layers.tables(result)[0].text()
+    _assert_json(result)
