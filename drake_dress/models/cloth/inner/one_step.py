@@ -23,7 +23,7 @@ from drake_dress.models.cloth.matrices import Csr
 
 # Contacts from which a factor of its own costs less than iterations, and slipping nodes from which
 # another one does as preconditioner, measured at 6,000 nodes.
-MANY, MANY_SLIPPING = 500, 1500
+MANY, MANY_SLIPPING = 1500, 1500
 _NO_NODES = np.zeros(0, dtype=np.int32)
 _NO_PUSH = np.zeros((0, 3))
 
