@@ -14,7 +14,7 @@ from benchmarks.cloth.comparison import Result
 from benchmarks.cloth.draping import draping_scene
 from benchmarks.cloth.engines import explicit_bias
 from benchmarks.cloth.garments import PAPER_SPACING, QUICK_SPACING, jacket, sheet
-from benchmarks.cloth.measure import Session, race
+from benchmarks.cloth.measure import Session, race, ratio
 from benchmarks.cloth.motions import at_rest
 from benchmarks.cloth.scene import SOFT, Scene
 from benchmarks.cloth.table import Table, milliseconds
@@ -39,17 +39,15 @@ def measure(session: Session) -> Result:
         runs = race(session, scene, [explicit_bias(1), explicit_bias(1, _THICKNESS)], _STEP)
         if len(runs) < 2:
             continue
-        plain, apart = (np.array(run.turn_mean) for run in runs)
-        count = min(len(plain), len(apart))
-        ratio = apart[:count] / plain[:count]
+        plain, apart = runs
         rows.append(
             {
                 "scene": scene.name,
                 "nodes": len(scene.position),
-                "step_s": runs[0].median(),
-                "step_apart_s": runs[1].median(),
-                "ratio": float(np.nanmedian(ratio)),
-                "ratio_end": float(np.nanmedian(ratio[-3:])),
+                "step_s": plain.median(),
+                "step_apart_s": apart.median(),
+                "ratio": ratio(apart, plain),
+                "ratio_end": ratio(apart, plain, last=3),
             }
         )
     return {"thickness_m": _THICKNESS, "time_step_s": _STEP, "runs": rows}
@@ -58,8 +56,8 @@ def measure(session: Session) -> Result:
 def _scenes(quick: bool) -> list[Scene]:
     spacing = QUICK_SPACING if quick else PAPER_SPACING
     time = _QUICK_TIME if quick else _TIME
-    x = jacket(spacing).rest_position
-    faces = jacket(spacing).faces
+    coat = jacket(spacing)
+    x, faces = coat.rest_position, coat.faces
     low = Obstacles.floor(float(x[:, 2].min()) - _ABOVE)
     flat, pieces = sheet(12 if quick else _COLUMNS, _SPACING)
     two = np.vstack([flat, flat + np.array([0.3 * _SPACING, 0.3 * _SPACING, _APART])])

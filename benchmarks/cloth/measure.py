@@ -190,10 +190,14 @@ def _line(run: Run, scene: Scene) -> str:
     ).rstrip()
 
 
-def ratio(run: Run, to: Run) -> float:
-    """Returns how many times as long as `to` a step of `run` took, median over turns."""
+def ratio(run: Run, to: Run, last: int = 0) -> float:
+    """Returns how many times as long as `to` a step of `run` took, median over turns.
+
+    Of the `last` turns alone, if any are asked for.
+    """
     count = min(len(run.turn_mean), len(to.turn_mean))
     both = np.array(run.turn_mean[:count]) / np.array(to.turn_mean[:count])
+    both = both[-last:]
     both = both[np.isfinite(both)]
     return float(np.median(both)) if len(both) else float("nan")
 

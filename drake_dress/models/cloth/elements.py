@@ -108,7 +108,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     weight = 1.0 / (area[hinge_faces[:, 0]] + area[hinge_faces[:, 1]])
     rest = np.linalg.norm(np.einsum("hi,hij->hj", coefficient, x[hinge]), axis=1)
 
-    half_edges = np.sort(triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    half_edges = np.sort(_half_edges(triangle), axis=1)
     edge = np.unique(half_edges, axis=0).astype(np.int32)
     edge_length = np.linalg.norm(x[edge[:, 1]] - x[edge[:, 0]], axis=1)
     return Elements(
@@ -139,6 +139,11 @@ def in_lanes(rows: npt.NDArray) -> npt.NDArray:
     return np.ascontiguousarray(padded.reshape(tiles, LANES, columns).transpose(0, 2, 1))
 
 
+def _half_edges(triangle: IntArray) -> IntArray:
+    """Returns (3F,2) the edges of each triangle in the direction in which it passes them."""
+    return triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
 def _check(x: FloatArray, triangle: IntArray) -> None:
     """Raises an error that names what is wrong with a mesh."""
     n = len(x)
@@ -150,7 +155,7 @@ def _check(x: FloatArray, triangle: IntArray) -> None:
     bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
     if len(bad):
         raise ValueError(f"node {int(bad[0])} rests at {x[bad[0]]}, expected finite numbers")
-    directed = triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    directed = _half_edges(triangle).astype(np.int64)
     face = np.repeat(np.arange(len(triangle)), 3)
     key = directed[:, 0] * n + directed[:, 1]
     order = np.argsort(key, kind="stable")
@@ -170,7 +175,7 @@ def _check(x: FloatArray, triangle: IntArray) -> None:
 
 def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:
     """Returns (H,4) nodes and (H,2) faces of all interior edges."""
-    directed = triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    directed = _half_edges(triangle)
     opposite = triangle[:, [2, 0, 1]].reshape(-1)
     face = np.repeat(np.arange(len(triangle), dtype=np.int32), 3)
     key = np.sort(directed, axis=1)

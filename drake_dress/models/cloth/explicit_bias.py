@@ -476,6 +476,4 @@ def _closing(near: Contacts, time_step: float) -> FloatArray:
 
 def _ahead(near: Contacts, motion: FloatArray, time_step: float) -> FloatArray:
     """Returns the gap (c,) that is left after `motion` (c,3), m."""
-    relative = motion - time_step * near.surface_velocity
-    ahead: FloatArray = near.gap + np.einsum("ij,ij->i", near.normal, relative)
-    return ahead
+    return near.ahead(motion - time_step * near.surface_velocity)

@@ -243,7 +243,7 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
             add(solutions[s], alpha, direction[s])
             add(residual[s], -alpha, product)
             iterations[s] += 1
-            running = True
+            running = running or iterations[s] < most
         if not running:
             return iterations[0], iterations[1]
         solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])

@@ -14,14 +14,19 @@ from drake_dress.models.cloth.matrices import (
 from tests.models.cloth.sheets import sheet_elements
 
 
+def _system() -> sp.csc_matrix:
+    _, e = sheet_elements(12, 15, 0.03)
+    material = Material()
+    return sp.csc_matrix(sp.diags(lumped_mass(e, material)) + 1e-3 * stretch_matrix(e, material))
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.7])
 def test_masked_factor_solves_the_free_block(share: float) -> None:
     rng = np.random.default_rng(5)
-    _, e = sheet_elements(12, 15, 0.03)
-    material = Material()
-    p = sp.csc_matrix(sp.diags(lumped_mass(e, material)) + 1e-3 * stretch_matrix(e, material))
-    masked = rng.random(e.node_count) < share
-    rhs = rng.normal(size=(e.node_count, 3))
+    p = _system()
+    count = p.shape[0]
+    masked = rng.random(count) < share
+    rhs = rng.normal(size=(count, 3))
     solution = SymbolicFactor(p).factorize(masked).solve(rhs)
     free = ~masked
     expected = spla.spsolve(sp.csc_matrix(p[free][:, free]), rhs[free])
@@ -32,17 +37,16 @@ def test_masked_factor_solves_the_free_block(share: float) -> None:
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_part_of_a_factor_solves_between_its_nodes(share: float) -> None:
     rng = np.random.default_rng(6)
-    _, e = sheet_elements(12, 15, 0.03)
-    material = Material()
-    p = sp.csc_matrix(sp.diags(lumped_mass(e, material)) + 1e-3 * stretch_matrix(e, material))
-    masked = rng.random(e.node_count) < share
+    p = _system()
+    count = p.shape[0]
+    masked = rng.random(count) < share
     factor = SymbolicFactor(p).factorize(masked)
     free = np.flatnonzero(~masked).astype(np.int32)
     nodes = rng.choice(free, size=len(free) // 4, replace=False)
     force = rng.normal(size=(len(nodes), 3))
     motion = np.empty_like(force)
     restricted_solve(factor.part(nodes), force, motion)
-    rhs = np.zeros((e.node_count, 3))
+    rhs = np.zeros((count, 3))
     rhs[nodes] = force
     np.testing.assert_allclose(motion, factor.solve(rhs)[nodes], rtol=1e-9, atol=1e-12)
 

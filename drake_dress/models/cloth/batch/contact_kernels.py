@@ -220,7 +220,7 @@ def prescribe_touching(
     """Lets touching nodes follow their surface; new ones close their gap, deep ones leave by it."""
     b, i = wp.tid()
     if mode[b, i] == _STICK:
-        u = h * near.velocity[b, i] - near.gap[b, i] * near.normal[b, i]
+        u = _closing(near, b, i, h)
         prescribed[b, i] = u
         motion[b, i] = u
         target_change[b, i] = near.velocity[b, i] - v[b, i]
@@ -258,7 +258,7 @@ def hold_lying(
     if mode[b, i] != _STICK:
         return
     if near.gap[b, i] <= _CLOSE:
-        motion[b, i] = h * near.velocity[b, i] - near.gap[b, i] * near.normal[b, i]
+        motion[b, i] = _closing(near, b, i, h)
     else:
         lying_mode[b, i] = _FREE
 
@@ -318,6 +318,12 @@ def take_back(
         near.owner[b, i] = spared[b, i]
         mode[b, i] = _STICK
         spared[b, i] = -1
+
+
+@wp.func
+def _closing(near: Proximity, b: wp.int32, i: wp.int32, h: wp.float64) -> wp.vec3d:
+    """Returns the motion of sticking, which ends on the surface."""
+    return h * near.velocity[b, i] - near.gap[b, i] * near.normal[b, i]
 
 
 @wp.func

@@ -93,6 +93,11 @@ class Contacts:
     slope: FloatArray
     surface_velocity: FloatArray
 
+    def ahead(self, relative: FloatArray) -> FloatArray:
+        """Returns the gap (c,) that is left after a motion (c,3) relative to the surface, m."""
+        ahead: FloatArray = self.gap + np.einsum("ij,ij->i", self.normal, relative)
+        return ahead
+
     def chosen(self, some: BoolArray) -> Contacts:
         """Returns those where `some` (c,) is True."""
         if some.all():
@@ -153,8 +158,7 @@ def find_contacts(
         distance_to(at, shapes, met, distance)
         near = _contacts(at, nodes, distance, met, obstacles, margin)
         relative = motion[nodes] - time_step * near.surface_velocity
-    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
-    touching = (near.gap < 0.0) | (touched & (ahead < 0.0))
+    touching = (near.gap < 0.0) | (touched & (near.ahead(relative) < 0.0))
     return near.chosen(touching)
 
 
@@ -175,9 +179,10 @@ def _met_on_the_way(
     distance, who = np.empty(len(at)), np.empty(len(at), dtype=np.int32)
     nearest_obstacle(at + relative, shapes, distance, who)
     inside = distance < margin
-    ahead = near.gap + np.einsum("ij,ij->i", near.normal, relative)
     far = np.einsum("ij,ij->i", relative, relative) > SHORT_WAY**2
-    unclear = np.where(inside, who != near.owner, (ahead < 0.0) | far) & (near.gap > 0.0)
+    unclear = np.where(inside, who != near.owner, (near.ahead(relative) < 0.0) | far) & (
+        near.gap > 0.0
+    )
     touched: BoolArray = inside | (near.gap <= 0.0)
     if unclear.any():
         rows = np.flatnonzero(unclear)

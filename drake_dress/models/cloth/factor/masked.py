@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.kernels import eliminate, factorize, substitute
 from drake_dress.models.cloth.factor.lanes import EIGHT, FOUR
-from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern, permuted_upper
+from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern
 
 # A part is made for fewer nodes than all by this.
 _MANY = 3
@@ -69,8 +69,7 @@ class SymbolicFactor:
     """
 
     def __init__(self, matrix: sp.csc_array) -> None:
-        p = self.pattern = find_pattern(matrix)
-        upper = permuted_upper(matrix, p.permutation)
+        self.pattern, upper = find_pattern(matrix)
         self._upper = (
             upper.indptr.astype(np.int32),
             upper.indices.astype(np.int32),

@@ -47,8 +47,11 @@ class Pattern:
     block_of: IntArray
 
 
-def find_pattern(matrix: sp.csc_matrix) -> Pattern:
-    """Returns the pattern of an (n,n) symmetric positive definite matrix."""
+def find_pattern(matrix: sp.csc_matrix) -> tuple[Pattern, sp.csc_matrix]:
+    """Returns the pattern of an (n,n) symmetric positive definite matrix.
+
+    And its upper triangle in the order of elimination, indices sorted.
+    """
     lu = spla.splu(
         sp.csc_matrix(matrix),
         permc_spec="MMD_AT_PLUS_A",
@@ -57,10 +60,10 @@ def find_pattern(matrix: sp.csc_matrix) -> Pattern:
     )
     # perm_c maps old to new; its argsort is the order of elimination.
     permutation = np.argsort(lu.perm_c).astype(np.int32)
-    parent, _ = _tree(matrix, permutation)
+    parent, _ = _tree(_permuted_upper(matrix, permutation))
     permutation = permutation[_postorder(parent)]
-    parent, counts = _tree(matrix, permutation)
-    upper = permuted_upper(matrix, permutation)
+    upper = _permuted_upper(matrix, permutation)
+    parent, counts = _tree(upper)
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     rows = np.empty(start[-1], dtype=np.int32)
     _column_rows(upper.indptr, upper.indices, parent, start, rows)
@@ -77,7 +80,7 @@ def find_pattern(matrix: sp.csc_matrix) -> Pattern:
     reach_start = np.cumsum(reach_start, dtype=np.int32)
     reach = np.empty(reach_start[-1], dtype=np.int32)
     _find_reach(row_start, row, block_of, reach_start, reach)
-    return Pattern(
+    pattern = Pattern(
         permutation,
         np.argsort(permutation).astype(np.int32),
         first,
@@ -89,20 +92,19 @@ def find_pattern(matrix: sp.csc_matrix) -> Pattern:
         reach,
         block_of,
     )
+    return pattern, upper
 
 
-def permuted_upper(matrix: sp.csc_matrix, permutation: IntArray) -> sp.csc_matrix:
-    """Returns the upper triangle of a matrix in the order of elimination, indices sorted."""
+def _permuted_upper(matrix: sp.csc_matrix, permutation: IntArray) -> sp.csc_matrix:
     permuted = sp.csc_matrix(matrix)[permutation][:, permutation]
     upper = sp.csc_matrix(sp.triu(permuted))
     upper.sort_indices()
     return upper
 
 
-def _tree(matrix: sp.csc_matrix, permutation: IntArray) -> tuple[IntArray, IntArray]:
+def _tree(upper: sp.csc_matrix) -> tuple[IntArray, IntArray]:
     """Returns the elimination tree (n,), -1 for roots, and how many rows each column has (n,)."""
-    n = matrix.shape[0]
-    upper = permuted_upper(matrix, permutation)
+    n = upper.shape[0]
     parent, counts = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     _elimination_tree(n, upper.indptr, upper.indices, parent, counts)
     return parent, counts

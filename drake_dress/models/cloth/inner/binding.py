@@ -254,26 +254,12 @@ def _condition(conditioner, mode, normal, residual, out, z, force):  # type: ign
         matrix_product(indptr, indices, data, z, force)
     else:
         others[:] = 0.0
-        for k in range(nodes.shape[0]):
-            i = nodes[k]
-            for q in range(indptr[i], indptr[i + 1]):
-                for c in range(3):
-                    others[indices[q], c] -= data[q] * z[k, c]
+        subtract_columns(indptr, indices, data, nodes, z, others)
         solve_into(blocks, permutation, others, moved, work)
         for k in range(nodes.shape[0]):
             for c in range(3):
                 moved[nodes[k], c] = z[k, c]
-        for k in range(nodes.shape[0]):
-            i = nodes[k]
-            f0, f1, f2 = 0.0, 0.0, 0.0
-            for q in range(indptr[i], indptr[i + 1]):
-                j = indices[q]
-                f0 += data[q] * moved[j, 0]
-                f1 += data[q] * moved[j, 1]
-                f2 += data[q] * moved[j, 2]
-            force[k, 0] = f0
-            force[k, 1] = f1
-            force[k, 2] = f2
+        product_rows(indptr, indices, data, nodes, moved, force)
     _reduce(force, mode, normal, out)
 
 
@@ -314,6 +300,33 @@ def _reduce(z, mode, direction, out):  # type: ignore[no-untyped-def]
             out[at + 1] = z[i, 1]
             out[at + 2] = z[i, 2]
             at += 3
+
+
+@nb.njit(cache=True, nogil=True)
+def subtract_columns(indptr, indices, data, nodes, z, out):  # type: ignore[no-untyped-def]
+    """Takes P E `z` (k,3) off `out` (n,3), in place, for a symmetric CSR matrix P."""
+    for k in range(nodes.shape[0]):
+        i = nodes[k]
+        for q in range(indptr[i], indptr[i + 1]):
+            j = indices[q]
+            for c in range(3):
+                out[j, c] -= data[q] * z[k, c]
+
+
+@nb.njit(cache=True, nogil=True)
+def product_rows(indptr, indices, data, nodes, z, out):  # type: ignore[no-untyped-def]
+    """Writes the rows of P z, (n,3), at `nodes` (k,) to `out` (k,3)."""
+    for k in range(nodes.shape[0]):
+        i = nodes[k]
+        f0, f1, f2 = 0.0, 0.0, 0.0
+        for q in range(indptr[i], indptr[i + 1]):
+            j = indices[q]
+            f0 += data[q] * z[j, 0]
+            f1 += data[q] * z[j, 1]
+            f2 += data[q] * z[j, 2]
+        out[k, 0] = f0
+        out[k, 1] = f1
+        out[k, 2] = f2
 
 
 @nb.njit(cache=True, nogil=True)

@@ -10,14 +10,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
-from drake_dress.models.cloth.inner.binding import bind, by_all, by_neighbours
+from drake_dress.models.cloth.inner.binding import (
+    bind,
+    by_all,
+    by_neighbours,
+    product_rows,
+    subtract_columns,
+)
 from drake_dress.models.cloth.inner.interface import directions_of_exact
 from drake_dress.models.cloth.matrices import Csr
 
@@ -53,6 +58,7 @@ class OneStep:
         tolerance: of the motion of nodes in contact, relative to how far they are moved.
         max_iterations: of conjugate gradients and of GMRES.
         many: contacts from which sticking nodes are left out of a factor of their own.
+        many_slipping: slipping nodes from which a factor without them preconditions.
     """
 
     depends_on_position = False
@@ -65,6 +71,7 @@ class OneStep:
         tolerance: float,
         max_iterations: int = 300,
         many: int = MANY,
+        many_slipping: int = MANY_SLIPPING,
     ) -> None:
         n = p.shape[0]
         masked = np.zeros(n, dtype=np.bool_)
@@ -76,6 +83,7 @@ class OneStep:
         self.symbolic = SymbolicFactor(p)
         self.factor: Factor = self.symbolic.factorize(masked)
         self.many = many
+        self.many_slipping = many_slipping
         self.tolerance = tolerance
         self.max_iterations = max_iterations
         self.node_count = n
@@ -109,7 +117,7 @@ class OneStepSystem:
         rhs = []
         for right, held in (motion, change):
             r = right.copy()
-            _subtract_held(m.indptr, m.indices, m.data, s.held, held, r)
+            subtract_columns(m.indptr, m.indices, m.data, s.held, held, r)
             rhs.append(r)
         first, second = s.factor.solve_pair(*rhs)
         first[s.held] = motion[1]
@@ -174,14 +182,14 @@ class OneStepSystem:
         free = unknown.free[nodes]
         lack = target - free
         rhs = np.zeros_like(unknown.free)
-        _subtract_held(m.indptr, m.indices, m.data, nodes[stick], lack[stick], rhs)
+        subtract_columns(m.indptr, m.indices, m.data, nodes[stick], lack[stick], rhs)
         correction = factor.solve(rhs)
         correction[nodes[stick]] = lack[stick]
         force = np.zeros_like(lack)
         multiplier = np.zeros(len(nodes))
         if len(slip):
             sliding = nodes[slip]
-            if len(slip) > MANY_SLIPPING:
+            if len(slip) > s.many_slipping:
                 bound_nodes = nodes[(mode == STICK) | (mode == SLIP)]
                 conditioner = by_all(m, self._factor_without(bound_nodes), sliding)
             else:
@@ -204,7 +212,7 @@ class OneStepSystem:
             rhs[sliding] = bound
             correction += factor.solve(rhs)
         rows = np.empty((len(stick), 3))
-        _rows(m.indptr, m.indices, m.data, nodes[stick], correction, rows)
+        product_rows(m.indptr, m.indices, m.data, nodes[stick], correction, rows)
         force[stick] = rows
         multiplier[stick] = np.einsum("ij,ij->i", rows, normal[stick])
         unknown.force, unknown.multiplier, unknown.change = force, multiplier, correction
@@ -296,35 +304,15 @@ class OneStepSystem:
         """See `StepSystem`."""
         s, m = self._scheme, self._scheme.matrix
         out = np.empty((len(s.held), 3))
-        _rows(m.indptr, m.indices, m.data, s.held, z, out)
+        product_rows(m.indptr, m.indices, m.data, s.held, z, out)
         return out
 
     def _solution(self, unknown: ForcedUnknown) -> FloatArray:
         if unknown.force is None:
             return unknown.free
+        if unknown.change is not None:
+            return unknown.free + unknown.change
         forces = np.zeros_like(unknown.free)
         forces[self._nodes] = unknown.force
         solution: FloatArray = unknown.free + self._scheme.factor.solve(forces)
         return solution
-
-
-@nb.njit(cache=True, nogil=True)
-def _subtract_held(indptr, indices, data, held, motion, rhs):  # type: ignore[no-untyped-def]
-    """Takes P_fh `motion` (k,3) off `rhs` (n,3), in place; rows of held nodes have no meaning."""
-    for k in range(held.shape[0]):
-        i = held[k]
-        for q in range(indptr[i], indptr[i + 1]):
-            j = indices[q]
-            for c in range(3):
-                rhs[j, c] -= data[q] * motion[k, c]
-
-
-@nb.njit(cache=True, nogil=True)
-def _rows(indptr, indices, data, nodes, z, out):  # type: ignore[no-untyped-def]
-    for k in range(nodes.shape[0]):
-        i = nodes[k]
-        for c in range(3):
-            out[k, c] = 0.0
-        for q in range(indptr[i], indptr[i + 1]):
-            for c in range(3):
-                out[k, c] += data[q] * z[indices[q], c]
