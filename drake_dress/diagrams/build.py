@@ -27,6 +27,8 @@ def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat
             material=material(scenario.plant.material),
             time_step=scenario.plant.time_step,
             integrator=scenario.plant.integrator,
+            iterations=scenario.plant.iterations,
+            tolerance=scenario.plant.tolerance,
             self_collision=scenario.plant.self_collision,
             measures=measures(person),
             posture=posture(person),

@@ -52,6 +52,8 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
     given = {
         entry.name: getattr(coat, entry.name)
         for entry in fields(coat)
-        if entry.name not in ("preset", "scale") and getattr(coat, entry.name) is not None
+        if entry.name not in ("preset", "scale", "grasp") and getattr(coat, entry.name) is not None
     }
+    if coat.grasp == "seam":
+        parameters = replace(parameters, grasp_count=0)
     return make_coat(replace(parameters, **given), spacing, source="garment.coat")

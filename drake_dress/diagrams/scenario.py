@@ -35,6 +35,9 @@ class Coat:
     cuff_girth: float | None = None
     collar_height: float | None = None
     front_opening: float | None = None  # between the front edges, part of the chest girth
+    # What each gripper holds: a patch of ten nodes, or the whole shoulder seam, as a hanger does;
+    # the seam is the same at every spacing, a patch of nodes is not.
+    grasp: str = "patch"
 
 
 @dataclass
@@ -128,6 +131,8 @@ class Plant:
     spacing: float = 0.02  # of the garment's mesh, m
     time_step: float = 0.004  # s
     integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
+    iterations: int = 40  # of the implicit integrator's linear solver, at most
+    tolerance: float = 5e-3  # relative residual at which it stops
     self_collision: bool = False  # layers of the garment do not pass through each other
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
@@ -238,6 +243,7 @@ class Scenario:
 # Words that a text may be (Drake's loader has no literal types).
 _CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
+    "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": ("m", "cm", "mm"),
     "person.posture": ("standing", "sitting"),
     "plant.integrator": ("implicit", "projective_dynamics"),
@@ -258,6 +264,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "plant.spacing": (0.01, 0.06),
     "controller.spacing": (0.01, 0.06),
     "plant.time_step": (1e-4, 0.05),
+    "plant.iterations": (1, 1000),
+    "plant.tolerance": (1e-10, 0.5),
     "shoulder_stiffness": (0.0, 1000.0),
     "shoulder_damping": (0.0, 1000.0),
     "elbow_stiffness": (0.0, 1000.0),

@@ -57,6 +57,8 @@ class StationParameters:
     height_offset: float = 0.0
     lateral_offset: float = 0.0
     integrator: str = "implicit"
+    iterations: int = 40
+    tolerance: float = 5e-3
     self_collision: bool = False
 
 
@@ -142,7 +144,14 @@ def _integrator(p: StationParameters, elements: Elements, held: np.ndarray) -> I
             elements, p.material, p.time_step, held, quasi_newton=True
         )
     else:
-        integrator = ImplicitCloth(elements, p.material, p.time_step, held)
+        integrator = ImplicitCloth(
+            elements,
+            p.material,
+            p.time_step,
+            held,
+            tolerance=p.tolerance,
+            max_iterations=p.iterations,
+        )
     return LayeredCloth(integrator) if p.self_collision else integrator
 
 

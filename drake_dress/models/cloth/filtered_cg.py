@@ -15,6 +15,8 @@ import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, solve_into, solve_pair_into
+from drake_dress.models.cloth.fibres import Fibres, no_fibres
+from drake_dress.models.cloth.fibres import filtered_product as fibre_product
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
@@ -30,6 +32,7 @@ class SystemMatrix:
         inverse_diagonal: (n,) of P, for nodes that the factor leaves out but contact does not.
         elements: the rest shape, or None if A has no filtered stretch.
         scale: of the filtered stretch, s².
+        fibres: further stretch along one direction a triangle; `prepare_fibres` before a product.
     """
 
     def __init__(
@@ -38,20 +41,32 @@ class SystemMatrix:
         inverse_diagonal: FloatArray,
         elements: Elements | None = None,
         scale: float = 0.0,
+        fibres: Fibres | None = None,
     ) -> None:
         if elements is None:
             triangle = np.zeros((0, 3, LANES), dtype=np.uint32)
             gradient, scale = np.zeros((0, 5, LANES)), 0.0
         else:
             triangle, gradient = elements.triangle_lanes, elements.gradient_lanes
-        self._operator = (linear.indptr, linear.indices, linear.data, triangle, gradient)
+        f = fibres or no_fibres()
+        self._fibres = f
+        self._fibre_block = np.zeros((0, 4))
+        self._linear = (linear.indptr, linear.indices, linear.data)
+        self._elements = (triangle, gradient, f.triangle, f.coefficient, f.weight)
         self._scale = scale
         self._inverse_diagonal = inverse_diagonal
+
+    def prepare_fibres(self, x: FloatArray) -> None:
+        """Takes the fibres' directions from positions `x` (n,3), m."""
+        self._fibre_block = self._fibres.prepare(x)
+
+    def _operator(self, block: FloatArray) -> tuple[object, ...]:
+        return (*self._linear, *self._elements, self._fibre_block, block, self._scale)
 
     def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
         """Returns A z (n,3); `block` is what `prepare_filtered` wrote for this state."""
         out = np.empty_like(z)
-        _apply((*self._operator, block, self._scale), z, out)
+        _apply(self._operator(block), z, out)
         return out
 
     def solve(
@@ -76,7 +91,7 @@ class SystemMatrix:
         """
         f = factor
         return _filtered_cg(
-            (*self._operator, block, self._scale),
+            self._operator(block),
             (f.blocks, f.pattern.permutation),
             f.masked,
             self._inverse_diagonal,
@@ -106,7 +121,7 @@ class SystemMatrix:
             Iterations done for each.
         """
         return _filtered_cg_pair(
-            (*self._operator, block, self._scale),
+            self._operator(block),
             (factor.blocks, factor.pattern.permutation),
             factor.masked,
             *rhs,
@@ -119,10 +134,13 @@ class SystemMatrix:
 @nb.njit(cache=True, nogil=True)
 def _apply(operator, z, out):  # type: ignore[no-untyped-def]
     """Writes A z (n,3) into `out`."""
-    indptr, indices, data, triangle, gradient, block, scale = operator
+    indptr, indices, data, triangle, gradient, corners, share, weight, fibres, block, scale = (
+        operator
+    )
     matrix_product(indptr, indices, data, z, out)
     if scale != 0.0:
         filtered_product(z, triangle, gradient, block, scale, out)
+        fibre_product(z, corners, share, weight, fibres, scale, out)
 
 
 @nb.njit(cache=True, nogil=True)

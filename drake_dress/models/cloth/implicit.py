@@ -20,6 +20,7 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
+from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.filtered_cg import (
     FREE,
     HELD,
@@ -31,6 +32,7 @@ from drake_dress.models.cloth.filtered_cg import (
 from drake_dress.models.cloth.filtered_stiffness import no_stretch, prepare_filtered
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
+from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -110,6 +112,8 @@ class ImplicitCloth:
         max_passes: of the active-set iteration, per step; what is left over is mended in the next.
         sample_elements: contact at edge midpoints and face centroids too.
         most_cone_passes: solves added, at most, while nodes stick beyond what friction can hold.
+        fibres: further stiffness of the triangles along a direction of theirs.
+        added_mass: (n,) further mass of the nodes, kg.
     """
 
     def __init__(
@@ -124,6 +128,8 @@ class ImplicitCloth:
         max_passes: int = 2,
         sample_elements: bool = True,
         most_cone_passes: int = 3,
+        fibres: Fibres | None = None,
+        added_mass: FloatArray | None = None,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -131,6 +137,9 @@ class ImplicitCloth:
         self.held = np.asarray(held, dtype=np.int32)
         self.gravity = np.asarray(gravity, dtype=np.float64)
         self.mass = lumped_mass(elements, material)
+        if added_mass is not None:
+            self.mass = self.mass + added_mass
+        self._fibres = fibres
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._max_passes = max_passes
@@ -142,17 +151,23 @@ class ImplicitCloth:
         bending = bending_matrix(elements, material)
         mass = sp.diags(self.mass)
         stiffness_bound = stretch_matrix(elements, material) + bending_bound(elements, material)
+        if fibres is not None:
+            stiffness_bound = stiffness_bound + fibres.matrix(elements.node_count)
         p = sp.csc_matrix(mass + scale * stiffness_bound)
         self._symbolic = SymbolicFactor(p)
         self._system = SystemMatrix(
-            Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale
+            Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale, fibres
         )
         self._block = no_stretch()
         self._factor: Factor | None = None
         self._steps_since_factor = 0
 
     def step(
-        self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences = NO_INFLUENCES,
     ) -> tuple[ClothState, StepInfo]:
         """Returns the state one time step later.
 
@@ -160,15 +175,23 @@ class ImplicitCloth:
             state: now.
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
+            influences: what else acts on the garment.
 
         Raises:
             ValueError: something is not finite; the message names it.
         """
-        e, m, h = self.elements, self.material, self.time_step
+        m, h = self.material, self.time_step
+        e = influences.stiffened(self.elements)
         x, v = state.x, state.v
+        mu, adhesion = influences.contact_law(m.friction, len(x))
         force = internal_force(e, m.stretch_stiffness, m.bending_stiffness, x)
         self._block = prepare_filtered(e, m.stretch_stiffness, x)
         force += self.mass[:, None] * self.gravity
+        if self._fibres is not None:
+            self._fibres.add_force(x, force)
+            self._system.prepare_fibres(x)
+        if influences.force is not None:
+            force += influences.force
         rhs = self.mass[:, None] * v + h * force
 
         near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)
@@ -191,7 +214,7 @@ class ImplicitCloth:
             near.gap > 0.0, -near.gap / h, np.minimum(-0.5 * near.gap / h, _LARGEST_PUSH)
         )
         friction = np.zeros_like(x)
-        _initial_friction(state.reaction, near.normal, m.friction * h, mode, friction)
+        _initial_friction(state.reaction, near.normal, h, mu, adhesion, mode, friction)
 
         velocity = self._start(v, held_velocity, mode, near.normal, rhs)
         total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
@@ -218,7 +241,9 @@ class ImplicitCloth:
             passes += 1
             if last:
                 # Sticking may not hold more than friction can: what does slides after all.
-                if left > 0 and _slip_out_of_cone(near.normal, impulse, m.friction, mode, friction):
+                if left > 0 and _slip_out_of_cone(
+                    near.normal, impulse, mu, h * adhesion, mode, friction
+                ):
                     left -= 1
                     continue
                 break
@@ -229,7 +254,8 @@ class ImplicitCloth:
                 push,
                 velocity,
                 impulse,
-                m.friction,
+                mu,
+                h * adhesion,
                 mode,
                 friction,
             )
@@ -336,7 +362,7 @@ def _landing_mode(v, surface_velocity, normal, i):  # type: ignore[no-untyped-de
 
 
 @nb.njit(cache=True, nogil=True)
-def _initial_friction(reaction, normal, bound, mode, friction):  # type: ignore[no-untyped-def]
+def _initial_friction(reaction, normal, h, mu, adhesion, mode, friction):  # type: ignore[no-untyped-def]
     """Starts slipping nodes from the friction impulse of the step before."""
     for i in range(mode.shape[0]):
         if mode[i] != SLIP:
@@ -351,8 +377,9 @@ def _initial_friction(reaction, normal, bound, mode, friction):  # type: ignore[
             size += t * t
         size = np.sqrt(size)
         scale = 0.0
+        along += adhesion[i]
         if size > 0.0 and along > 0.0:
-            scale = bound * along / size
+            scale = h * mu[i] * along / size
         for c in range(3):
             friction[i, c] *= scale
 
@@ -372,7 +399,7 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
 
 
 @nb.njit(cache=True, nogil=True)
-def _slip_out_of_cone(normal, impulse, mu, mode, friction):  # type: ignore[no-untyped-def]
+def _slip_out_of_cone(normal, impulse, mu, adhesion, mode, friction):  # type: ignore[no-untyped-def]
     """Lets sticking nodes slip whose friction exceeds the cone; returns if it matters in sum."""
     excess = 0.0
     bound = 0.0
@@ -382,16 +409,17 @@ def _slip_out_of_cone(normal, impulse, mu, mode, friction):  # type: ignore[no-u
         pressure = 0.0
         for c in range(3):
             pressure += impulse[i, c] * normal[i, c]
+        most = mu[i] * max(pressure + adhesion[i], 0.0)
         pressure = max(pressure, 0.0)
-        bound += mu * pressure
+        bound += most
         if mode[i] == SLIP:
             continue
         tangential = 0.0
         for c in range(3):
             tangential += (impulse[i, c] - pressure * normal[i, c]) ** 2
         tangential = np.sqrt(tangential)
-        if tangential > mu * pressure:
-            excess += tangential - mu * pressure
+        if tangential > most:
+            excess += tangential - most
     if excess <= _TOLERATED_EXCESS * bound:
         return False
     for i in range(mode.shape[0]):
@@ -400,6 +428,7 @@ def _slip_out_of_cone(normal, impulse, mu, mode, friction):  # type: ignore[no-u
         pressure = 0.0
         for c in range(3):
             pressure += impulse[i, c] * normal[i, c]
+        most = mu[i] * max(pressure + adhesion[i], 0.0)
         pressure = max(pressure, 0.0)
         if mode[i] == SLIP:
             size = 0.0
@@ -408,23 +437,23 @@ def _slip_out_of_cone(normal, impulse, mu, mode, friction):  # type: ignore[no-u
             size = np.sqrt(size)
             if size > 0.0:
                 for c in range(3):
-                    friction[i, c] *= mu * pressure / size
+                    friction[i, c] *= most / size
             continue
         tangential = 0.0
         for c in range(3):
             tangential += (impulse[i, c] - pressure * normal[i, c]) ** 2
         tangential = np.sqrt(tangential)
-        if tangential > mu * pressure:
+        if tangential > most:
             mode[i] = SLIP
             for c in range(3):
                 t = impulse[i, c] - pressure * normal[i, c]
-                friction[i, c] = mu * pressure * t / tangential
+                friction[i, c] = most * t / tangential
     return True
 
 
 @nb.njit(cache=True, nogil=True)
 def _update_modes(  # type: ignore[no-untyped-def]
-    gap, normal, surface_velocity, push, velocity, impulse, mu, mode, friction
+    gap, normal, surface_velocity, push, velocity, impulse, mu, adhesion, mode, friction
 ):
     """One round of the active set; returns how many nodes changed what binds them."""
     changed = 0
@@ -444,7 +473,8 @@ def _update_modes(  # type: ignore[no-untyped-def]
         pressure = 0.0
         for c in range(3):
             pressure += impulse[i, c] * normal[i, c]
-        if pressure < 0.0:
+        most = mu[i] * max(pressure + adhesion[i], 0.0)
+        if pressure < -adhesion[i]:
             mode[i] = FREE
             for c in range(3):
                 friction[i, c] = 0.0
@@ -456,11 +486,11 @@ def _update_modes(  # type: ignore[no-untyped-def]
                 t = impulse[i, c] - pressure * normal[i, c]
                 tangential += t * t
             tangential = np.sqrt(tangential)
-            if tangential > mu * pressure:
+            if tangential > most:
                 mode[i] = SLIP
                 for c in range(3):
                     t = impulse[i, c] - pressure * normal[i, c]
-                    friction[i, c] = mu * pressure * t / tangential
+                    friction[i, c] = most * t / tangential
                 changed += 1
             continue
         speed = 0.0
@@ -482,7 +512,7 @@ def _update_modes(  # type: ignore[no-untyped-def]
             for c in range(3):
                 old += friction[i, c] ** 2
             old = np.sqrt(old)
-            new = mu * pressure
+            new = most
             for c in range(3):
                 w = velocity[i, c] - surface_velocity[i, c] - push[i] * normal[i, c]
                 target = friction[i, c]

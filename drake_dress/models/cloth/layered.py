@@ -16,6 +16,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import HELD, STICK
 from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.layers.separation import LayerSeparation
 from drake_dress.models.cloth.material import Material
 
@@ -34,7 +35,11 @@ class Integrator(Protocol):
     gravity: FloatArray
 
     def step(
-        self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences = NO_INFLUENCES,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later, and how it was solved."""
 
@@ -62,10 +67,14 @@ class LayeredCloth:
         self._layers = LayerSeparation(integrator.elements, thickness)
 
     def step(
-        self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences = NO_INFLUENCES,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
-        after, info = self._integrator.step(state, obstacles, held_velocity)
+        after, info = self._integrator.step(state, obstacles, held_velocity, influences)
         near = find_proximity(state.x, obstacles, self.material.margin)
         barred = np.where((near.gap < _ON_THE_PERSON)[:, None], near.normal, 0.0)
         x, v = separate(

@@ -14,6 +14,9 @@ because h² ∇E(x) = P x − M y − h² Σ w Aᵀp. P is constant: one factor 
 rises, as the quadratic with p held lies above it. `quasi_newton` uses P⁻¹ as the first guess of
 L-BFGS, with a line search on E (Liu, Bouaziz and Kavan 2017).
 
+Damping adds β/(2h) (x − x_n)ᵀ K₊(x_n) (x − x_n) to E, with the filtered stiffness that
+`ImplicitCloth` damps with, and hβ Σ w AᵀA to P.
+
 Contact is found at every iterate (`iterated_contact.py`) and leaves nodes without some of their
 freedom (`projected_system.py`). The iteration stops at an estimate of how far the fixed point still
 is (`stopping_rule.py`).
@@ -30,12 +33,16 @@ import scipy.sparse as sp
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK, project
+from drake_dress.models.cloth.fibres import Fibres
+from drake_dress.models.cloth.fibres import filtered_product as fibre_product
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product, project
+from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
-from drake_dress.models.cloth.implicit import GRAVITY, ClothState
+from drake_dress.models.cloth.implicit import GRAVITY, ClothState, ImplicitCloth
+from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.matrices import bending_matrix, lumped_mass, stretch_matrix
+from drake_dress.models.cloth.matrices import Csr, bending_matrix, lumped_mass, stretch_matrix
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
 from drake_dress.models.cloth.projective.projected_system import ProjectedSystem
 from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory, dot
@@ -80,13 +87,17 @@ class ProjectiveDynamicsCloth:
 
     Args:
         elements: the rest shape.
-        material: SI values; `damping` is not used, implicit Euler damps by itself.
+        material: SI values.
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
         tolerance: estimated distance to the fixed point at which a step is done, m.
         max_iterations: global steps at most; the info says if they did not suffice.
         quasi_newton: L-BFGS instead of the plain iteration.
+        fibres: further stiffness of the triangles along a direction of theirs.
+        added_mass: (n,) further mass of the nodes, kg.
+        predicted: start each step from the linearly implicit one; where that is near, few
+            iterations are left.
     """
 
     def __init__(
@@ -99,6 +110,9 @@ class ProjectiveDynamicsCloth:
         tolerance: float = 1e-5,
         max_iterations: int = 5000,
         quasi_newton: bool = False,
+        fibres: Fibres | None = None,
+        added_mass: FloatArray | None = None,
+        predicted: bool = False,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -106,16 +120,40 @@ class ProjectiveDynamicsCloth:
         self.held = np.asarray(held, dtype=np.int32)
         self.gravity = np.asarray(gravity, dtype=np.float64)
         self.mass = lumped_mass(elements, material)
+        if added_mass is not None:
+            self.mass = self.mass + added_mass
+        self._fibres = fibres
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._quasi_newton = quasi_newton
 
-        stiffness = stretch_matrix(elements, material) + bending_matrix(elements, material)
-        p = sp.csc_matrix(sp.diags(self.mass) + time_step**2 * stiffness)
-        self._system = ProjectedSystem(p)
+        bending = bending_matrix(elements, material)
+        stiffness = stretch_matrix(elements, material) + bending
+        if fibres is not None:
+            stiffness = stiffness + fibres.matrix(elements.node_count)
+        scale = time_step * (time_step + material.damping)
+        self._system = ProjectedSystem(sp.csc_matrix(sp.diags(self.mass) + scale * stiffness))
+        self._bending = Csr.of(bending)
+        self._predictor = None
+        if predicted:
+            self._predictor = ImplicitCloth(
+                elements,
+                material,
+                time_step,
+                held,
+                gravity,
+                tolerance=1e-3,
+                sample_elements=False,
+                fibres=fibres,
+                added_mass=added_mass,
+            )
 
     def step(
-        self, state: ClothState, obstacles: Obstacles, held_velocity: FloatArray
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences = NO_INFLUENCES,
     ) -> tuple[ClothState, ProjectiveInfo]:
         """Returns the state one time step later.
 
@@ -123,6 +161,7 @@ class ProjectiveDynamicsCloth:
             state: now.
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
+            influences: what else acts on the garment.
 
         Raises:
             ValueError: something in the input is not finite.
@@ -131,6 +170,7 @@ class ProjectiveDynamicsCloth:
         if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):
             explain_not_finite(state.x, state.v, held_velocity, self.held)
         material = self.material
+        mu, adhesion = influences.contact_law(material.friction, n)
         contact = IteratedContact(
             state.x,
             state.mode,
@@ -140,17 +180,25 @@ class ProjectiveDynamicsCloth:
             obstacles,
             self.mass,
             h,
-            material.friction,
+            mu,
+            adhesion,
             material.margin,
             self._tolerance,
         )
         self._system.start_counting()
         inertial = state.x + h * state.v + h * h * self.gravity
+        if influences.force is not None:
+            inertial += h * h * influences.force / self.mass[:, None]
+        equations = _Equations(self, inertial, state.x, influences)
         fall, steady = inertial.copy(), state.x + h * state.v
         fall[self.held] = steady[self.held] = state.x[self.held] + h * held_velocity
         # a falling garment falls on, a hanging one goes on as before
-        falls = self._energy(fall, inertial) < self._energy(steady, inertial)
-        x = contact.place(fall if falls else steady, steady)
+        falls = equations.energy(fall) < equations.energy(steady)
+        guess = fall if falls else steady
+        if self._predictor is not None:
+            ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences)
+            guess = steady = ahead.x
+        x = contact.place(guess, steady)
         history = CurvatureHistory(_WINDOW, n) if self._quasi_newton else None
         stop = StoppingRule(self._tolerance)
         before = x.copy()
@@ -158,7 +206,7 @@ class ProjectiveDynamicsCloth:
         iterations = 0
         while True:
             changes = contact.bind(x)
-            gradient = self._gradient(x, inertial)
+            gradient = equations.gradient(x)
             changes += contact.classify(gradient)
             if iterations > 0:
                 if changes:
@@ -180,7 +228,7 @@ class ProjectiveDynamicsCloth:
             old_gradient = gradient
             motion = self._motion(gradient - contact.friction, contact, history)
             if history is not None:
-                self._shorten(x, motion, inertial, gradient, contact, history)
+                self._shorten(x, motion, equations, gradient, contact, history)
             contact.shorten(x, motion)
             x += motion
             iterations += 1
@@ -204,19 +252,6 @@ class ProjectiveDynamicsCloth:
             changes,
         )
 
-    def _energy(self, x: FloatArray, inertial: FloatArray) -> float:
-        """Returns h² E(x), kg m²."""
-        m = self.material
-        elastic = elastic_energy(self.elements, m.stretch_stiffness, m.bending_stiffness, x)
-        return float(_inertia_energy(x, inertial, self.mass)) + self.time_step**2 * elastic
-
-    def _gradient(self, x: FloatArray, inertial: FloatArray) -> FloatArray:
-        """Returns h² ∇E(x) (n,3), kg m."""
-        m = self.material
-        out = internal_force(self.elements, m.stretch_stiffness, m.bending_stiffness, x)
-        _add_inertia(x, inertial, self.mass, self.time_step**2, out)
-        return out
-
     def _motion(
         self, gradient: FloatArray, contact: IteratedContact, history: CurvatureHistory | None
     ) -> FloatArray:
@@ -234,7 +269,7 @@ class ProjectiveDynamicsCloth:
         self,
         x: FloatArray,
         motion: FloatArray,
-        inertial: FloatArray,
+        equations: _Equations,
         gradient: FloatArray,
         contact: IteratedContact,
         history: CurvatureHistory,
@@ -245,17 +280,76 @@ class ProjectiveDynamicsCloth:
         """
         force = gradient - contact.friction
         slope = dot(force, motion)
-        start = self._energy(x, inertial)
+        start = equations.energy(x)
         noise = _ROUNDING * abs(start)
         for _ in range(_MOST_HALVINGS):
             resisted = dot(contact.friction, motion)
             resisted -= 0.5 * float(np.einsum("i,ij,ij->", contact.resistance, motion, motion))
-            if self._energy(x + motion, inertial) - resisted <= start + _ARMIJO * slope + noise:
+            if equations.energy(x + motion) - resisted <= start + _ARMIJO * slope + noise:
                 return
             motion *= 0.5
             slope *= 0.5
         history.clear()
         motion[:] = self._system.solve(-force, contact)
+
+
+class _Equations:
+    """What a step minimises, and its gradient."""
+
+    def __init__(
+        self,
+        cloth: ProjectiveDynamicsCloth,
+        inertial: FloatArray,
+        x: FloatArray,
+        influences: Influences,
+    ) -> None:
+        m = cloth.material
+        self._elements = influences.stiffened(cloth.elements)
+        self._stiffness = (m.stretch_stiffness, m.bending_stiffness)
+        self._mass, self._inertial, self._before = cloth.mass, inertial, x
+        self._h2 = cloth.time_step**2
+        self._fibres = cloth._fibres
+        self._damping = cloth.time_step * m.damping
+        self._bending = cloth._bending
+        if self._damping > 0.0:
+            self._block = prepare_filtered(self._elements, m.stretch_stiffness, x)
+            if self._fibres is not None:
+                self._fibre_block = self._fibres.prepare(x)
+
+    def energy(self, x: FloatArray) -> float:
+        """Returns h² E(x), kg m²."""
+        elastic = elastic_energy(self._elements, *self._stiffness, x)
+        if self._fibres is not None:
+            elastic += self._fibres.energy(x)
+        total = float(_inertia_energy(x, self._inertial, self._mass)) + self._h2 * elastic
+        if self._damping > 0.0:
+            motion = x - self._before
+            total += 0.5 * dot(motion, self._damped(motion))
+        return total
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Returns h² ∇E(x) (n,3), kg m."""
+        out = internal_force(self._elements, *self._stiffness, x)
+        if self._fibres is not None:
+            self._fibres.add_force(x, out)
+        _add_inertia(x, self._inertial, self._mass, self._h2, out)
+        if self._damping > 0.0:
+            out += self._damped(x - self._before)
+        return out
+
+    def _damped(self, motion: FloatArray) -> FloatArray:
+        out = np.empty_like(motion)
+        b, e, f = self._bending, self._elements, self._fibres
+        matrix_product(b.indptr, b.indices, b.data, motion, out)
+        out *= self._damping
+        filtered_product(
+            motion, e.triangle_lanes, e.gradient_lanes, self._block, self._damping, out
+        )
+        if f is not None:
+            fibre_product(
+                motion, f.triangle, f.coefficient, f.weight, self._fibre_block, self._damping, out
+            )
+        return out
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True)

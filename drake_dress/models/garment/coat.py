@@ -50,7 +50,7 @@ class CoatParameters:
     front_opening: float = 0.22  # between the front edges at the underarm, part of the chest girth
     shoulder_slope: float = 0.04  # height of the seam's inner end above its outer end
     grasp_fraction: float = 0.75  # where a gripper holds, from neck (0) to shoulder tip (1)
-    grasp_count: int = 10  # nodes that one gripper holds
+    grasp_count: int = 10  # nodes that one gripper holds; 0: its whole shoulder seam
 
 
 COATS = {
@@ -113,7 +113,7 @@ _RANGES = {
     "front_opening": (0.01, 0.4),
     "shoulder_slope": (0.0, 0.08),
     "grasp_fraction": (0.0, 1.0),
-    "grasp_count": (1, 60),
+    "grasp_count": (0, 60),
 }
 _DEPTH_RATIO = 0.55  # depth of the chest ellipse by its width, from body measures
 _GAP_RATIO = 0.24  # part of the armhole that runs below the arm, across the side of the body
@@ -428,6 +428,8 @@ def _build(p: CoatParameters, shape: _Shape, c: _Counts, source: str) -> Garment
     hold = shape.seam[0] + p.grasp_fraction * (shape.seam[-1] - shape.seam[0])
     far = np.linalg.norm(half.position - hold, axis=1)
     grasp = np.argsort(far, kind="stable")[: int(p.grasp_count)].astype(np.int32)
+    if p.grasp_count == 0:
+        grasp = front[-1]
     return _mirrored(half, armhole, cuff, grasp, region, source)
 
 

@@ -43,6 +43,22 @@ def barycentric_transfer(source: GarmentMesh, target: GarmentMesh) -> csr_array:
     return matrix
 
 
+def attach(mesh: GarmentMesh, points: FloatArray) -> csr_array:
+    """Returns W (m, n) such that `W @ x` are `points` (m,3) of the rest surface, wherever it is.
+
+    Each row holds the barycentric weights of the closest point of the rest surface.
+    """
+    triangles = mesh.rest_position[mesh.faces]
+    face, closest = _closest_on_triangles(triangles, points)
+    weight = np.clip(trimesh.triangles.points_to_barycentric(triangles[face], closest), 0.0, 1.0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(len(points)), 3)
+    shape = (len(points), len(mesh.rest_position))
+    return csr_array(
+        coo_array((weight.ravel(), (rows, mesh.faces[face].astype(np.int64).ravel())), shape=shape)
+    )
+
+
 def _closest_on_triangles(
     triangles: FloatArray, points: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:

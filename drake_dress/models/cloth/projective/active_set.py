@@ -153,6 +153,7 @@ def classify(  # type: ignore[no-untyped-def]
     residual,
     normal,
     mu,
+    adhesion,
     tolerance,
     weight,
     mode,
@@ -169,7 +170,8 @@ def classify(  # type: ignore[no-untyped-def]
     Args:
         residual: (n,3) of the equations of motion without contact, h² N.
         normal: (n,3) of the surfaces.
-        mu: Coulomb coefficient.
+        mu: (n,) Coulomb coefficient.
+        adhesion: (n,) pull that a contact bears, h² N.
         tolerance: accuracy of positions, m.
         weight: (n,) tolerance times mass, kg m: a force h² N that moves a node by the tolerance.
         mode: (n,) changed in place, as all that follows.
@@ -197,12 +199,12 @@ def classify(  # type: ignore[no-untyped-def]
             # its neighbours have not felt the surface yet
             pressure = max(pressure, 0.0)
             last_slid[i] = 0.0
-        if pressure < -weight[i] * _share(landings[i]):
+        if pressure < -adhesion[i] - weight[i] * _share(landings[i]):
             mode[i] = 0
             friction[i] = 0.0
             changed += 1
             continue
-        bound = mu * max(pressure, 0.0)
+        bound = mu[i] * max(pressure + adhesion[i], 0.0)
         if m == 1:
             if fresh[i]:
                 continue

@@ -56,7 +56,8 @@ class IteratedContact:
         obstacles: now, with velocities.
         mass: (n,) kg.
         time_step: h, s.
-        friction: Coulomb coefficient.
+        friction: (n,) Coulomb coefficient.
+        adhesion: (n,) pull that a contact bears, N.
         margin: distance to keep, m.
         tolerance: wanted accuracy of positions, m.
 
@@ -78,7 +79,8 @@ class IteratedContact:
         obstacles: Obstacles,
         mass: FloatArray,
         time_step: float,
-        friction: float,
+        friction: FloatArray,
+        adhesion: FloatArray,
         margin: float,
         tolerance: float,
     ) -> None:
@@ -90,6 +92,7 @@ class IteratedContact:
         self.resistance = np.zeros(n)
         self.friction = np.zeros((n, 3))
         self._mu = friction
+        self._adhesion = time_step**2 * adhesion
         self._margin = margin
         self._tolerance = tolerance
         self._weight = tolerance * mass
@@ -123,7 +126,7 @@ class IteratedContact:
             pressure = np.einsum("ij,ij->i", r, normal)
             along = r - pressure[:, None] * normal
             size = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
-            bound = time_step**2 * friction * np.maximum(pressure, 0.0)
+            bound = time_step**2 * friction[slip] * np.maximum(pressure + adhesion[slip], 0.0)
             self.friction[slip] = (bound / size)[:, None] * along
 
     def place(self, guess: FloatArray, steady: FloatArray) -> FloatArray:
@@ -224,6 +227,7 @@ class IteratedContact:
                 residual,
                 self.normal,
                 self._mu,
+                self._adhesion,
                 self._tolerance,
                 self._weight,
                 self.mode,

@@ -1,0 +1,1 @@
+"""Measured data against simulation: compare, name what is wrong, extend the model, report."""

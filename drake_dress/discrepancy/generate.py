@@ -1,0 +1,137 @@
+"""Data that hides an effect: what a lab would measure if the garment were not quite the model's.
+
+The truth is another simulation: Projective Dynamics to convergence on a finer mesh with a smaller
+step, other random draws, and a motion-capture system's noise and drop-outs on what it says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.motions import MOTIONS, Stage
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.discrepancy.replay import Replayer
+from drake_dress.models.effects.composition import seen_points
+from drake_dress.models.effects.effect import Effect
+
+FloatArray = npt.NDArray[np.float64]
+
+# How much finer the truth is simulated than the scenario.
+_FINER, _SHORTER = 0.84, 0.5
+# Where the garment hangs: free, before the person, and just before the limb, m.
+_FREE_DISTANCE, _ABOVE_SHOULDERS, _BEFORE_LIMB, _ABOVE_LIMB = 0.8, 0.05, 0.25, 0.24
+# Where along the arm it is drawn over, from shoulder (0) to hand (1).
+_ON_ARM = 0.72
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What measures, SI units.
+
+    Attributes:
+        rate: Hz.
+        markers: number on the garment.
+        marker_noise: standard deviation of a coordinate, m.
+        force_noise: of a component, N.
+        lost: share of the time that a marker is not seen, in bursts.
+    """
+
+    rate: float = 100.0
+    markers: int = 48
+    marker_noise: float = 1e-3
+    force_noise: float = 0.05
+    lost: float = 0.03
+
+
+def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> Lab:
+    """Returns the lab behind the data: the scenario's, simulated otherwise, with effects."""
+    p = scenario.plant
+    numerics = Numerics(_FINER * p.spacing, _SHORTER * p.time_step, "projective_dynamics")
+    lab = Lab.of(scenario, base, numerics)
+    return replace(lab, effects=(*lab.effects, *effects))
+
+
+def stage(lab: Lab) -> Stage:
+    """Returns where a lab's motions take place."""
+    joints = lab.person([]).posed
+    shoulder, hand = joints[0], joints[2]
+    rest, grasp = lab.garment.rest_position, lab.garment.grasp
+    along = (hand - shoulder) / np.linalg.norm(hand - shoulder)
+    limb = shoulder + _ON_ARM * (hand - shoulder)
+    middle = 0.5 * (joints[0] + joints[3])
+    return Stage(
+        free=middle + np.array([-_FREE_DISTANCE, 0.0, _ABOVE_SHOULDERS]),
+        before=limb + np.array([_BEFORE_LIMB, 0.0, _ABOVE_LIMB]),
+        along=along,
+        across=np.array([-1.0, 0.0, 0.0]),
+        spread=rest[grasp["left"]].mean(axis=0) - rest[grasp["right"]].mean(axis=0),
+    )
+
+
+def record(
+    lab: Lab, motion: str, duration: float, sensors: Sensors, rng: np.random.Generator
+) -> Recording:
+    """Returns what would be measured without noise.
+
+    Args:
+        lab: the truth.
+        motion: of `MOTIONS`.
+        duration: s.
+        sensors: their rate and number are used.
+        rng: draws the motion and where markers sit.
+    """
+    time = np.arange(round(duration * sensors.rate) + 1) / sensors.rate
+    path = MOTIONS[motion](stage(lab), duration, rng)
+    rest = lab.garment.rest_position
+    nodes = _spread_out(rest, sensors.markers, int(rng.integers(len(rest))))
+    posed = lab.person([]).posed
+    joints = seen_points(np.tile(posed, (len(time), 1, 1)), lab.effects)
+    unseen = np.full((len(time), len(nodes), 3), np.nan)
+    blank = Recording(motion, time, path(time), unseen, rest[nodes], None, joints)
+    told = Replayer(lab, blank).run(gain=0.0)
+    return replace(
+        blank,
+        marker_position=told.marker_position,
+        gripper_force=told.gripper_force,
+        marker_noise=sensors.marker_noise,
+        force_noise=sensors.force_noise,
+    )
+
+
+def measured(recording: Recording, sensors: Sensors, rng: np.random.Generator) -> Recording:
+    """Returns a recording with the sensors' noise and drop-outs."""
+    markers = recording.marker_position
+    markers = markers + sensors.marker_noise * rng.standard_normal(markers.shape)
+    count, number = markers.shape[:2]
+    burst = max(2, round(0.08 * sensors.rate))
+    for m in range(number):
+        for _ in range(rng.poisson(sensors.lost * count / burst)):
+            begin = rng.integers(count)
+            markers[begin : begin + rng.integers(2, 2 * burst), m] = np.nan
+    force = recording.gripper_force
+    if force is not None:
+        force = force + sensors.force_noise * rng.standard_normal(force.shape)
+    return replace(
+        recording,
+        marker_position=markers,
+        gripper_force=force,
+        marker_noise=sensors.marker_noise,
+        force_noise=sensors.force_noise,
+    )
+
+
+def _spread_out(points: FloatArray, count: int, first: int) -> npt.NDArray[np.int64]:
+    """Returns indices of `count` points (n,3) that are far from each other."""
+    chosen = [first]
+    distance = np.linalg.norm(points - points[first], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)

@@ -1,0 +1,94 @@
+"""What may be hidden in generated data: every effect at a size that matters, drawn at random."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.registry import EFFECTS
+
+Draw = Callable[[np.random.Generator, float], dict[str, float]]
+
+
+def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effect:
+    """Returns the effect called `name` with parameters drawn at `size` times what matters.
+
+    Args:
+        name: of `EFFECTS`.
+        rng: source of chance.
+        size: factor on how strong it is.
+    """
+    return EFFECTS[name](**SIZES[name](rng, size))
+
+
+def _between(low: float, high: float, both: bool = False) -> Callable[..., float]:
+    def draw(rng: np.random.Generator, size: float) -> float:
+        value = size * rng.uniform(low, high)
+        return float(value * rng.choice([-1.0, 1.0]) if both else value)
+
+    return draw
+
+
+def _one(name: str, low: float, high: float, both: bool = False) -> Draw:
+    draw = _between(low, high, both)
+    return lambda rng, size: {name: draw(rng, size)}
+
+
+def _direction(names: str, low: float, high: float) -> Draw:
+    """Returns a vector of random direction and a length between `low` and `high`."""
+
+    def draw(rng: np.random.Generator, size: float) -> dict[str, float]:
+        vector = rng.standard_normal(len(names.split()))
+        vector *= size * rng.uniform(low, high) / np.linalg.norm(vector)
+        return dict(zip(names.split(), vector.tolist(), strict=True))
+
+    return draw
+
+
+def _local_mass(rng: np.random.Generator, size: float) -> dict[str, float]:
+    # a pocket: at the sides of the body or in front, between hem and chest
+    angle = rng.uniform(-np.pi, np.pi)
+    return {
+        "mass": size * rng.uniform(0.03, 0.06),
+        "x": 0.11 * np.cos(angle),
+        "y": 0.2 * np.sin(angle),
+        "z": rng.uniform(-0.58, -0.3),
+    }
+
+
+def _wind(rng: np.random.Generator, size: float) -> dict[str, float]:
+    angle, speed = rng.uniform(-np.pi, np.pi), size**0.5 * rng.uniform(0.9, 1.4)
+    return {"x": speed * np.cos(angle), "y": speed * np.sin(angle), "z": 0.0}
+
+
+def _slip(rng: np.random.Generator, size: float) -> dict[str, float]:
+    return {"rate": size * rng.uniform(0.006, 0.012), "threshold": 0.0}
+
+
+SIZES: Mapping[str, Draw] = {
+    "air_drag": _one("coefficient", 1.5, 3.0),
+    "wind": _wind,
+    "surface_density": _one("added", 0.03, 0.06, both=True),
+    "local_mass": _local_mass,
+    "stretch_stiffness": _one("added", 150.0, 300.0, both=True),
+    "anisotropic_stiffness": _one("warp", 600.0, 1500.0),
+    "strain_stiffening": _one("rate", 10.0, 25.0),
+    "bending_stiffness": _one("added", 1.5e-3, 2.5e-3, both=True),
+    "internal_damping": _one("added", 0.015, 0.03),
+    "rest_size": _one("strain", 0.015, 0.03, both=True),
+    "friction": _one("added", 0.2, 0.29, both=True),
+    "velocity_dependent_friction": _one("rate", 2.0, 4.0),
+    "anisotropic_friction": _one("contrast", 0.6, 0.9, both=True),
+    "adhesion": _one("strength", 10.0, 25.0),
+    "limb_radius": _one("added", 0.01, 0.02, both=True),
+    "limb_compliance": _one("compliance", 0.02, 0.04),
+    "gripper_latency": _one("delay", 0.04, 0.08),
+    "gripper_slip": _slip,
+    "gripper_compliance": _one("compliance", 0.006, 0.012),
+    "time_offset": _one("offset", 0.03, 0.06, both=True),
+    "camera_rotation": _direction("x y z", 0.008, 0.016),
+    "camera_translation": _direction("x y z", 0.008, 0.016),
+    "gravity_tilt": _direction("about_x about_y", 0.025, 0.05),
+}

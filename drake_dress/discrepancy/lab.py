@@ -1,0 +1,226 @@
+"""The lab as a scenario describes it: garment, person and how they are simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from drake_dress.diagrams.build import arm, material, measures, posture
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.fibres import Fibres
+from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.effects.composition import GarmentWithEffects, body_with_effects
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.garment.grain import grain
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    Posture,
+    arm_points,
+    body_capsules,
+)
+from drake_dress.models.sides import SIDES, Side
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How finely the garment is simulated.
+
+    Attributes:
+        spacing: of the mesh, m.
+        time_step: s.
+        integrator: "implicit" or "projective_dynamics".
+        iterations: of the linear solver, at most.
+        tolerance: relative residual at which it stops.
+    """
+
+    spacing: float
+    time_step: float
+    integrator: str = "implicit"
+    iterations: int = 40
+    tolerance: float = 5e-3
+
+
+@dataclass(frozen=True)
+class Lab:
+    """All that does not change between recordings.
+
+    Attributes:
+        garment: the mesh.
+        material: of the garment.
+        numerics: how it is simulated.
+        measures, posture, arms: of the person.
+        effects: that the scenario switches on already.
+    """
+
+    garment: GarmentMesh
+    material: Material
+    numerics: Numerics
+    measures: BodyMeasures
+    posture: Posture
+    arms: dict[Side, ArmPose]
+    effects: tuple[Effect, ...] = ()
+
+    @staticmethod
+    def of(scenario: Scenario, base: Path, numerics: Numerics | None = None) -> Lab:
+        """Returns the lab of a scenario.
+
+        Args:
+            scenario: its plant is the simulation that is held against data.
+            base: directory that a mesh file's name is relative to.
+            numerics: in place of the scenario's.
+        """
+        p = scenario.plant
+        numerics = numerics or Numerics(
+            p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance
+        )
+        return Lab(
+            build_garment(scenario.garment, numerics.spacing, base),
+            material(p.material),
+            numerics,
+            measures(scenario.person),
+            posture(scenario.person),
+            {"left": arm(scenario.person.left_arm), "right": arm(scenario.person.right_arm)},
+        )
+
+    @property
+    def held(self) -> tuple[FloatArray, FloatArray]:
+        """Nodes that grippers hold (k,), and which gripper holds each, 0 left, 1 right (k,)."""
+        parts = [self.garment.grasp[side] for side in SIDES]
+        return (
+            np.concatenate(parts).astype(np.int32),
+            np.repeat([0, 1], [len(p) for p in parts]),
+        )
+
+    def cloth(
+        self,
+        effects: Sequence[Effect],
+        damping: float | None = None,
+        time_step: float | None = None,
+    ) -> GarmentWithEffects:
+        """Returns the garment with effects beside those of the lab, ready to be stepped.
+
+        Args:
+            effects: any.
+            damping: in place of the fabric's, s.
+            time_step: in place of the numerics', s.
+        """
+        n = self.numerics
+        held = self.held[0]
+        h = time_step or n.time_step
+
+        def make(
+            elements: Elements,
+            fabric: Material,
+            gravity: FloatArray,
+            fibres: Fibres | None,
+            added_mass: FloatArray | None,
+        ) -> Integrator:
+            if damping is not None:
+                fabric = replace(fabric, damping=damping)
+            if n.integrator == "projective_dynamics" and damping is None:
+                return ProjectiveDynamicsCloth(
+                    elements,
+                    fabric,
+                    h,
+                    held,
+                    gravity,
+                    tolerance=2e-5,
+                    quasi_newton=True,
+                    fibres=fibres,
+                    added_mass=added_mass,
+                    predicted=True,
+                )
+            return ImplicitCloth(
+                elements,
+                fabric,
+                h,
+                held,
+                gravity,
+                tolerance=n.tolerance,
+                max_iterations=n.iterations,
+                fibres=fibres,
+                added_mass=added_mass,
+            )
+
+        return GarmentWithEffects(
+            self.garment.rest_position,
+            self.garment.faces,
+            grain(self.garment),
+            self.material,
+            [*self.effects, *effects],
+            make,
+        )
+
+    def person(self, effects: Sequence[Effect]) -> PersonShape:
+        """Returns the person with effects."""
+        sizes = body_with_effects(self.measures, [*self.effects, *effects])
+        return PersonShape(sizes, self.posture, self.arms)
+
+
+class PersonShape:
+    """The person's capsules where joints were measured, or as posed.
+
+    Attributes:
+        limb: (c,) which limb a capsule is of, −1 for none: upper arm and forearm of left, right.
+    """
+
+    LIMBS = 4
+
+    def __init__(self, sizes: BodyMeasures, stance: Posture, arms: dict[Side, ArmPose]) -> None:
+        capsules = body_capsules(sizes, stance)
+        order = [f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm")]
+        self.limb = np.array([order.index(c.body) if c.body in order else -1 for c in capsules])
+        self.posed = np.concatenate([arm_points(sizes, stance, side, arms[side]) for side in SIDES])
+        self._radius = np.array([c.radius for c in capsules])
+        self._a = np.array([c.a_B for c in capsules])
+        self._b = np.array([c.b_B for c in capsules])
+        # joints at the ends of a limb's axis: upper arm, forearm; the hand is a point
+        self._hand = np.array([np.array_equal(c.a_B, c.b_B) for c in capsules]) & (self.limb >= 0)
+
+    def obstacles(self, joints: FloatArray, joint_velocity: FloatArray) -> Obstacles:
+        """Returns the person with joints (6,3), m, that move at (6,3), m/s."""
+        a, b = self._a.copy(), self._b.copy()
+        velocity, omega = np.zeros_like(a), np.zeros_like(a)
+        for k in range(self.LIMBS):
+            start = 3 * (k // 2) + k % 2
+            rows = self.limb == k
+            a[rows], b[rows] = joints[start], joints[start + 1]
+            velocity[rows] = joint_velocity[start]
+            axis = joints[start + 1] - joints[start]
+            turn = np.cross(axis, joint_velocity[start + 1] - joint_velocity[start])
+            omega[rows] = turn / max(float(axis @ axis), 1e-12)
+            hand = rows & self._hand
+            a[hand] = b[hand] = joints[start + 1]
+            velocity[hand] = joint_velocity[start + 1]
+        return Obstacles(a, b, self._radius, velocity, omega)
+
+    def displaced(self, bodies: Obstacles, displacement: FloatArray, rate: FloatArray) -> Obstacles:
+        """Returns the person with limbs displaced by (4,3), m, at (4,3), m/s."""
+        rows = self.limb >= 0
+        u, w = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
+        u[rows], w[rows] = displacement[self.limb[rows]], rate[self.limb[rows]]
+        return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + w)
+
+    def limb_forces(self, owner: FloatArray, reaction: FloatArray) -> FloatArray:
+        """Returns (4,3) the force of the garment on the limbs, N.
+
+        Args:
+            owner: (n,) capsule that a node touches, −1 without.
+            reaction: (n,3) of the person on the nodes, N.
+        """
+        force = np.zeros((self.LIMBS, 3))
+        rows = np.flatnonzero(owner >= 0)
+        limb = self.limb[owner[rows]]
+        np.subtract.at(force, limb[limb >= 0], reaction[rows[limb >= 0]])
+        return force

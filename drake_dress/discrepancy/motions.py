@@ -1,0 +1,129 @@
+"""Motions to record: what two grippers do with a garment so that its physics shows.
+
+Each is a path of both grippers over a few seconds that starts and ends at rest, drawn at random
+within a kind, so that no two recordings are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Path = Callable[[FloatArray], FloatArray]
+
+# Time at rest before and after, s.
+_STILL = 0.3
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Where motions take place, world, m.
+
+    Attributes:
+        free: (3,) middle of the grippers where nothing is near.
+        before: (3,) middle of the grippers when the garment hangs just before a limb.
+        along: (3,) unit, along that limb.
+        across: (3,) unit, horizontal, from `before` to the limb.
+        spread: (3,) from the right gripper to the left one, as the garment hangs without tension.
+    """
+
+    free: FloatArray
+    before: FloatArray
+    along: FloatArray
+    across: FloatArray
+    spread: FloatArray
+
+
+def ease(t: FloatArray, start: float, end: float) -> FloatArray:
+    """Returns 0 before `start`, 1 after `end`, and a polynomial with two smooth derivatives."""
+    s = np.clip((t - start) / (end - start), 0.0, 1.0)
+    eased: FloatArray = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+    return eased
+
+
+def sway(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns oscillations in both horizontal directions, in the open."""
+    size = rng.uniform(0.025, 0.04, 2)
+    rate = np.array([rng.uniform(0.75, 0.95), rng.uniform(0.5, 0.7)])
+
+    def path(t: FloatArray) -> FloatArray:
+        window = ease(t, _STILL, _STILL + 0.6) * (1.0 - ease(t, duration - 0.9, duration - 0.3))
+        phase = 2.0 * np.pi * rate * (t - _STILL)[:, None]
+        offset = np.zeros((len(t), 3))
+        offset[:, :2] = window[:, None] * size * np.sin(phase)
+        return _both(stage.free + offset, stage.spread)
+
+    return path
+
+
+def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns fast heaves and a twist about the vertical, in the open."""
+    height, rate = rng.uniform(0.05, 0.08), rng.uniform(1.0, 1.3)
+    angle, turns = rng.uniform(0.15, 0.25), rng.uniform(0.5, 0.7)
+
+    def path(t: FloatArray) -> FloatArray:
+        window = ease(t, _STILL, _STILL + 0.5) * (1.0 - ease(t, duration - 0.8, duration - 0.3))
+        middle = np.tile(stage.free, (len(t), 1))
+        middle[:, 2] += window * height * np.sin(2.0 * np.pi * rate * (t - _STILL))
+        turn = window * angle * np.sin(2.0 * np.pi * turns * (t - _STILL))
+        c, s = np.cos(turn), np.sin(turn)
+        x, y, z = stage.spread
+        spread = np.stack([c * x - s * y, s * x + c * y, np.full(len(t), z)], axis=1)
+        return _both(middle, spread)
+
+    return path
+
+
+def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns a garment that is pressed against a limb and drawn up and down over it."""
+    press, rub = rng.uniform(0.24, 0.27), rng.uniform(0.045, 0.06)
+
+    def path(t: FloatArray) -> FloatArray:
+        middle = stage.before + press * ease(t, _STILL, 1.5)[:, None] * stage.across
+        middle[:, 2] += rub * (ease(t, 1.5, 2.4) - 2.0 * ease(t, 2.5, 3.1) + ease(t, 3.2, 3.7))
+        return _both(middle, stage.spread)
+
+    return path
+
+
+def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns a garment that is pressed against a limb and drawn along it, there and back."""
+    press, rub = rng.uniform(0.24, 0.27), rng.uniform(0.06, 0.08) * rng.choice([-1.0, 1.0])
+
+    def path(t: FloatArray) -> FloatArray:
+        middle = stage.before + press * ease(t, _STILL, 1.5)[:, None] * stage.across
+        along = rub * (ease(t, 1.5, 2.4) - 1.6 * ease(t, 2.5, 3.1))
+        return _both(middle + along[:, None] * stage.along, stage.spread)
+
+    return path
+
+
+def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns grippers that draw the garment taut between them, twice."""
+    first, second = rng.uniform(0.015, 0.02), rng.uniform(0.032, 0.042)
+
+    def path(t: FloatArray) -> FloatArray:
+        a = ease(t, _STILL, 1.2) * (1.0 - ease(t, 1.3, 1.9))
+        b = ease(t, 1.9, 2.8) * (1.0 - ease(t, 3.1, duration - 0.2))
+        apart = (first * a + second * b)[:, None] * stage.spread / np.linalg.norm(stage.spread)
+        return _both(np.tile(stage.free, (len(t), 1)), stage.spread + apart)
+
+    return path
+
+
+MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
+    "sway": sway,
+    "lift": lift,
+    "drag": drag,
+    "shift": shift,
+    "pull": pull,
+}
+
+
+def _both(middle: FloatArray, spread: FloatArray) -> FloatArray:
+    """Returns (T,2,3) left and right gripper about a middle (T,3)."""
+    return np.stack([middle + 0.5 * spread, middle - 0.5 * spread], axis=1)

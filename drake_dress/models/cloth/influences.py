@@ -1,0 +1,46 @@
+"""What acts on a garment during one step beside its material, gravity and the bodies it touches.
+
+Physical effects (`drake_dress/models/effects`) write it, integrators read it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import Elements, FloatArray, in_lanes
+
+
+@dataclass(frozen=True)
+class Influences:
+    """All that is None leaves the step as it is.
+
+    Attributes:
+        force: (n,3) on the nodes, N.
+        friction: (n,) Coulomb coefficient in place of the material's.
+        adhesion: (n,) pull that a contact bears before it lets go, N; presses as well.
+        stretch_factor: (F,) on the stretch stiffness of each triangle.
+    """
+
+    force: FloatArray | None = None
+    friction: FloatArray | None = None
+    adhesion: FloatArray | None = None
+    stretch_factor: FloatArray | None = None
+
+    def contact_law(self, friction: float, count: int) -> tuple[FloatArray, FloatArray]:
+        """Returns Coulomb coefficient and adhesion, N, of `count` nodes, (n,) each."""
+        mu = np.full(count, friction) if self.friction is None else self.friction
+        return mu, np.zeros(count) if self.adhesion is None else self.adhesion
+
+    def stiffened(self, elements: Elements) -> Elements:
+        """Returns the elements, their areas scaled where stretch has another stiffness."""
+        if self.stretch_factor is None:
+            return elements
+        area = elements.triangle_area * self.stretch_factor
+        lanes = elements.gradient_lanes.copy()
+        lanes[:, 4] = in_lanes(area[:, None])[:, 0]
+        return replace(elements, triangle_area=area, gradient_lanes=lanes)
+
+
+NO_INFLUENCES = Influences()

@@ -1,0 +1,1 @@
+"""Physical effects that extend the model: one small object each, listed in `registry.py`."""

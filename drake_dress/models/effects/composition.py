@@ -1,0 +1,215 @@
+"""A garment with effects, as an integrator, and the person with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.cloth.contact.detection import known_contacts
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elements import Elements, FloatArray, make_elements
+from drake_dress.models.cloth.fibres import Fibres
+from drake_dress.models.cloth.implicit import GRAVITY, ClothState
+from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.effects.effect import (
+    AdhesionEffect,
+    BodyEffect,
+    CameraEffect,
+    ClockEffect,
+    Effect,
+    FibreEffect,
+    ForceEffect,
+    FrictionEffect,
+    GravityEffect,
+    MassEffect,
+    MaterialEffect,
+    ShapeEffect,
+    Sheet,
+    Sliding,
+    StretchEffect,
+    norms,
+)
+from drake_dress.models.human.body import BodyMeasures
+
+# Elements, fabric, gravity (3,), fibres and added mass (n,) to what steps the garment.
+MakeIntegrator = Callable[
+    [Elements, Material, FloatArray, Fibres | None, FloatArray | None], Integrator
+]
+Kind = TypeVar("Kind", bound=Effect)
+
+
+def of_kind(effects: Sequence[Effect], kind: type[Kind]) -> list[Kind]:
+    """Returns those effects of a kind that are not off."""
+    return [e for e in effects if isinstance(e, kind) and not e.is_off]
+
+
+class GarmentWithEffects:
+    """An integrator of a garment on which effects act.
+
+    Effects on grippers, cameras and the person's sizes do not concern it and are passed over.
+    Friction, adhesion and strain are those of the start of the step.
+
+    Args:
+        rest_position: (n,3) without effects, m.
+        faces: (F,3).
+        grain: (F,3) direction of the warp in the frame of `rest_position`.
+        material: without effects.
+        effects: any.
+        make: makes the integrator inside.
+    """
+
+    def __init__(
+        self,
+        rest_position: FloatArray,
+        faces: npt.NDArray[np.integer],
+        grain: FloatArray,
+        material: Material,
+        effects: Sequence[Effect],
+        make: MakeIntegrator,
+    ) -> None:
+        for change in of_kind(effects, MaterialEffect):
+            material = change.apply(material)
+        elements = make_elements(rest_position, faces)
+        shapes = of_kind(effects, ShapeEffect)
+        if shapes:
+            area = elements.triangle_area.sum()
+            for shape in shapes:
+                rest_position = shape.apply(rest_position)
+            elements = make_elements(rest_position, faces)
+            # the cloth keeps its mass
+            density = material.surface_density * area / elements.triangle_area.sum()
+            material = replace(material, surface_density=float(density))
+        self.sheet = Sheet(elements, rest_position, grain)
+        gravity = GRAVITY
+        for tilt in of_kind(effects, GravityEffect):
+            gravity = tilt.apply(gravity)
+        added: FloatArray | None = None
+        for mass in of_kind(effects, MassEffect):
+            added = mass.apply(self.sheet) + (0.0 if added is None else added)
+        fibres = None
+        for fibre in of_kind(effects, FibreEffect):
+            fibres = Fibres.along(elements, rest_position, grain, 1.0)
+            stiffness = fibre.apply(self.sheet)
+            fibres = replace(fibres, weight=fibres.weight * stiffness)
+        inner = make(elements, material, gravity, fibres, added)
+        self.elements, self.material, self.time_step = elements, material, inner.time_step
+        self.held, self.mass, self.gravity = inner.held, inner.mass, inner.gravity
+        self._inner = inner
+        self._forces = of_kind(effects, ForceEffect)
+        self._frictions = of_kind(effects, FrictionEffect)
+        self._stretches = of_kind(effects, StretchEffect)
+        self._adhesion: FloatArray | None = None
+        for cling in of_kind(effects, AdhesionEffect):
+            pull = cling.apply(self.sheet)
+            self._adhesion = pull if self._adhesion is None else self._adhesion + pull
+
+    def step(
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences = NO_INFLUENCES,
+    ) -> tuple[ClothState, Any]:
+        """Returns the state one time step later; see `ImplicitCloth.step`."""
+        return self._inner.step(
+            state, obstacles, held_velocity, self._with_effects(influences, state, obstacles)
+        )
+
+    def _with_effects(
+        self, given: Influences, state: ClothState, obstacles: Obstacles
+    ) -> Influences:
+        changed: dict[str, Any] = {}
+        if self._forces:
+            force = np.zeros_like(state.x) if given.force is None else given.force.copy()
+            for effect in self._forces:
+                force += effect.apply(self.sheet, state.x, state.v)
+            changed["force"] = force
+        if self._stretches:
+            strain = largest_strain(self.elements, state.x)
+            factor = np.ones(len(strain))
+            for stretch in self._stretches:
+                factor *= stretch.apply(strain)
+            changed["stretch_factor"] = factor
+        if self._adhesion is not None:
+            changed["adhesion"] = self._adhesion
+        if self._frictions:
+            friction = np.full(len(state.x), self.material.friction)
+            sliding = _sliding(self.sheet, self.material.margin, state, obstacles)
+            for rub in self._frictions:
+                friction[sliding.nodes] += rub.apply(self.material.friction, sliding)
+            changed["friction"] = np.maximum(friction, 0.0)
+        return replace(given, **changed) if changed else given
+
+
+def body_with_effects(measures: BodyMeasures, effects: Sequence[Effect]) -> BodyMeasures:
+    """Returns the person's sizes with effects."""
+    for effect in of_kind(effects, BodyEffect):
+        measures = effect.apply(measures)
+    return measures
+
+
+def seen_points(position: FloatArray, effects: Sequence[Effect]) -> FloatArray:
+    """Returns where cameras with these effects report points (…,3), m."""
+    for effect in of_kind(effects, CameraEffect):
+        position = effect.apply(position)
+    return position
+
+
+def world_points(position: FloatArray, effects: Sequence[Effect]) -> FloatArray:
+    """Returns where points (…,3), m, that cameras with these effects report are."""
+    for effect in reversed(of_kind(effects, CameraEffect)):
+        position = effect.inverse(position)
+    return position
+
+
+def true_times(time: FloatArray, effects: Sequence[Effect], name: str) -> FloatArray:
+    """Returns what the clock effect called `name` makes of times, s."""
+    for effect in of_kind(effects, ClockEffect):
+        if name == effect.NAME:
+            time = effect.apply(time)
+    return time
+
+
+def largest_strain(elements: Elements, x: FloatArray) -> FloatArray:
+    """Returns the larger principal strain (F,) of the triangles at `x` (n,3), m."""
+    f = np.einsum("eia,eic->eac", elements.triangle_gradient, x[elements.triangle])
+    c = np.einsum("eac,ebc->eab", f, f)
+    mean, half = 0.5 * (c[:, 0, 0] + c[:, 1, 1]), 0.5 * (c[:, 0, 0] - c[:, 1, 1])
+    strain: FloatArray = np.sqrt(mean + np.hypot(half, c[:, 0, 1])) - 1.0
+    return strain
+
+
+def _sliding(sheet: Sheet, margin: float, state: ClothState, obstacles: Obstacles) -> Sliding:
+    nodes = np.flatnonzero(state.owner >= 0).astype(np.int32)
+    contacts = known_contacts(state.x, nodes, state.owner[nodes], obstacles, margin)
+    relative, force = state.v[nodes] - contacts.surface_velocity, state.reaction[nodes]
+    return Sliding(
+        nodes,
+        _tangential(relative, contacts.normal),
+        _tangential(force, contacts.normal),
+        _grain(sheet, state.x)[nodes],
+    )
+
+
+def _tangential(vector: FloatArray, normal: FloatArray) -> FloatArray:
+    return vector - np.einsum("ij,ij->i", vector, normal)[:, None] * normal
+
+
+def _grain(sheet: Sheet, x: FloatArray) -> FloatArray:
+    """Returns (n,3) unit directions of the warp at the nodes, as the garment lies at `x`."""
+    e = sheet.elements
+    frame = np.einsum("eia,eic->eac", e.triangle_gradient, sheet.rest_position[e.triangle])
+    flat = np.einsum("eac,ec->ea", frame, sheet.grain)
+    f = np.einsum("eia,eic->eac", e.triangle_gradient, x[e.triangle])
+    along = np.einsum("eac,ea->ec", f, flat) * e.triangle_area[:, None]
+    grain = np.zeros_like(x)
+    for corner in range(3):
+        np.add.at(grain, e.triangle[:, corner], along)
+    unit: FloatArray = grain / np.maximum(norms(grain), 1e-300)[:, None]
+    return unit

@@ -1,0 +1,274 @@
+"""What a physical effect is: a few numbers in SI units that change one thing about the model.
+
+An effect with all its parameters at their off values changes nothing. Each kind below enters at
+one place; `composition.py` puts them together. `apply` gives the effect itself, `derivative` the
+derivative of what `apply` returns by one parameter, given the same arguments.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.human.body import BodyMeasures
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of an effect.
+
+    Attributes:
+        name: of the effect's field.
+        unit: SI.
+        low, high: bounds, both allowed.
+        typical: a size that matters in a lab, for steps and plots.
+        off: value at which the effect does nothing.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    off: float = 0.0
+
+
+def parameter(unit: str, low: float, high: float, typical: float) -> Any:
+    """Returns a dataclass field for a parameter whose off value is 0; see `Parameter`."""
+    return field(default=0.0, metadata={"unit": unit, "low": low, "high": high, "typical": typical})
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect; its fields are its parameters.
+
+    Raises:
+        ValueError: a parameter is not finite or outside its bounds.
+    """
+
+    NAME: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for p in self.parameters():
+            value = getattr(self, p.name)
+            if not (math.isfinite(value) and p.low <= value <= p.high):
+                raise ValueError(
+                    f"{self.NAME}.{p.name} is {value} {p.unit}, expected {p.low:g} to {p.high:g}"
+                )
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """Returns what its fields mean, in their order."""
+        return tuple(Parameter(f.name, **f.metadata) for f in fields(cls) if f.metadata)
+
+    def values(self) -> dict[str, float]:
+        """Returns the parameters by name."""
+        return {p.name: float(getattr(self, p.name)) for p in self.parameters()}
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it changes nothing."""
+        return all(getattr(self, p.name) == p.off for p in self.parameters())
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The garment as effects see it.
+
+    Attributes:
+        elements: of the rest shape.
+        rest_position: (n,3) in the garment's frame, m.
+        grain: (F,3) direction of the warp in the garment's frame, of any length.
+    """
+
+    elements: Elements
+    rest_position: FloatArray
+    grain: FloatArray
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """The nodes that touch a body at the start of a step.
+
+    Attributes:
+        nodes: (c,) indices.
+        velocity: (c,3) tangential, relative to the surface, m/s.
+        force: (c,3) tangential, of the surface on the node in the last step, N.
+        grain: (c,3) unit, along the warp as the garment lies.
+    """
+
+    nodes: IntArray
+    velocity: FloatArray
+    force: FloatArray
+    grain: FloatArray
+
+
+class MaterialEffect(Effect):
+    """Changes a value of the fabric."""
+
+    def apply(self, material: Material) -> Material:
+        """Returns the fabric with the effect."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, material: Material) -> dict[str, float]:
+        """Returns the derivative of the fabric's changed fields by the parameter `name`."""
+        raise NotImplementedError
+
+
+class ShapeEffect(Effect):
+    """Changes the rest shape."""
+
+    def apply(self, rest_position: FloatArray) -> FloatArray:
+        """Returns (n,3) rest positions, m."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, rest_position: FloatArray) -> FloatArray:
+        """Returns (n,3)."""
+        raise NotImplementedError
+
+
+class MassEffect(Effect):
+    """Adds mass to nodes."""
+
+    def apply(self, sheet: Sheet) -> FloatArray:
+        """Returns (n,) kg."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, sheet: Sheet) -> FloatArray:
+        """Returns (n,)."""
+        raise NotImplementedError
+
+
+class GravityEffect(Effect):
+    """Changes gravity."""
+
+    def apply(self, gravity: FloatArray) -> FloatArray:
+        """Returns (3,) m/s²."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, gravity: FloatArray) -> FloatArray:
+        """Returns (3,)."""
+        raise NotImplementedError
+
+
+class FibreEffect(Effect):
+    """Adds stiffness along the warp."""
+
+    def apply(self, sheet: Sheet) -> FloatArray:
+        """Returns (F,) N/m."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, sheet: Sheet) -> FloatArray:
+        """Returns (F,)."""
+        raise NotImplementedError
+
+
+class StretchEffect(Effect):
+    """Makes stretch stiffness depend on strain."""
+
+    def apply(self, strain: FloatArray) -> FloatArray:
+        """Returns the factor (F,) on the stiffness of triangles whose largest strain is given."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, strain: FloatArray) -> FloatArray:
+        """Returns (F,)."""
+        raise NotImplementedError
+
+
+class ForceEffect(Effect):
+    """Acts on the nodes."""
+
+    def apply(self, sheet: Sheet, x: FloatArray, v: FloatArray) -> FloatArray:
+        """Returns the force (n,3), N, at positions and velocities (n,3), m, m/s."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, sheet: Sheet, x: FloatArray, v: FloatArray) -> FloatArray:
+        """Returns (n,3)."""
+        raise NotImplementedError
+
+
+class FrictionEffect(Effect):
+    """Changes the Coulomb coefficient of the nodes in contact."""
+
+    def apply(self, friction: float, sliding: Sliding) -> FloatArray:
+        """Returns what is added to the fabric's coefficient `friction`, (c,)."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, friction: float, sliding: Sliding) -> FloatArray:
+        """Returns (c,)."""
+        raise NotImplementedError
+
+
+class AdhesionEffect(Effect):
+    """Makes nodes in contact stick to it."""
+
+    def apply(self, sheet: Sheet) -> FloatArray:
+        """Returns the pull (n,) that each node's contact bears, N."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, sheet: Sheet) -> FloatArray:
+        """Returns (n,)."""
+        raise NotImplementedError
+
+
+class BodyEffect(Effect):
+    """Changes the person's sizes."""
+
+    def apply(self, measures: BodyMeasures) -> BodyMeasures:
+        """Returns the sizes."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, measures: BodyMeasures) -> dict[str, float]:
+        """Returns the derivative of the changed fields."""
+        raise NotImplementedError
+
+
+class ClockEffect(Effect):
+    """Lets what happens at a recorded time have happened earlier."""
+
+    def apply(self, time: FloatArray) -> FloatArray:
+        """Returns the true times, s, of recorded ones."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, time: FloatArray) -> FloatArray:
+        """Returns as `time`."""
+        raise NotImplementedError
+
+
+class CameraEffect(Effect):
+    """Lets cameras see points elsewhere."""
+
+    def apply(self, position: FloatArray) -> FloatArray:
+        """Returns where cameras report points (…,3), m, of the world."""
+        raise NotImplementedError
+
+    def inverse(self, position: FloatArray) -> FloatArray:
+        """Returns where points (…,3), m, that cameras report are in the world."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, position: FloatArray) -> FloatArray:
+        """Returns (…,3)."""
+        raise NotImplementedError
+
+
+class MountEffect(Effect):
+    """Lets what the garment pulls at give way: `apply` is its speed or its rest deflection."""
+
+    def apply(self, force: FloatArray) -> FloatArray:
+        """Returns (…,3) for forces (…,3) of the garment, N."""
+        raise NotImplementedError
+
+    def derivative(self, name: str, force: FloatArray) -> FloatArray:
+        """Returns (…,3)."""
+        raise NotImplementedError
+
+
+def norms(vectors: FloatArray) -> FloatArray:
+    """Returns the lengths (…,) of vectors (…,3)."""
+    lengths: FloatArray = np.linalg.norm(vectors, axis=-1)
+    return lengths

@@ -1,0 +1,135 @@
+"""Mass and weight: a heavier cloth, a thing in a pocket, a floor that is not level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.effects.effect import (
+    GravityEffect,
+    MassEffect,
+    MaterialEffect,
+    Sheet,
+    parameter,
+)
+
+# Radius over which a local mass is spread (standard deviation), m.
+_SPREAD = 0.05
+
+
+@dataclass(frozen=True)
+class SurfaceDensity(MaterialEffect):
+    """The cloth is heavier: ρ' = ρ + added.
+
+    Args:
+        added: kg/m².
+    """
+
+    NAME = "surface_density"
+    added: float = parameter("kg/m²", -0.25, 2.0, 0.05)
+
+    def apply(self, material: Material) -> Material:
+        """Returns the fabric."""
+        return replace(material, surface_density=material.surface_density + self.added)
+
+    def derivative(self, name: str, material: Material) -> dict[str, float]:
+        """Returns ∂ρ'/∂added."""
+        return {"surface_density": 1.0}
+
+
+@dataclass(frozen=True)
+class LocalMass(MassEffect):
+    """A mass somewhere on the garment, such as a pocket with something in it.
+
+    It is spread over the nodes by the weight exp(−d² / 2σ²) times their area, d the distance in the
+    rest shape from the given point, σ = 5 cm; the sum is the mass, the centre of it near the point.
+
+    Args:
+        mass: kg.
+        x: of the point in the garment's frame, m.
+        y: m.
+        z: m.
+    """
+
+    NAME = "local_mass"
+    mass: float = parameter("kg", 0.0, 1.0, 0.06)
+    x: float = parameter("m", -1.0, 1.0, 0.1)
+    y: float = parameter("m", -1.0, 1.0, 0.1)
+    z: float = parameter("m", -1.5, 1.0, 0.1)
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it changes nothing."""
+        return self.mass == 0.0
+
+    def apply(self, sheet: Sheet) -> FloatArray:
+        """Returns (n,) kg."""
+        return self.mass * self._share(sheet)
+
+    def derivative(self, name: str, sheet: Sheet) -> FloatArray:
+        """Returns (n,)."""
+        share = self._share(sheet)
+        if name == "mass":
+            return share
+        slope = (sheet.rest_position - self._point)[:, "xyz".index(name)] / _SPREAD**2
+        weighted: FloatArray = self.mass * share * (slope - np.sum(share * slope))
+        return weighted
+
+    @property
+    def _point(self) -> FloatArray:
+        return np.array([self.x, self.y, self.z])
+
+    def _share(self, sheet: Sheet) -> FloatArray:
+        distance2 = np.sum((sheet.rest_position - self._point) ** 2, axis=1)
+        # relative to the nearest node, so that a point off the garment still has one
+        weight = sheet.elements.node_area * np.exp(
+            -0.5 * (distance2 - distance2.min()) / _SPREAD**2
+        )
+        share: FloatArray = weight / weight.sum()
+        return share
+
+
+@dataclass(frozen=True)
+class GravityTilt(GravityEffect):
+    """The world frame is not level: gravity g R_y(about_y) R_x(about_x) (0, 0, −1).
+
+    Args:
+        about_x: rad.
+        about_y: rad.
+    """
+
+    NAME = "gravity_tilt"
+    about_x: float = parameter("rad", -0.3, 0.3, 0.03)
+    about_y: float = parameter("rad", -0.3, 0.3, 0.03)
+
+    def apply(self, gravity: FloatArray) -> FloatArray:
+        """Returns (3,) m/s²."""
+        turned: FloatArray = _about_y(self.about_y) @ _about_x(self.about_x) @ gravity
+        return turned
+
+    def derivative(self, name: str, gravity: FloatArray) -> FloatArray:
+        """Returns (3,)."""
+        # the derivative of a rotation about an axis is a quarter turn further, less what lies on it
+        quarter = 0.5 * np.pi
+        if name == "about_x":
+            off = np.diag([1.0, 0.0, 0.0])
+            slope: FloatArray = (
+                _about_y(self.about_y) @ (_about_x(self.about_x + quarter) - off) @ gravity
+            )
+        else:
+            off = np.diag([0.0, 1.0, 0.0])
+            slope = (_about_y(self.about_y + quarter) - off) @ _about_x(self.about_x) @ gravity
+        return slope
+
+
+def _about_x(angle: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def _about_y(angle: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

@@ -1,0 +1,114 @@
+"""Grippers and limbs that give way under the garment's pull.
+
+A yielding mount follows u'' = (c f − u) / τ² − 2 u' / τ: critically damped about its rest
+deflection c f, with a time constant τ that stands for its mass and damping. Integrated implicitly
+in u. Cloth that slips in a gripper is displaced further, at a speed that depends on the pull.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.effects.effect import Effect, MountEffect
+from drake_dress.models.effects.grip import GripperCompliance, GripperSlip
+from drake_dress.models.effects.person import LimbCompliance
+
+# τ of grippers and limbs, s.
+GRIPPER_TIME, LIMB_TIME = 0.03, 0.05
+
+
+@dataclass(frozen=True)
+class MountState:
+    """Where mounts are relative to where they should be.
+
+    Attributes:
+        gripper, gripper_rate: (2,3) of the left and the right gripper, m, m/s.
+        slip: (2,3) of the cloth in them, m.
+        limb, limb_rate: (b,3) of the limbs, m, m/s.
+    """
+
+    gripper: FloatArray
+    gripper_rate: FloatArray
+    slip: FloatArray
+    limb: FloatArray
+    limb_rate: FloatArray
+
+    @staticmethod
+    def at_rest(limbs: int) -> MountState:
+        """Returns mounts of `limbs` limbs without load."""
+        z, b = np.zeros((2, 3)), np.zeros((limbs, 3))
+        return MountState(z, z, z, b, b)
+
+    def flat(self) -> FloatArray:
+        """Returns all as one vector (18 + 6b,)."""
+        parts = (self.gripper, self.gripper_rate, self.slip, self.limb, self.limb_rate)
+        return np.concatenate([p.ravel() for p in parts])
+
+    @staticmethod
+    def of(flat: FloatArray) -> MountState:
+        """Returns what `flat` gave."""
+        grip, limbs = flat[:18].reshape(3, 2, 3), flat[18:].reshape(2, -1, 3)
+        return MountState(grip[0], grip[1], grip[2], limbs[0], limbs[1])
+
+    @property
+    def held(self) -> FloatArray:
+        """Displacement (2,3) of what grippers hold from where the grippers report to be, m."""
+        return self.gripper + self.slip
+
+
+class Mounts:
+    """What of grippers and limbs gives way, by the effects given; all others are passed over."""
+
+    def __init__(self, effects: Sequence[Effect]) -> None:
+        self._gripper: MountEffect | None = None
+        self._limb: MountEffect | None = None
+        self._slip: MountEffect | None = None
+        for effect in effects:
+            if effect.is_off:
+                continue
+            if isinstance(effect, GripperCompliance):
+                self._gripper = effect
+            elif isinstance(effect, LimbCompliance):
+                self._limb = effect
+            elif isinstance(effect, GripperSlip):
+                self._slip = effect
+
+    @property
+    def rigid(self) -> bool:
+        """Whether nothing gives way."""
+        return self._gripper is None and self._limb is None and self._slip is None
+
+    def step(
+        self, state: MountState, gripper_force: FloatArray, limb_force: FloatArray, h: float
+    ) -> MountState:
+        """Returns the state `h` s later.
+
+        Args:
+            state: now.
+            gripper_force: (2,3) of the garment on the grippers, N.
+            limb_force: (b,3) of the garment on the limbs, N.
+            h: s.
+        """
+        gripper, gripper_rate = state.gripper, state.gripper_rate
+        if self._gripper is not None:
+            rest = self._gripper.apply(gripper_force)
+            gripper, gripper_rate = _settle(gripper, gripper_rate, rest, GRIPPER_TIME, h)
+        limb, limb_rate = state.limb, state.limb_rate
+        if self._limb is not None:
+            limb, limb_rate = _settle(limb, limb_rate, self._limb.apply(limb_force), LIMB_TIME, h)
+        slip = state.slip
+        if self._slip is not None:
+            slip = slip + h * self._slip.apply(gripper_force)
+        return MountState(gripper, gripper_rate, slip, limb, limb_rate)
+
+
+def _settle(
+    u: FloatArray, rate: FloatArray, rest: FloatArray, tau: float, h: float
+) -> tuple[FloatArray, FloatArray]:
+    a = h / tau
+    after = (rate + a / tau * (rest - u)) / (1.0 + 2.0 * a + a * a)
+    return u + h * after, after

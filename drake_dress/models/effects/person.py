@@ -1,0 +1,52 @@
+"""The person: limbs that are thicker than thought, or that give way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.effects.effect import BodyEffect, MountEffect, parameter
+from drake_dress.models.human.body import BodyMeasures
+
+_RADII = ("upper_arm_radius", "forearm_radius", "hand_radius")
+
+
+@dataclass(frozen=True)
+class LimbRadius(BodyEffect):
+    """Arms and hands are thicker: R' = R + added.
+
+    Args:
+        added: m.
+    """
+
+    NAME = "limb_radius"
+    added: float = parameter("m", -0.025, 0.05, 0.01)
+
+    def apply(self, measures: BodyMeasures) -> BodyMeasures:
+        """Returns the sizes; no radius below 5 mm."""
+        radii = {name: max(getattr(measures, name) + self.added, 0.005) for name in _RADII}
+        return replace(measures, **radii)
+
+    def derivative(self, name: str, measures: BodyMeasures) -> dict[str, float]:
+        """Returns the derivative of the radii."""
+        return {r: 1.0 if getattr(measures, r) + self.added > 0.005 else 0.0 for r in _RADII}
+
+
+@dataclass(frozen=True)
+class LimbCompliance(MountEffect):
+    """A limb gives way by c times the force on it, on a critically damped mount; see `mounts`.
+
+    Args:
+        compliance: c, m/N, of each upper arm and each forearm.
+    """
+
+    NAME = "limb_compliance"
+    compliance: float = parameter("m/N", 0.0, 0.2, 0.008)
+
+    def apply(self, force: FloatArray) -> FloatArray:
+        """Returns where the limb rests, (…,3) m, under forces (…,3), N."""
+        return self.compliance * force
+
+    def derivative(self, name: str, force: FloatArray) -> FloatArray:
+        """Returns (…,3)."""
+        return force
