@@ -21,6 +21,8 @@ _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml
   drake-dress run scenarios/dummy_varied.yaml --seed 3 --out out/try
   drake-dress run scenarios/dummy_standing.yaml --set plant.material.friction=0.5 --no-meshcat
+  drake-dress dataset measured --hide random --seed 1 --out out/lab
+  drake-dress explain out/lab/measured.h5 --scenario scenarios/measured.yaml
   drake-dress replay out/dummy_standing-seed0/run.h5
   drake-dress bench cloth --only draping,growth --json cloth.json
 
@@ -94,6 +96,33 @@ def _parser() -> argparse.ArgumentParser:
     replay.add_argument("--port", type=int, metavar="PORT", help="default: a free one")
     replay.set_defaults(command=_replay)
 
+    explain = verbs.add_parser(
+        "explain", help="show what the simulation gets wrong about measured data, and why"
+    )
+    explain.add_argument("measured", metavar="MEASURED", nargs="+", help=".h5, .npz or .csv")
+    explain.add_argument("--scenario", metavar="SCENARIO.yaml", required=True)
+    explain.add_argument("--out", metavar="DIR", help="default: out/explain-<first file>")
+    explain.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
+    explain.add_argument(
+        "--workers", type=_count, metavar="N", help="processes; default: all cores"
+    )
+    explain.set_defaults(command=_explain)
+
+    dataset = verbs.add_parser("dataset", help="make data")
+    kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
+    hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
+    hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
+    hidden.add_argument("--seed", type=int, default=0, metavar="N")
+    hidden.add_argument("--out", metavar="DIR", required=True)
+    hidden.add_argument("--scenario", metavar="SCENARIO.yaml", default="scenarios/measured.yaml")
+    hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
+    hidden.add_argument("--size", type=_rate, default=1.0, help="of the effect; default 1")
+    hidden.add_argument(
+        "--marker-noise", type=_rate, default=1e-3, metavar="M", help="default 1e-3"
+    )
+    hidden.add_argument("--force-noise", type=_rate, default=0.05, metavar="N", help="default 0.05")
+    hidden.set_defaults(command=_dataset_measured)
+
     verbs.add_parser(
         "bench", help="measure speed and accuracy, beside other simulators where installed"
     )
@@ -118,6 +147,30 @@ def _replay(options: argparse.Namespace) -> int:
     return show_replay(options.log, options.port)
 
 
+def _explain(options: argparse.Namespace) -> int:
+    from drake_dress.discrepancy.commands import explain_files
+
+    out = Path(options.out or Path("out") / f"explain-{Path(options.measured[0]).stem}")
+    if out.exists() and not out.is_dir():
+        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    explain_files(options.measured, options.scenario, options.set, out, options.workers)
+    return 0
+
+
+def _dataset_measured(options: argparse.Namespace) -> int:
+    from drake_dress.discrepancy.commands import write_dataset
+    from drake_dress.discrepancy.generate import Sensors
+
+    out = Path(options.out)
+    if out.exists() and not out.is_dir():
+        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
+    write_dataset(
+        options.hide, options.seed, out, options.scenario, options.set, options.size, sensors
+    )
+    return 0
+
+
 def _bench(words: list[str]) -> int:
     name, arguments = BENCHMARKS[0], list(words)
     if arguments and not arguments[0].startswith("-"):
@@ -140,6 +193,16 @@ def _rate(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
+    return value
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 1 or more")
     return value
 
 

@@ -13,6 +13,8 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.policy import DressingPolicy, PersonModel, PolicyParameters
 from drake_dress.models.dressing.stages import StageParameters
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_joint
 from drake_dress.models.sides import SIDES
@@ -30,6 +32,7 @@ def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat
             iterations=scenario.plant.iterations,
             tolerance=scenario.plant.tolerance,
             self_collision=scenario.plant.self_collision,
+            effects=effects(scenario),
             measures=measures(person),
             posture=posture(person),
             arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},
@@ -68,6 +71,17 @@ def controller_policy(
         stages=StageParameters(waiting_progress=g.waiting_progress),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
+
+
+def effects(scenario: schema.Scenario) -> tuple[Effect, ...]:
+    """Returns the physical effects that the scenario switches on."""
+    on = []
+    for name, effect in EFFECTS.items():
+        values = getattr(scenario.effects, name)
+        if values is not None:
+            given = {p.name: getattr(values, p.name) for p in effect.parameters()}
+            on.append(effect(**given))
+    return tuple(e for e in on if not e.is_off)
 
 
 def rates(scenario: schema.Scenario) -> Rates:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +13,13 @@ from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.station import Station
 from drake_dress.models.control.policy import DressingPolicy
+from drake_dress.models.effects.composition import true_times
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.sensing import TimeOffset
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
+from drake_dress.systems.delay import Delay
 from drake_dress.systems.garment_oracle import GarmentOracle
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
@@ -52,6 +57,7 @@ def make_dressing(
     rates: Rates,
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
+    effects: Sequence[Effect] = (),
 ) -> Dressing:
     """Returns station and controllers wired together.
 
@@ -63,11 +69,15 @@ def make_dressing(
         rates: of controllers and log.
         writer: open log, if one is kept.
         meshcat: where the run is shown, if it is.
+        effects: those on cameras and their clock, which lie between truth and controllers. A clock
+            that is behind changes nothing for controllers that do not look at stamps.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
-    garment = builder.AddNamedSystem("garment_oracle", GarmentOracle(transfer))
-    joints = builder.AddNamedSystem("joint_oracle", JointOracle(station.person.joint_points))
+    garment = builder.AddNamedSystem("garment_oracle", GarmentOracle(transfer, effects))
+    joints = builder.AddNamedSystem(
+        "joint_oracle", JointOracle(station.person.joint_points, effects)
+    )
     predictor = builder.AddNamedSystem("human_predictor", HumanPredictor(policy.parameters.horizon))
     mpc = builder.AddNamedSystem(
         "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
@@ -84,8 +94,18 @@ def make_dressing(
     connect(lab, "cheat_garment_velocity", garment, "garment_velocity")
     connect(lab, "cheat_body_poses", joints, "body_poses")
     connect(joints, "joint_position", predictor, "joint_position")
-    connect(garment, "estimated_position", mpc, "garment_position")
-    connect(garment, "estimated_velocity", mpc, "garment_velocity")
+    late = -float(true_times(np.zeros(1), effects, TimeOffset.NAME)[0])
+    for quantity in ("position", "velocity"):
+        port = garment.GetOutputPort(f"estimated_{quantity}")
+        if late > 0.0:
+            still = np.zeros(port.size())
+            if quantity == "position":
+                held = station.cloth.start_position
+                still = np.asarray(transfer @ held).ravel()
+            line = builder.AddSystem(Delay(still, rates.command_period, late))
+            builder.Connect(port, line.get_input_port())
+            port = line.get_output_port()
+        builder.Connect(port, mpc.GetInputPort(f"garment_{quantity}"))
     connect(predictor, "predicted_joint_position", mpc, "predicted_joint_position")
     connect(mpc, "plan", follower, "plan")
     for side in SIDES:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
-from drake_dress.diagrams.build import controller_policy, plant_station, rates
+from drake_dress.diagrams.build import controller_policy, effects, plant_station, rates
 from drake_dress.diagrams.dressing import Dressing, is_finished, make_dressing
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
@@ -70,7 +70,14 @@ def run_scenario(
         estimate_garment=belief,
     ) as writer:
         dressing = make_dressing(
-            station, mesh, policy, barycentric_transfer(mesh, belief), rates(scenario), writer, page
+            station,
+            mesh,
+            policy,
+            barycentric_transfer(mesh, belief),
+            rates(scenario),
+            writer,
+            page,
+            effects(scenario),
         )
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)
     wall_time = clock.perf_counter() - begin

@@ -19,6 +19,8 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from drake_dress.errors import UserError
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.registry import EFFECTS
 
 
 @dataclass
@@ -218,6 +220,24 @@ class Variation:
     start_offset: float = 0.0  # m, on each of the three
 
 
+def _effect_schema(effect: type[Effect]) -> type:
+    """Returns a dataclass with an effect's parameters and their standard deviations."""
+    entries: list[tuple[str, Any, Any]] = []
+    for p in effect.parameters():
+        entries.append((p.name, float, field(default=p.off)))
+        # as `drake-dress explain` found it; not used by the simulation
+        entries.append((f"{p.name}_std", float, field(default=0.0)))
+    return dataclasses.make_dataclass(effect.__name__, entries)
+
+
+EFFECT_SCHEMAS = {name: _effect_schema(effect) for name, effect in EFFECTS.items()}
+# Physical effects by name, each with its parameters in SI units; see models/effects/. One that is
+# not given is off.
+Effects = dataclasses.make_dataclass(
+    "Effects", [(n, t | None, field(default=None)) for n, t in EFFECT_SCHEMAS.items()]
+)
+
+
 @dataclass
 class Log:
     """What is written while the run goes on."""
@@ -238,6 +258,7 @@ class Scenario:
     station: Station = field(default_factory=Station)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
+    effects: Effects = field(default_factory=Effects)  # type: ignore[valid-type]
 
 
 # Words that a text may be (Drake's loader has no literal types).
@@ -309,6 +330,11 @@ _RANGES: dict[str, tuple[float, float]] = {
     "log.rate": (1.0, 250.0),
 }
 _MEASURE_RANGE = (0.005, 3.0)
+_EFFECT_RANGES = {
+    f"effects.{name}.{p.name}": (p.low, p.high)
+    for name, effect in EFFECTS.items()
+    for p in effect.parameters()
+}
 
 
 def load_scenario(
@@ -497,7 +523,7 @@ def _check_ranges(source: str, key: str, value: Any) -> None:
             raise UserError(source, key, f"is {value}, expected a finite number")
         bounds = next(
             (r for end, r in _RANGES.items() if key == end or key.endswith("." + end)),
-            _MEASURE_RANGE if ".measures." in key else None,
+            _MEASURE_RANGE if ".measures." in key else _EFFECT_RANGES.get(key),
         )
         if bounds is not None and not bounds[0] <= value <= bounds[1]:
             raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")

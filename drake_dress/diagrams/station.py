@@ -13,7 +13,7 @@ What only simulation can know has the prefix `cheat_`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
@@ -23,15 +23,27 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.person import JointParameters, Person, add_person
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, make_elements
+from drake_dress.models.cloth.elements import Elements
+from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.effects.composition import (
+    GarmentWithEffects,
+    MakeIntegrator,
+    body_with_effects,
+    true_times,
+)
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.grip import GripperLatency
+from drake_dress.models.effects.mounts import Mounts
+from drake_dress.models.garment.grain import grain
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_height
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.systems.cloth_plant import ClothPlant
+from drake_dress.systems.delay import Delay
 from drake_dress.systems.floating_gripper import FloatingGripper
 
 FloatArray = np.ndarray
@@ -60,6 +72,7 @@ class StationParameters:
     iterations: int = 40
     tolerance: float = 5e-3
     self_collision: bool = False
+    effects: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,12 +91,13 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     """Returns a station with two floating grippers that hold a coat behind a person."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.time_step)
-    person = add_person(plant, p.measures, p.posture, p.arms, p.joints)
+    person = add_person(
+        plant, body_with_effects(p.measures, p.effects), p.posture, p.arms, p.joints
+    )
     plant.Finalize()
     tone = builder.AddSystem(ConstantVectorSource(person.tone_torque(plant)))
     builder.Connect(tone.get_output_port(), plant.get_applied_generalized_force_input_port())
 
-    elements = make_elements(p.mesh.rest_position, p.mesh.faces)
     held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
     top = shoulder_height(p.measures, p.posture) + p.height_offset
     hung = p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
@@ -93,12 +107,13 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     cloth = builder.AddNamedSystem(
         "cloth",
         ClothPlant(
-            _integrator(p, elements, held),
+            _integrator(p, held),
             (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
             start,
             grippers,
             person.capsules,
             person.body_indices,
+            Mounts(p.effects),
         ),
     )
     builder.Connect(plant.get_body_poses_output_port(), cloth.GetInputPort("body_poses"))
@@ -109,6 +124,8 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     builder.Connect(
         cloth.GetOutputPort("person_forces"), plant.get_applied_spatial_force_input_port()
     )
+    # a gripper that were earlier than it reports would have to know the future
+    late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
     for i, side in enumerate(SIDES):
         gripper = builder.AddNamedSystem(
             f"{side}_gripper",
@@ -118,8 +135,13 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
         )
         for quantity in ("position", "velocity"):
             port = gripper.GetOutputPort(f"{quantity}_measured")
-            builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
             builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
+            if late > 0.0:
+                first = grippers[i] if quantity == "position" else np.zeros(3)
+                line = builder.AddSystem(Delay(first, p.time_step, late))
+                builder.Connect(port, line.get_input_port())
+                port = line.get_output_port()
+            builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
         builder.ExportInput(
             gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
         )
@@ -136,39 +158,65 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     return Station(diagram, plant, scene_graph, person, cloth, grippers)
 
 
-def _integrator(p: StationParameters, elements: Elements, held: np.ndarray) -> Integrator:
+def _integrator(p: StationParameters, held: np.ndarray) -> Integrator:
     """Returns what steps the plant's garment."""
-    integrator: Integrator
-    if p.integrator == "projective_dynamics":
-        integrator = ProjectiveDynamicsCloth(
-            elements, p.material, p.time_step, held, quasi_newton=True
-        )
-    else:
-        integrator = ImplicitCloth(
+
+    def make(
+        elements: Elements,
+        material: Material,
+        gravity: FloatArray,
+        fibres: Fibres | None,
+        added_mass: FloatArray | None,
+    ) -> Integrator:
+        if p.integrator == "projective_dynamics":
+            return ProjectiveDynamicsCloth(
+                elements,
+                material,
+                p.time_step,
+                held,
+                gravity,
+                quasi_newton=True,
+                fibres=fibres,
+                added_mass=added_mass,
+            )
+        return ImplicitCloth(
             elements,
-            p.material,
+            material,
             p.time_step,
             held,
+            gravity,
             tolerance=p.tolerance,
             max_iterations=p.iterations,
+            fibres=fibres,
+            added_mass=added_mass,
         )
+
+    integrator = _with_effects(p, make)
     return LayeredCloth(integrator) if p.self_collision else integrator
+
+
+def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffects:
+    return GarmentWithEffects(
+        p.mesh.rest_position, p.mesh.faces, grain(p.mesh), p.material, p.effects, make
+    )
 
 
 def settled(p: StationParameters, hung: FloatArray, held: np.ndarray) -> FloatArray:
     """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
-    m = p.material
-    damped = Material(
-        m.surface_density,
-        m.stretch_stiffness,
-        m.bending_stiffness,
-        _SETTLING_DAMPING,
-        m.friction,
-        m.margin,
-    )
-    cloth = ImplicitCloth(
-        make_elements(p.mesh.rest_position, p.mesh.faces), damped, p.time_step, held
-    )
+
+    def make(
+        elements: Elements,
+        material: Material,
+        gravity: FloatArray,
+        fibres: Fibres | None,
+        added_mass: FloatArray | None,
+    ) -> Integrator:
+        damped = replace(material, damping=_SETTLING_DAMPING)
+        return ImplicitCloth(
+            elements, damped, p.time_step, held, gravity, fibres=fibres, added_mass=added_mass
+        )
+
+    cloth = _with_effects(p, make)
     state = ClothState.at_rest(hung)
     still = np.zeros((len(held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):

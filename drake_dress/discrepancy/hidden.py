@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
+
+NOTHING, RANDOM = "nothing", "random"
 
 Draw = Callable[[np.random.Generator, float], dict[str, float]]
 
@@ -21,6 +25,30 @@ def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effec
         size: factor on how strong it is.
     """
     return EFFECTS[name](**SIZES[name](rng, size))
+
+
+def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[Effect]:
+    """Returns what is hidden.
+
+    Args:
+        what: names of effects joined by "+", `nothing`, or `random` for any of them or nothing.
+        rng: source of chance.
+        size: factor on how strong it is.
+
+    Raises:
+        UserError: there is no such effect.
+    """
+    if what == RANDOM:
+        what = str(rng.choice([NOTHING, *SIZES]))
+    if what == NOTHING:
+        return []
+    names = what.split("+")
+    for name in names:
+        if name not in SIZES:
+            near = difflib.get_close_matches(name, SIZES, n=1)
+            expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(SIZES)}"
+            raise UserError("--hide", name, f"is no effect that can be hidden, {expected}")
+    return [draw_effect(name, rng, size) for name in names]
 
 
 def _between(low: float, high: float, both: bool = False) -> Callable[..., float]:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from drake_dress.diagrams.build import arm, material, measures, posture
+from drake_dress.diagrams.build import arm, effects, material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.layered import Integrator
@@ -91,27 +91,32 @@ class Lab:
             measures(scenario.person),
             posture(scenario.person),
             {"left": arm(scenario.person.left_arm), "right": arm(scenario.person.right_arm)},
+            effects(scenario),
         )
 
     @property
-    def held(self) -> tuple[FloatArray, FloatArray]:
+    def held(self) -> tuple[IntArray, IntArray]:
         """Nodes that grippers hold (k,), and which gripper holds each, 0 left, 1 right (k,)."""
         parts = [self.garment.grasp[side] for side in SIDES]
         return (
             np.concatenate(parts).astype(np.int32),
-            np.repeat([0, 1], [len(p) for p in parts]),
+            np.repeat([0, 1], [len(p) for p in parts]).astype(np.int32),
         )
+
+    def with_effects(self, further: Sequence[Effect]) -> list[Effect]:
+        """Returns the lab's effects and further ones, which take the place of those alike."""
+        return list({e.NAME: e for e in (*self.effects, *further)}.values())
 
     def cloth(
         self,
-        effects: Sequence[Effect],
+        further: Sequence[Effect],
         damping: float | None = None,
         time_step: float | None = None,
     ) -> GarmentWithEffects:
-        """Returns the garment with effects beside those of the lab, ready to be stepped.
+        """Returns the garment with the lab's effects and further ones, ready to be stepped.
 
         Args:
-            effects: any.
+            further: any.
             damping: in place of the fabric's, s.
             time_step: in place of the numerics', s.
         """
@@ -158,13 +163,13 @@ class Lab:
             self.garment.faces,
             grain(self.garment),
             self.material,
-            [*self.effects, *effects],
+            self.with_effects(further),
             make,
         )
 
-    def person(self, effects: Sequence[Effect]) -> PersonShape:
-        """Returns the person with effects."""
-        sizes = body_with_effects(self.measures, [*self.effects, *effects])
+    def person(self, further: Sequence[Effect]) -> PersonShape:
+        """Returns the person with the lab's effects and further ones."""
+        sizes = body_with_effects(self.measures, self.with_effects(further))
         return PersonShape(sizes, self.posture, self.arms)
 
 
@@ -212,7 +217,7 @@ class PersonShape:
         u[rows], w[rows] = displacement[self.limb[rows]], rate[self.limb[rows]]
         return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + w)
 
-    def limb_forces(self, owner: FloatArray, reaction: FloatArray) -> FloatArray:
+    def limb_forces(self, owner: IntArray, reaction: FloatArray) -> FloatArray:
         """Returns (4,3) the force of the garment on the limbs, N.
 
         Args:

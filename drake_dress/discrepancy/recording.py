@@ -1,4 +1,4 @@
-"""What was measured: one recording, SI units, world frame as the cameras and the robot report it."""
+"""What was measured: one recording, SI units, in the world that cameras and robot report."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 FloatArray = npt.NDArray[np.float64]
+
+# Sightings that a parabola is fitted to, at least.
+_LEAST_SEEN = 3
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def smoothed(
         (T,m,3) m, (T,m,3) m/s, zero where not known, and (T,m).
     """
     count, markers = position.shape[:2]
-    seen = np.isfinite(position).all(axis=2)
+    seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=2))
     filled = np.where(seen[:, :, None], position, 0.0)
     x, v = np.zeros_like(filled), np.zeros_like(filled)
     known = np.zeros((count, markers), dtype=np.bool_)
@@ -78,12 +81,12 @@ def smoothed(
         normal = np.einsum("at,bt,tm->mab", powers, powers, weight)
         right = np.einsum("at,tm,tmc->mac", powers, weight, filled[s])
         # both sides of the instant must have been seen, or the parabola is a guess
-        enough = (weight.sum(axis=0) >= 4) & (
+        enough = (weight.sum(axis=0) >= _LEAST_SEEN) & (
             (weight * (t[:, None] < 0.5)).sum(axis=0) * (weight * (t[:, None] > -0.5)).sum(axis=0)
             > 0
         )
         normal[~enough] = np.eye(3)
         fit = np.linalg.solve(normal + 1e-9 * np.eye(3), right)
-        x[j], v[j] = fit[:, 0], fit[:, 1] / half_window
+        x[j, enough], v[j, enough] = fit[enough, 0], fit[enough, 1] / half_window
         known[j] = enough
     return x, v, known

@@ -43,8 +43,8 @@ FloatArray = npt.NDArray[np.float64]
 _REACH = 0.07
 # Variance of a marker against that of the garment between markers, for the interpolation.
 _MARKER_SHARE = 0.3
-# Damping of the fabric while it settles before a recording, s.
-_SETTLE_DAMPING = 0.05
+# While the garment settles before a recording: damping of the fabric, s, and of all motion, 1/s.
+_SETTLE_DAMPING, _SETTLE_DRAG = 0.05, 6.0
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,10 @@ class Replayer:
             self._start = x
         return self._start
 
+    def start_from(self, position: FloatArray) -> None:
+        """Takes (n,3), m, for how the garment hangs at the start."""
+        self._start = position
+
     def run(
         self,
         effects: Sequence[Effect] = (),
@@ -135,17 +139,18 @@ class Replayer:
             effects: beside those of the lab.
             gain: ω, 1/s; 0 does not look at the markers, but for how the garment hangs at first.
             start: positions and velocities (n,3) at `begin`, m, m/s; settled by default.
-            begin, end: part of the recording, s; all by default. Outside it the result is NaN.
+            begin: of the part that is replayed, s; the recording's by default.
+            end: of it, s.
             keep: (K,) times at which the whole garment is kept, s.
         """
         lab, r = self.lab, self.recording
-        effects = [*lab.effects, *effects]
+        effects = lab.with_effects(effects)
         cloth, person = lab.cloth(effects), lab.person(effects)
         h = cloth.time_step
         begin = float(r.time[0]) if begin is None else begin
         end = float(r.time[-1]) if end is None else end
         steps = max(1, int(np.ceil((end - begin) / h - 1e-9)))
-        clock = begin + h * np.arange(steps + 1)
+        clock: FloatArray = begin + h * np.arange(steps + 1, dtype=np.float64)
         held = self._held_at(clock, effects)
         seen, rate, known = self._targets(clock, effects)
         joints, joint_rate = self._joints(clock, effects, person.posed)
@@ -213,7 +218,8 @@ class Replayer:
         stamped = true_times(self.recording.time, effects, "time_offset")
         position = world_points(x, effects)
         rate = world_points(v, effects) - world_points(np.zeros(3), effects)
-        share = _at(clock, stamped, known.astype(np.float64))
+        # between a frame that is known and one that is not, nothing is known
+        share = np.floor(_at(clock, stamped, known.astype(np.float64)) + 1e-9)
         share[(clock < stamped[0]) | (clock > stamped[-1])] = 0.0
         return _at(clock, stamped, position), _at(clock, stamped, rate), share
 
@@ -260,7 +266,7 @@ class Replayer:
         how: _Settling,
     ) -> FloatArray:
         """Returns (n,3) where the garment comes to rest from `x`, pulled to the first markers."""
-        effects = [*self.lab.effects, *effects]
+        effects = self.lab.with_effects(effects)
         h = how.time_step
         cloth = self.lab.cloth(effects, _SETTLE_DAMPING, h)
         person = self.lab.person(effects)
@@ -285,6 +291,7 @@ class Replayer:
                 around = person.displaced(bodies, mount.limb, mount.limb_rate)
             target = held + mount.gripper[self._side]
             pull = self._pull(cloth, state, seen, np.zeros_like(seen), known, how.gain)
+            pull -= _SETTLE_DRAG * cloth.mass[:, None] * state.v
             velocity = (target - state.x[self._held]) / h
             state, _ = cloth.step(state, around, velocity, Influences(force=pull))
         return state.x

@@ -21,6 +21,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.measures import Measures, measure
+from drake_dress.report.page import embedded, html_page
 from drake_dress.report.stills import CameraPose, render_still
 from drake_dress.report.summary import SuccessRules
 
@@ -90,14 +91,7 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
         f"<details><summary>resolved YAML</summary><pre>{html.escape(log.scenario_text)}</pre>"
         "</details>",
     ]
-    title = "Dressing report"
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{_STYLE}</style></head><body><main>"
-        + "\n".join(parts)
-        + "</main></body></html>\n"
-    )
+    return html_page("Dressing report", parts)
 
 
 def _limits(summary: dict[str, Any], rules: SuccessRules) -> str:
@@ -334,13 +328,7 @@ def _chart(title: str, note: str, draw: Callable[[list[Axes]], None]) -> str:
         ax.spines[["top", "right"]].set_visible(False)
         ax.tick_params(labelsize=9)
     axes[-1].set_xlabel("time, s")
-    buffer = io.BytesIO()
-    # As an image of its own: identifiers of several inline pictures would clash.
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f'<figure><h3>{title}</h3><img alt="{title}" src="data:image/svg+xml;base64,{data}">' + (
-        f"<figcaption>{note}</figcaption></figure>" if note else "</figure>"
-    )
+    return embedded(figure, title, note)
 
 
 def _shading() -> str:
@@ -349,34 +337,3 @@ def _shading() -> str:
         for name, shade in zip(STAGE_NAMES, _STAGE_SHADE, strict=True)
     )
     return f'<p class="note">Shaded by stage: {shades}; upper half left, lower half right.</p>'
-
-
-_STYLE = """
-:root { --ink: #26303b; --soft: #66727f; --line: #dfe4ea; }
-body { margin: 0; background: #f3f5f7; color: var(--ink);
-  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", sans-serif; }
-main { max-width: 960px; margin: 0 auto; padding: 24px 20px 60px; }
-header { border-radius: 12px; padding: 18px 24px; margin-bottom: 8px; }
-header.good { background: #dff1e4; border-left: 8px solid #2b8a57; }
-header.bad { background: #fbe4e1; border-left: 8px solid #b8453b; }
-h1 { margin: 0; font-size: 28px; } header p { margin: 4px 0 0; font-size: 18px; }
-h2 { margin: 34px 0 10px; font-size: 20px; } h3 { margin: 0 0 6px; font-size: 16px; }
-table { border-collapse: collapse; background: #fff; border-radius: 10px; overflow: hidden;
-  box-shadow: 0 1px 4px rgba(30,45,60,.08); min-width: min(100%, 620px);
-  font-variant-numeric: tabular-nums; }
-td, th { text-align: left; padding: 7px 16px; border-bottom: 1px solid var(--line); }
-th { color: var(--soft); font-weight: 500; font-size: 14px; }
-tr:last-child td { border-bottom: 0; }
-.yes { color: #1f7a4a; } .no { color: #b03228; font-weight: 600; }
-figure { margin: 0 0 18px; background: #fff; border-radius: 10px; padding: 14px 16px;
-  box-shadow: 0 1px 4px rgba(30,45,60,.08); }
-figure img { display: block; width: 100%; height: auto; }
-figcaption, .note { color: var(--soft); font-size: 14px; margin-top: 6px; }
-.pictures { display: grid; gap: 14px;
-  grid-template-columns: repeat(auto-fill, minmax(min(100%, 380px), 1fr)); }
-.pictures figure { margin: 0; padding: 0 0 10px; overflow: hidden; }
-.pictures figcaption { padding: 0 12px; }
-.key { display: inline-block; width: 14px; height: 12px; border: 1px solid #c4ccd4;
-  margin: 0 4px 0 8px; vertical-align: -1px; }
-pre { overflow: auto; background: #fff; padding: 12px; border-radius: 10px; font-size: 13px; }
-"""

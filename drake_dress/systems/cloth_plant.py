@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydrake.common.value import Value
@@ -15,6 +16,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.effects.mounts import Mounts, MountState
 from drake_dress.models.human.body import Capsule
 
 FloatArray = np.ndarray
@@ -54,6 +56,8 @@ class ClothPlant(LeafSystem):
         start_grippers: (2,3) p_WG of left and right at time 0, m.
         capsules: of the person, fixed in their bodies.
         body_indices: body name to its index in the plant.
+        mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
+            limbs that do not know of it.
     """
 
     def __init__(
@@ -64,11 +68,13 @@ class ClothPlant(LeafSystem):
         start_grippers: FloatArray,
         capsules: Sequence[Capsule],
         body_indices: dict[str, BodyIndex],
+        mounts: Mounts | None = None,
     ) -> None:
         super().__init__()
         self.cloth = cloth
         n = cloth.elements.node_count
         self._n = n
+        self.start_position = np.array(start)
         self._side = np.repeat([0, 1], held_count)
         self._offset = start[cloth.held] - start_grippers[self._side]
         self._capsules = list(capsules)
@@ -79,6 +85,12 @@ class ClothPlant(LeafSystem):
         self._b = np.array([c.b_B for c in capsules])
         self._radius = np.array([c.radius for c in capsules])
 
+        self._mounts = mounts or Mounts([])
+        limbs = [name for name in self._names if name.endswith("arm")]
+        self._limb_of = np.array(
+            [limbs.index(c.body) if c.body in limbs else -1 for c in self._capsules]
+        )
+
         self._x = self.DeclareDiscreteState(np.array(start).ravel())
         self._v = self.DeclareDiscreteState(np.zeros(3 * n))
         self._mode = self.DeclareDiscreteState(np.zeros(n))
@@ -86,6 +98,7 @@ class ClothPlant(LeafSystem):
         self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
         # Force and moment about the body's origin, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
+        self._mount = self.DeclareDiscreteState(MountState.at_rest(len(limbs)).flat())
 
         self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self._velocities = self.DeclareAbstractInputPort(
@@ -142,9 +155,15 @@ class ClothPlant(LeafSystem):
         )
         held = state.x[self.cloth.held]
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
+        bodies = self.obstacles(context)
+        if not self._mounts.rigid:
+            mount = self._mounted(context, state)
+            target += mount.held
+            bodies = self._displaced(bodies, mount)
+            discrete.set_value(self._mount, mount.flat())
         held_velocity = (target[self._side] + self._offset - held) / h
         try:
-            after, _ = self.cloth.step(state, self.obstacles(context), held_velocity)
+            after, _ = self.cloth.step(state, bodies, held_velocity)
         except ValueError as error:
             raise ValueError(f"garment at {context.get_time():.3f} s: {error}") from error
         discrete.set_value(self._x, after.x.ravel())
@@ -153,6 +172,22 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._owner, after.owner.astype(np.float64))
         discrete.set_value(self._reaction, after.reaction.ravel())
         discrete.set_value(self._wrench, self._wrenches(context, state.x, after).ravel())
+
+    def _mounted(self, context: Context, state: ClothState) -> MountState:
+        """Returns how far grippers and limbs have given way at the end of this step."""
+        pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
+        rows = np.flatnonzero(state.owner >= 0)
+        limb = self._limb_of[state.owner[rows]]
+        mount = MountState.of(context.get_discrete_state(self._mount).value())
+        force = np.zeros_like(mount.limb)
+        np.subtract.at(force, limb[limb >= 0], state.reaction[rows[limb >= 0]])
+        return self._mounts.step(mount, np.stack(pulled), force, self.cloth.time_step)
+
+    def _displaced(self, bodies: Obstacles, mount: MountState) -> Obstacles:
+        rows = self._limb_of >= 0
+        u, rate = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
+        u[rows], rate[rows] = mount.limb[self._limb_of[rows]], mount.limb_rate[self._limb_of[rows]]
+        return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + rate)
 
     def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from drake_dress.models.effects.composition import seen_points
+from drake_dress.models.effects.effect import Effect
 
 
 class GarmentOracle(LeafSystem):
@@ -25,10 +30,12 @@ class GarmentOracle(LeafSystem):
 
     Args:
         transfer: (m,n) barycentric weights, rows sum to 1.
+        effects: those on cameras displace what is seen.
     """
 
-    def __init__(self, transfer: sp.csr_array) -> None:
+    def __init__(self, transfer: sp.csr_array, effects: Sequence[Effect] = ()) -> None:
         super().__init__()
+        self._effects = tuple(effects)
         self._transfer = transfer
         m, n = transfer.shape
         for i, name in enumerate(("position", "velocity")):
@@ -40,6 +47,9 @@ class GarmentOracle(LeafSystem):
     def _calc(self, port: int, n: int):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
             value = self.get_input_port(port).Eval(context).reshape(n, 3)
-            output.SetFromVector(np.asarray(self._transfer @ value).ravel())
+            seen = seen_points(np.asarray(self._transfer @ value), self._effects)
+            if port == 1:
+                seen = seen - seen_points(np.zeros(3), self._effects)
+            output.SetFromVector(seen.ravel())
 
         return calc

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from drake_dress.models.effects.composition import seen_points
+from drake_dress.models.effects.effect import Effect
 
 
 class JointOracle(LeafSystem):
@@ -23,14 +28,19 @@ class JointOracle(LeafSystem):
 
     Args:
         points: body index and point in the body's frame (3,), m, for each of the six joints.
+        effects: those on cameras displace what is seen.
     """
 
-    def __init__(self, points: list[tuple[int, np.ndarray]]) -> None:
+    def __init__(
+        self, points: list[tuple[int, np.ndarray]], effects: Sequence[Effect] = ()
+    ) -> None:
         super().__init__()
+        self._effects = tuple(effects)
         self._points = points
         self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self.DeclareVectorOutputPort("joint_position", 18, self._calc)
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         poses = self.get_input_port(0).Eval(context)
-        output.SetFromVector(np.concatenate([poses[body] @ p for body, p in self._points]))
+        joints = np.stack([poses[body] @ p for body, p in self._points])
+        output.SetFromVector(seen_points(joints, self._effects).ravel())

@@ -102,8 +102,8 @@ class GravityTilt(GravityEffect):
     """
 
     NAME = "gravity_tilt"
-    about_x: float = parameter("rad", -0.3, 0.3, 0.03)
-    about_y: float = parameter("rad", -0.3, 0.3, 0.03)
+    about_x: float = parameter("rad", -0.6, 0.6, 0.03)
+    about_y: float = parameter("rad", -0.6, 0.6, 0.03)
 
     def apply(self, gravity: FloatArray) -> FloatArray:
         """Returns (3,) m/s²."""

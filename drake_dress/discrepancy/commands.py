@@ -1,0 +1,149 @@
+"""What `drake-dress explain` and `drake-dress dataset measured` do."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
+from drake_dress.discrepancy.experiment import Experiment
+from drake_dress.discrepancy.explanation import Explanation, explain
+from drake_dress.discrepancy.generate import Sensors, measured, record, truth
+from drake_dress.discrepancy.hidden import NOTHING, RANDOM, draw_hidden
+from drake_dress.discrepancy.motions import MOTIONS
+from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.discrepancy.report import report_page
+from drake_dress.discrepancy.results import as_json, extended_yaml, write_json, write_text
+from drake_dress.discrepancy.sentences import headline
+from drake_dress.discrepancy.suggestion import suggest
+from drake_dress.discrepancy.where import spots
+from drake_dress.discrepancy.writing import write_recordings
+from drake_dress.errors import UserError
+
+DURATION = 4.0
+
+
+def explain_files(
+    files: Sequence[str],
+    scenario_file: str,
+    overrides: Sequence[str],
+    out: Path,
+    workers: int | None = None,
+) -> Explanation:
+    """Explains measured logs and writes explanation.json, report.html and extended.yaml.
+
+    Args:
+        files: measured logs.
+        scenario_file: YAML of the model that is held against them.
+        overrides: KEY=VALUE changes of it.
+        out: directory to write to; made when all input has proved usable.
+        workers: processes; by default as many as there are cores.
+
+    Raises:
+        UserError: a file cannot be used.
+    """
+    scenario = load_scenario(scenario_file, overrides)
+    base = Path(scenario_file).parent
+    mesh = build_garment(scenario.garment, scenario.plant.spacing, base)
+    recordings = read_recordings(files, mesh)
+    with _progress() as (stage, tick):
+        stage("settling")
+        with Experiment(scenario, base, recordings, workers=workers) as experiment:
+            found = explain(experiment, scenario.seed, stage, tick)
+            stage("writing")
+            told = found.comparison.told["refined"]
+            off = spots(
+                found.comparison.whitening,
+                found.comparison.whitening.vector(told),
+                experiment.recordings,
+                mesh,
+                [t.contact for t in told],
+                experiment.samples,
+            )
+            advice = suggest(found, scenario, base, stage)
+            page = report_page(found, experiment, off, advice, resolved_yaml(scenario))
+            yaml_text = extended_yaml(scenario, experiment, found)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "extended.yaml", yaml_text)
+    write_text(out / "report.html", page)
+    write_json(out / "explanation.json", as_json(found, off, advice))
+    print(headline(found))
+    print(f"report, explanation and extended scenario: {out}")
+    return found
+
+
+def write_dataset(
+    hide: str,
+    seed: int,
+    out: Path,
+    scenario_file: str,
+    overrides: Sequence[str] = (),
+    size: float = 1.0,
+    sensors: Sensors | None = None,
+) -> None:
+    """Writes measured.h5, and apart answer.json.
+
+    Args:
+        hide: effects joined by "+", `nothing` or `random`.
+        seed: of all that is drawn.
+        out: directory.
+        scenario_file: the model that knows nothing of what is hidden.
+        overrides: KEY=VALUE changes of it.
+        size: of the effect, times what matters.
+        sensors: noise, markers, rate.
+
+    Raises:
+        UserError: an effect has no such name, or the scenario cannot be used.
+    """
+    if seed < 0:
+        raise UserError("--seed", "", f"is {seed}, expected 0 or more")
+    scenario = load_scenario(scenario_file, overrides)
+    rng = np.random.default_rng([seed, *hide.encode()])
+    hidden = draw_hidden(hide, rng, size)
+    sensors = sensors or Sensors()
+    lab = truth(scenario, Path(scenario_file).parent, hidden)
+    recordings = []
+    with _progress() as (stage, _):
+        for name in MOTIONS:
+            stage(f"recording {name}")
+            clean = record(lab, name, DURATION, sensors, rng)
+            recordings.append(measured(clean, sensors, rng))
+    out.mkdir(parents=True, exist_ok=True)
+    write_recordings(out / "measured.h5", recordings, resolved_yaml(scenario))
+    names = [e.NAME for e in hidden]
+    answer = {
+        "effect": "+".join(names) if names else NOTHING,
+        "parameters": {e.NAME: e.values() for e in hidden} if len(names) > 1 else {},
+    }
+    if len(hidden) == 1:
+        answer["parameters"] = hidden[0].values()
+    write_json(out / "answer.json", answer)
+    print(f"measured.h5 and answer.json: {out}" + (" (random)" if hide == RANDOM else ""))
+
+
+@contextmanager
+def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[], None]]]:
+    """Yields what says the stage and what counts replays: a bar, or lines where no one watches."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda text: print(text, file=sys.stderr, flush=True), lambda: None
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} replays"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("", total=None)
+        yield (
+            lambda text: bar.update(task, description=text),
+            lambda: bar.advance(task),
+        )

@@ -1,0 +1,208 @@
+"""Recordings and the simulations that are held against them, at three levels of numerics.
+
+    screening  coarser than the scenario, for derivatives by many parameters
+    scenario   as the scenario says
+    refined    finer in mesh and step: what the scenario's model would say without its numerics
+
+What one level says about a change of parameters is added to what the refined one says at a point
+nearby (multi-fidelity): p ↦ refined(p₀) + level(p) − level(p₀).
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.discrepancy.replay import Replayer
+from drake_dress.models.effects.effect import Effect
+
+FloatArray = npt.NDArray[np.float64]
+Level = Literal["screening", "scenario", "refined"]
+LEVELS: tuple[Level, ...] = ("screening", "scenario", "refined")
+
+# ω of the observer, 1/s: soft enough to see what is wrong, hard enough not to lose the garment.
+GAIN = 6.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a simulation says of one recording, at the samples that are compared.
+
+    Attributes:
+        marker: (S,m,3) m.
+        force: (S,2,3) N.
+        contact: (S,) share of the nodes that touch the person.
+    """
+
+    marker: FloatArray
+    force: FloatArray
+    contact: FloatArray
+
+
+def levels(numerics: Numerics) -> dict[Level, Numerics]:
+    """Returns the numerics of each level about those of a scenario."""
+    n = numerics
+    return {
+        "screening": replace(
+            n,
+            integrator="implicit",
+            spacing=min(1.2 * n.spacing, 0.06),
+            time_step=min(2.0 * n.time_step, 0.01),
+            tolerance=max(n.tolerance, 2e-3),
+        ),
+        "scenario": n,
+        "refined": replace(
+            n,
+            integrator="implicit",
+            spacing=max(0.87 * n.spacing, 0.015),
+            time_step=min(0.5 * n.time_step, 0.002),
+            iterations=max(n.iterations, 100),
+            tolerance=min(n.tolerance, 5e-4),
+        ),
+    }
+
+
+class Experiment:
+    """All recordings with all levels; a context manager that owns worker processes.
+
+    Args:
+        scenario: its plant is the simulation held against data.
+        base: directory that a mesh file's name is relative to.
+        recordings: at least one.
+        period: between compared samples, s.
+        workers: processes; by default as many as there are cores.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        base: Path,
+        recordings: Sequence[Recording],
+        period: float = 0.02,
+        workers: int | None = None,
+    ) -> None:
+        self.recordings = list(recordings)
+        p = scenario.plant
+        self.numerics = levels(
+            Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance)
+        )
+        self.labs = {level: Lab.of(scenario, base, n) for level, n in self.numerics.items()}
+        self.samples = [_samples(r, period) for r in self.recordings]
+        self._workers = workers or os.cpu_count() or 1
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Experiment:
+        replayers = {
+            (level, i): Replayer(self.labs[level], r)
+            for level in LEVELS
+            for i, r in enumerate(self.recordings)
+        }
+        # each level starts from what the level before has found
+        self._open(replayers)
+        for key, start in zip(
+            replayers, self._map(_settle, [(key,) for key in replayers]), strict=True
+        ):
+            replayers[key].start_from(start)
+        self._pool_or_fail().shutdown()
+        self._open(replayers)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+    def tell(
+        self,
+        jobs: Sequence[tuple[Level, Sequence[Effect]]],
+        progress: Callable[[], None] | None = None,
+    ) -> list[list[Told]]:
+        """Returns what simulations say of each recording.
+
+        Args:
+            jobs: level and effects of each simulation.
+            progress: called after each replay of one recording.
+        """
+        count = len(self.recordings)
+        work = [
+            (level, i, tuple(effects), self.samples[i])
+            for level, effects in jobs
+            for i in range(count)
+        ]
+        told = self._map(_replay, work, progress)
+        return [told[j * count : (j + 1) * count] for j in range(len(jobs))]
+
+    def tell_some(
+        self,
+        jobs: Sequence[tuple[Level, Sequence[Effect], Sequence[int]]],
+        otherwise: Sequence[Told],
+        progress: Callable[[], None] | None = None,
+    ) -> list[list[Told]]:
+        """Returns what simulations say of some recordings, and `otherwise` of the others.
+
+        Args:
+            jobs: level, effects and recordings of each simulation.
+            otherwise: one for each recording.
+            progress: called after each replay of one recording.
+        """
+        work = [
+            (level, i, tuple(effects), self.samples[i])
+            for level, effects, which in jobs
+            for i in which
+        ]
+        told = iter(self._map(_replay, work, progress))
+        return [
+            [next(told) if i in which else otherwise[i] for i in range(len(self.recordings))]
+            for _, _, which in jobs
+        ]
+
+    def _open(self, replayers: dict[tuple[Level, int], Replayer]) -> None:
+        global _replayers
+        _replayers = replayers
+        # forked workers share what is in memory, compiled kernels too
+        context = multiprocessing.get_context("fork")
+        self._pool = ProcessPoolExecutor(self._workers, mp_context=context)
+
+    def _pool_or_fail(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            raise RuntimeError("the experiment is not open; use `with`")
+        return self._pool
+
+    def _map(self, function, work, progress=None):  # type: ignore[no-untyped-def]
+        futures = [self._pool_or_fail().submit(function, *w) for w in work]
+        results = []
+        for future in futures:
+            results.append(future.result())
+            if progress is not None:
+                progress()
+        return results
+
+
+_replayers: dict[tuple[Level, int], Replayer] = {}
+
+
+def _settle(key: tuple[Level, int]) -> FloatArray:
+    return _replayers[key].settled()
+
+
+def _replay(
+    level: Level, index: int, effects: tuple[Effect, ...], samples: npt.NDArray[np.int64]
+) -> Told:
+    p = _replayers[level, index].run(effects, gain=GAIN)
+    return Told(p.marker_position[samples], p.gripper_force[samples], p.contact[samples])
+
+
+def _samples(recording: Recording, period: float) -> npt.NDArray[np.int64]:
+    """Returns the indices of samples at least `period` apart."""
+    slots = np.floor((recording.time - recording.time[0]) / period + 1e-6)
+    return np.flatnonzero(np.diff(slots, prepend=-1.0) > 0)

@@ -1,0 +1,111 @@
+"""What `drake-dress explain` writes beside its report: explanation.json and extended.yaml."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drake_dress import __version__
+from drake_dress.diagrams.build import effects as effects_on
+from drake_dress.diagrams.scenario import Scenario, resolved_yaml
+from drake_dress.discrepancy.experiment import Experiment
+from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
+from drake_dress.discrepancy.where import Spot
+
+_SPOTS = 12
+
+
+def as_json(explanation: Explanation, spots: list[Spot], suggestion: str | None) -> dict[str, Any]:
+    """Returns the content of explanation.json."""
+    x = explanation
+    causes = []
+    for c in x.causes:
+        units = {} if c.effect is None else {p.name: p.unit for p in c.effect.parameters()}
+        values = {} if c.effect is None else c.effect.values()
+        causes.append(
+            {
+                "effect": c.name,
+                "parameters": {
+                    n: {"value": v, "std": c.std.get(n, 0.0), "unit": units[n]}
+                    for n, v in values.items()
+                },
+                "gain": c.gain,
+                "confidence": c.confidence,
+            }
+        )
+    return {
+        "schema": "drake_dress.explanation/1",
+        "version": __version__,
+        "verdict": x.verdict,
+        "causes": causes,
+        "candidates": [
+            {
+                "effect": s.name,
+                "score": s.screened if s.fitted is None else s.fitted,
+                "screened": s.screened,
+                "fitted": s.fitted,
+                "parameters": {} if s.effect is None else s.effect.values(),
+            }
+            for s in x.scores
+        ],
+        "suggestion": suggestion,
+        "residual": {
+            name: {"marker_m": pair[0], "force_N": pair[1]}
+            for name, pair in (("before", x.before), ("after", x.after), ("noise", x.noise))
+        },
+        "gain": {"value": x.gain[0], "low": x.gain[1], "high": x.gain[2], "level": 0.9},
+        "numerics_m": x.numerics,
+        "loss": x.loss,
+        "where": [vars(s) for s in spots[:_SPOTS]],
+    }
+
+
+def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Explanation) -> str:
+    """Returns the scenario with what was found, as YAML that `drake-dress run` takes."""
+    content = yaml.safe_load(resolved_yaml(scenario))
+    found: dict[str, Any] = {}
+    for effect in effects_on(scenario):
+        found[effect.NAME] = effect.values()
+    for c in explanation.causes:
+        if c.effect is None:
+            continue
+        found[c.name] = {
+            key: value
+            for n, v in c.effect.values().items()
+            for key, value in ((n, v), (f"{n}_std", c.std.get(n, 0.0)))
+        }
+    content["effects"] = found
+    if any(c.name == DISCRETISATION for c in explanation.causes):
+        n = experiment.numerics["refined"]
+        content["plant"].update(
+            spacing=n.spacing,
+            time_step=n.time_step,
+            iterations=n.iterations,
+            tolerance=n.tolerance,
+        )
+    # what is not there is not written: the loader refuses empty groups
+    text = yaml.safe_dump(_without_none(content), sort_keys=False)
+    head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
+    return head + text
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a file so that it is whole or not there."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Writes JSON so that it is whole or not there."""
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _without_none(v) for k, v in value.items() if v is not None}
+    return value

@@ -1,0 +1,69 @@
+"""What was found, in words that a lab member can read."""
+
+from __future__ import annotations
+
+from drake_dress.discrepancy.explanation import DISCRETISATION, Cause, Explanation
+
+_PLAIN = {
+    "discretisation": "the simulation's own step and mesh",
+    "air_drag": "the drag of the air",
+    "wind": "a wind",
+    "surface_density": "the weight of the cloth",
+    "local_mass": "a mass at one place of the garment",
+    "stretch_stiffness": "how stiff the cloth is against stretch",
+    "anisotropic_stiffness": "a warp that is stiffer than the weft",
+    "strain_stiffening": "cloth that stiffens as it stretches",
+    "bending_stiffness": "how stiff the cloth is against bending",
+    "internal_damping": "the cloth's internal damping",
+    "rest_size": "the garment's size at rest",
+    "friction": "the friction against the person",
+    "velocity_dependent_friction": "friction that depends on speed",
+    "anisotropic_friction": "friction that depends on direction",
+    "adhesion": "cloth that clings to the person",
+    "limb_radius": "the thickness of the limbs",
+    "limb_compliance": "limbs that give way",
+    "gripper_latency": "grippers that are late",
+    "gripper_slip": "cloth that creeps out of the grippers",
+    "gripper_compliance": "grippers that give way",
+    "time_offset": "cameras whose clock is off",
+    "camera_rotation": "cameras that are turned",
+    "camera_translation": "cameras that are displaced",
+    "gravity_tilt": "a world frame that is not level",
+}
+
+
+def plain(name: str) -> str:
+    """Returns an effect in plain words."""
+    return _PLAIN.get(name, name.replace("_", " "))
+
+
+def values(cause: Cause) -> str:
+    """Returns a cause's parameters with their uncertainties."""
+    if cause.effect is None:
+        return ""
+    parts = []
+    for p in cause.effect.parameters():
+        value, std = getattr(cause.effect, p.name), cause.std.get(p.name, 0.0)
+        unit = "" if p.unit == "1" else f" {p.unit}"
+        parts.append(f"{p.name.replace('_', ' ')} {value:.3g} ± {std:.1g}{unit}")
+    return ", ".join(parts)
+
+
+def headline(explanation: Explanation) -> str:
+    """Returns the verdict as one sentence."""
+    x = explanation
+    if x.verdict == "nothing":
+        return (
+            "The simulation explains the data to its noise: "
+            f"{1e3 * x.before[0]:.1f} mm are left, {1e3 * x.noise[0]:.1f} mm are noise, "
+            f"{1e3 * x.numerics:.1f} mm the simulation's own numerics."
+        )
+    if x.verdict == "unexplained":
+        near = f"; the nearest is {plain(x.causes[0].name)}" if x.causes else ""
+        return f"The simulation is off, and no effect of the list explains it{near}."
+    names = [
+        plain(c.name) + (f" ({values(c)})" if c.name != DISCRETISATION else "") for c in x.causes
+    ]
+    if x.verdict == "ambiguous":
+        return f"Either {' or '.join(names)}: these recordings do not tell them apart."
+    return f"What the simulation lacks is {', and '.join(names)}."

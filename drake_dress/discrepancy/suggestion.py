@@ -1,0 +1,81 @@
+"""What to record next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.discrepancy.experiment import levels
+from drake_dress.discrepancy.explanation import Explanation
+from drake_dress.discrepancy.generate import stage as stage_of
+from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.motions import MOTIONS
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.discrepancy.replay import Replayer
+from drake_dress.discrepancy.sentences import plain
+
+_DURATION, _RATE, _MARKERS = 4.0, 50.0, 40
+_WORDS = {
+    "sway": "sway the garment to and fro in the open",
+    "lift": "heave and twist the garment in the open",
+    "drag": "press the garment against the held-out arm and draw it up and down",
+    "shift": "press the garment against the held-out arm and draw it along the arm",
+    "pull": "draw the garment taut between the grippers",
+}
+
+
+def suggest(
+    explanation: Explanation,
+    scenario: Scenario,
+    base: Path,
+    stage: Callable[[str], None] = lambda _: None,
+) -> str | None:
+    """Returns which motion to record; None where nothing is open.
+
+    For two candidates every motion is simulated under both: that in which markers and forces differ
+    most, in units of their noise, tells them apart best.
+
+    Args:
+        explanation: what was found.
+        scenario: of the lab.
+        base: directory that a mesh file's name is relative to.
+        stage: told what is being done.
+    """
+    if explanation.verdict == "unexplained":
+        return (
+            "Record each of sway, lift, drag, shift and pull on its own, a few times, to see in "
+            "which the residual appears; the list of effects may lack its cause."
+        )
+    if explanation.verdict != "ambiguous":
+        return None
+    first, second = explanation.causes[-2:]
+    p = scenario.plant
+    numerics = levels(Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance))
+    lab = Lab.of(scenario, base, numerics["screening"])
+    scores = {}
+    for name in MOTIONS:
+        stage(f"simulating {name} under both candidates")
+        told = []
+        for cause in (first, second):
+            effects = [c.effect for c in (*explanation.causes[:-2], cause) if c.effect is not None]
+            told.append(Replayer(lab, _blank(lab, name)).run(effects, gain=0.0))
+        markers = (told[0].marker_position - told[1].marker_position) / 1e-3
+        forces = (told[0].gripper_force - told[1].gripper_force) / 0.05
+        scores[name] = float(np.mean(markers**2) + np.mean(forces**2))
+    best = max(scores, key=lambda n: scores[n])
+    return (
+        f"To tell {plain(first.name)} from {plain(second.name)}, {_WORDS.get(best, best)} "
+        f"(motion {best}): there the two differ by {np.sqrt(scores[best]):.1f} times the noise."
+    )
+
+
+def _blank(lab: Lab, motion: str) -> Recording:
+    time = np.arange(round(_DURATION * _RATE) + 1) / _RATE
+    path = MOTIONS[motion](stage_of(lab), _DURATION, np.random.default_rng(0))
+    rest = lab.garment.rest_position
+    nodes = np.linspace(0, len(rest) - 1, _MARKERS).astype(int)
+    unseen = np.full((len(time), _MARKERS, 3), np.nan)
+    return Recording(motion, time, path(time), unseen, rest[nodes])

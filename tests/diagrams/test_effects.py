@@ -1,0 +1,91 @@
+"""Effects in a scenario: read, refused, and at work in the station."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from drake_dress.diagrams.build import effects, plant_station
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
+from drake_dress.errors import UserError
+from drake_dress.models.effects.registry import EFFECTS
+from tests.discrepancy.data import SCENARIO
+
+QUICK = ["plant.spacing=0.06", "plant.time_step=0.01"]
+
+
+def test_every_effect_can_be_switched_on_and_loads_again(tmp_path):
+    settings = [
+        f"effects.{name}.{p.name}={p.typical}"
+        for name, kind in EFFECTS.items()
+        for p in kind.parameters()
+    ]
+    scenario = load_scenario(SCENARIO, settings)
+    assert [e.NAME for e in effects(scenario)] == list(EFFECTS)
+    copy = tmp_path / "all.yaml"
+    copy.write_text(resolved_yaml(scenario))
+    assert effects(load_scenario(copy)) == effects(scenario)
+
+
+def test_what_is_not_given_is_off_and_uncertainties_do_not_matter():
+    assert effects(load_scenario(SCENARIO)) == ()
+    told = load_scenario(SCENARIO, ["effects.air_drag.coefficient_std=0.3"])
+    assert effects(told) == ()
+
+
+@pytest.mark.parametrize(
+    "setting, words",
+    [
+        ("effects.air_drag.coefficient=-1", ["effects.air_drag.coefficient", "0 to 10"]),
+        ("effects.air_drag.size=1", ["effects.air_drag.size", "coefficient"]),
+        ("effects.airdrag.coefficient=1", ["effects.airdrag", "air_drag"]),
+        ("effects.wind.x=fast", ["effects.wind.x", "number"]),
+    ],
+)
+def test_bad_effects_are_named(setting, words):
+    with pytest.raises(UserError) as error:
+        load_scenario(SCENARIO, [setting])
+    for word in words:
+        assert word in str(error.value)
+
+
+def pulled(settings, seconds=0.5, command=(0.0, 0.0, 0.0)):
+    """Returns gripper forces (2,3), N, and the garment (n,3) after a while of hanging."""
+    scenario = load_scenario(SCENARIO, [*QUICK, *settings])
+    mesh = build_garment(scenario.garment, scenario.plant.spacing, SCENARIO.parent)
+    station = plant_station(scenario, mesh, None)
+    simulator = Simulator(station.diagram)
+    context = simulator.get_mutable_context()
+    for i, side in enumerate(("left", "right")):
+        port = station.diagram.GetInputPort(f"{side}_gripper.position_command")
+        port.FixValue(context, station.start_grippers[i] + np.array(command))
+    simulator.AdvanceTo(seconds)
+    forces = [
+        station.diagram.GetOutputPort(f"{side}_gripper.force_measured").Eval(context)
+        for side in ("left", "right")
+    ]
+    garment = station.diagram.GetOutputPort("cheat_garment_position").Eval(context)
+    return np.stack(forces), garment.reshape(-1, 3)
+
+
+def test_a_heavier_garment_weighs_on_the_station_s_grippers():
+    plain, _ = pulled([])
+    heavy, _ = pulled(["effects.surface_density.added=0.15"])
+    assert heavy[:, 2].sum() / plain[:, 2].sum() == pytest.approx(1.5, rel=0.02)
+
+
+def test_compliant_grippers_let_the_garment_down():
+    _, before = pulled([])
+    force, after = pulled(["effects.gripper_compliance.compliance=0.02"])
+    drop = np.mean(before[:, 2] - after[:, 2])
+    assert drop == pytest.approx(-0.02 * force[:, 2].mean(), rel=0.1)
+
+
+def test_late_grippers_move_the_garment_later():
+    ways = []
+    for delay in (0.0, 0.2):
+        setting = [] if delay == 0.0 else [f"effects.gripper_latency.delay={delay}"]
+        _, start = pulled(setting, 0.0)
+        _, after = pulled(setting, 0.25, (0.2, 0.0, 0.0))
+        ways.append(float((after - start)[:, 0].max()))
+    assert ways[1] < 0.3 * ways[0]

@@ -1,0 +1,88 @@
+"""From recordings to a verdict, on a lab so coarse that it takes seconds."""
+
+import json
+
+import numpy as np
+import pytest
+
+from drake_dress.diagrams.build import effects
+from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.discrepancy.candidates import candidates
+from drake_dress.discrepancy.experiment import Experiment
+from drake_dress.discrepancy.explanation import explain
+from drake_dress.discrepancy.fitting import solve_bounded
+from drake_dress.discrepancy.report import report_page
+from drake_dress.discrepancy.results import as_json, extended_yaml
+from drake_dress.discrepancy.where import spots
+from drake_dress.models.effects.mass import SurfaceDensity
+from tests.discrepancy.data import SCENARIO, quick_scenario, recordings
+
+
+@pytest.fixture(scope="module")
+def heavy():
+    """An experiment whose garment is heavier than the scenario's."""
+    made = recordings(("sway", "lift"), [SurfaceDensity(added=0.06)], duration=2.4)
+    with Experiment(quick_scenario(), SCENARIO.parent, made) as experiment:
+        yield experiment
+
+
+@pytest.fixture(scope="module")
+def found(heavy):
+    return explain(heavy)
+
+
+def test_the_cause_is_named_with_its_size(found):
+    assert found.verdict == "named"
+    assert found.causes[0].name == "surface_density"
+    assert found.causes[0].effect.added == pytest.approx(0.06, rel=0.1)
+    assert found.gain[1] <= found.gain[0] <= found.gain[2]
+    assert found.after[1] < 0.65 * found.before[1]
+
+
+def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
+    scenario = quick_scenario()
+    text = extended_yaml(scenario, heavy, found)
+    path = tmp_path / "extended.yaml"
+    path.write_text(text)
+    again = load_scenario(path)
+    assert effects(again) == found.effects
+    assert again.effects.surface_density.added_std > 0.0
+    told = found.comparison.told["refined"]
+    w = found.comparison.whitening
+    off = spots(
+        w,
+        w.vector(told),
+        heavy.recordings,
+        heavy.labs["scenario"].garment,
+        [t.contact for t in told],
+        heavy.samples,
+    )
+    content = json.loads(json.dumps(as_json(found, off, None), allow_nan=False))
+    assert content["verdict"] == "named"
+    assert content["causes"][0]["parameters"]["added"]["unit"] == "kg/m²"
+    assert len(content["candidates"]) == len({c["effect"] for c in content["candidates"]})
+    assert content["where"][0]["kind"] == "signal"
+    page = report_page(found, heavy, off, None, text)
+    assert "weight of the cloth" in page and page.count("data:image/svg+xml") >= 4
+
+
+def test_effects_that_need_contact_are_not_blamed_where_there_is_none(found):
+    scored = {s.name: s.screened for s in found.scores}
+    assert "friction" not in scored and "surface_density" in scored
+
+
+def test_bounded_least_squares_keeps_its_bounds():
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((200, 3))
+    truth = np.array([1.0, -2.0, 0.5])
+    residual = columns @ truth
+    free = solve_bounded(columns, residual, np.full(3, -np.inf), np.full(3, np.inf))
+    np.testing.assert_allclose(free, truth, rtol=1e-4)
+    bound = solve_bounded(columns, residual, np.zeros(3), np.full(3, 0.8))
+    assert np.all((bound >= -1e-9) & (bound <= 0.8 + 1e-9)) and bound[1] == pytest.approx(0.0)
+
+
+def test_effects_that_are_on_already_are_not_tried():
+    rest = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 3))
+    names = {c.name for c in candidates(rest, [SurfaceDensity(added=0.1)])}
+    assert "surface_density" not in names and "air_drag" in names

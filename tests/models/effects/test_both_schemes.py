@@ -1,0 +1,122 @@
+"""Effects act alike in the two schemes that simulate a plant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.effects.air import AirDrag
+from drake_dress.models.effects.composition import GarmentWithEffects
+from drake_dress.models.effects.contact import Adhesion, VelocityDependentFriction
+from drake_dress.models.effects.fabric import (
+    AnisotropicStiffness,
+    InternalDamping,
+    StrainStiffening,
+)
+from drake_dress.models.effects.mass import GravityTilt, LocalMass
+from tests.models.effects.scene import MATERIAL, sheet_mesh
+
+SCHEMES = ("implicit", "projective")
+SOFT = replace(MATERIAL, stretch_stiffness=60.0)
+
+
+def swung(effects, scheme, duration=0.3, step=1e-3):
+    """Returns a sheet that hangs from its top row, after the row has been drawn aside."""
+    x, faces = sheet_mesh()
+    top = np.flatnonzero(x[:, 2] == 0.0).astype(np.int32)
+
+    def make(elements, fabric, gravity, fibres, added):
+        if scheme == "implicit":
+            return ImplicitCloth(
+                elements,
+                fabric,
+                step,
+                top,
+                gravity,
+                tolerance=1e-6,
+                max_iterations=200,
+                fibres=fibres,
+                added_mass=added,
+            )
+        return ProjectiveDynamicsCloth(
+            elements,
+            fabric,
+            step,
+            top,
+            gravity,
+            tolerance=1e-7,
+            quasi_newton=True,
+            fibres=fibres,
+            added_mass=added,
+            predicted=True,
+        )
+
+    warp = np.tile([0.0, 0.0, -1.0], (len(faces), 1))
+    garment = GarmentWithEffects(x, faces, warp, SOFT, effects, make)
+    state = ClothState.at_rest(x)
+    for k in range(round(duration / step)):
+        speed = 0.8 * np.sin(np.pi * (k * step / duration)) ** 2
+        motion = np.tile([0.0, speed, 0.3 * speed], (len(top), 1))
+        state, _ = garment.step(state, Obstacles.none(), motion)
+    return state.x
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [AirDrag(coefficient=5.0)],
+        [AnisotropicStiffness(warp=100.0)],
+        [StrainStiffening(rate=100.0)],
+        [InternalDamping(added=0.02)],
+        [GravityTilt(about_x=0.2)],
+        [LocalMass(mass=0.1, x=0.1, z=-0.25)],
+    ],
+    ids=lambda e: e[0].NAME,
+)
+def test_an_effect_moves_a_swung_sheet_alike(effects):
+    changes = [swung(effects, scheme) - swung([], scheme) for scheme in SCHEMES]
+    size = np.abs(changes[0]).max()
+    assert size > 5e-4
+    assert np.abs(changes[0] - changes[1]).max() < 0.15 * size
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    "effect", [Adhesion(strength=10.0), VelocityDependentFriction(rate=5.0)], ids=lambda e: e.NAME
+)
+def test_contact_effects_slow_a_sheet_that_slides(scheme, effect):
+    x, faces = sheet_mesh(4, 4)
+    x = np.stack([x[:, 0], -x[:, 2], np.full(len(x), MATERIAL.margin)], axis=1)
+    none = np.zeros(0, dtype=np.int32)
+    step = 2e-3
+
+    def make(elements, fabric, gravity, fibres, added):
+        if scheme == "implicit":
+            return ImplicitCloth(elements, fabric, step, none, gravity, tolerance=1e-8)
+        return ProjectiveDynamicsCloth(
+            elements, fabric, step, none, gravity, tolerance=1e-7, quasi_newton=True
+        )
+
+    warp = np.tile([0.0, 1.0, 0.0], (len(faces), 1))
+    garment = GarmentWithEffects(x, faces[:, ::-1], warp, MATERIAL, [effect], make)
+    v = np.tile([0.5, 0.0, 0.0], (len(x), 1))
+    state = ClothState(
+        x, v, *(getattr(ClothState.at_rest(x), n) for n in ("mode", "reaction", "owner"))
+    )
+    speeds = [0.5]
+    for _ in range(20):
+        state, _ = garment.step(state, Obstacles.floor(), np.zeros((0, 3)))
+        speeds.append(float(state.v[:, 0].mean()))
+    g, rho, t = 9.81, MATERIAL.surface_density, 20 * step
+    mu = MATERIAL.friction
+    if effect.NAME == "adhesion":
+        expected = 0.5 - mu * (g + effect.strength / rho) * t
+    else:
+        # dv/dt = −g (μ + c v)
+        c = effect.rate
+        expected = (0.5 + mu / c) * np.exp(-g * c * t) - mu / c
+    assert speeds[-1] == pytest.approx(max(expected, 0.0), abs=0.03)
+    assert all(b <= a + 1e-9 for a, b in zip(speeds, speeds[1:], strict=False))
