@@ -152,3 +152,34 @@ def test_bad_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     for word in words:
         assert word in line, line
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "words, expected",
+    [
+        (["explain", "none.h5", "--scenario", "SCENARIO"], ["none.h5", "no such file"]),
+        (["explain", "SCENARIO", "--scenario", "SCENARIO"], ["unknown kind", ".h5"]),
+        (["explain", "none.h5", "--scenario", "no.yaml"], ["no.yaml", "no such file"]),
+        (
+            ["dataset", "measured", "--hide", "air_drug", "--out", "OUT", "--scenario", "SCENARIO"],
+            ["--hide", "air_drug", "air_drag"],
+        ),
+        (
+            ["dataset", "measured", "--hide", "wind", "--seed", "-1", "--out", "OUT"]
+            + ["--scenario", "SCENARIO"],
+            ["--seed", "0 or more"],
+        ),
+    ],
+)
+def test_measured_data_that_cannot_be_used(tmp_path, capsys, words, expected):
+    scenario = str(Path(__file__).parents[1] / "scenarios" / "measured.yaml")
+    out = tmp_path / "out"
+    words = [{"SCENARIO": scenario, "OUT": str(out)}.get(w, w) for w in words]
+    if words[0] == "explain":
+        words += ["--out", str(out)]
+    assert main(words) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1 and line.startswith("drake-dress: ")
+    for word in expected:
+        assert word in line
+    assert not out.exists()

@@ -32,12 +32,13 @@ FloatArray = npt.NDArray[np.float64]
 
 DISCRETISATION = "discretisation"
 # Least share of the held-out loss that a cause takes away; what numerics can feign stays below.
-LEAST_GAIN = 0.06
+LEAST_GAIN = 0.09
 # Numerics are named where they are off by so many times the markers' noise, and refining them takes
 # away at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
-# Two causes are not told apart where the second takes away this share of what the first does.
-_ALIKE = 0.93
+# Two causes are not told apart where the first is the better one in less than this share of the
+# resamples of blocks.
+_SURE = 0.9
 # A residual is unexplained where so many times the noise's variance is left, and less than this
 # share of what exceeds noise has been explained.
 _LEFT, _EXPLAINED = 2.0, 0.5
@@ -171,8 +172,7 @@ def explain(
         fit = fits[best]
         confidence = _confidence(before, after, best, judged, rng)
         second = gains[int(order[1])] if len(order) > 1 else 0.0
-        if round_ == 0 and second > _ALIKE * gains[best]:
-            rival = True
+        rival = round_ == 0 and confidence < _SURE and second >= LEAST_GAIN
         causes = _updated(causes, fit) + [_cause(fit, gains[best], confidence)]
         if rival:
             other = fits[int(order[1])]

@@ -19,7 +19,7 @@ from drake_dress.discrepancy.recording import Recording
 FloatArray = npt.NDArray[np.float64]
 
 # Share of the difference between scenario and refined replay that the refined one may still be off.
-NUMERICS_SHARE = 1.0
+NUMERICS_SHARE = 0.75
 # Length of a block that is judged as one, s; time over which numerics are averaged, s.
 BLOCK, _AVERAGED = 0.5, 0.3
 
