@@ -15,7 +15,7 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
-from drake_dress.discrepancy.generate import Sensors, measured, record, truth
+from drake_dress.discrepancy.generate import Sensors, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, RANDOM, draw_hidden
 from drake_dress.discrepancy.motions import MOTIONS
 from drake_dress.discrepancy.reading import read_recordings
@@ -105,16 +105,22 @@ def write_dataset(
     if seed < 0:
         raise UserError("--seed", "", f"is {seed}, expected 0 or more")
     scenario = load_scenario(scenario_file, overrides)
-    rng = np.random.default_rng([seed, *hide.encode()])
+    seeds = [seed, *hide.encode()]
+    rng = np.random.default_rng(seeds)
     hidden = draw_hidden(hide, rng, size)
     sensors = sensors or Sensors()
-    lab = truth(scenario, Path(scenario_file).parent, hidden)
-    recordings = []
     with _progress() as (stage, _):
-        for name in MOTIONS:
-            stage(f"recording {name}")
-            clean = record(lab, name, DURATION, sensors, rng)
-            recordings.append(measured(clean, sensors, rng))
+        stage(f"recording {', '.join(MOTIONS)}")
+        clean = record_all(
+            scenario,
+            Path(scenario_file).parent,
+            hidden,
+            seeds,
+            DURATION,
+            sensors,
+            done=lambda name: stage(f"recorded {name}"),
+        )
+    recordings = [measured(r, sensors, rng) for r in clean]
     out.mkdir(parents=True, exist_ok=True)
     write_recordings(out / "measured.h5", recordings, resolved_yaml(scenario))
     names = [e.NAME for e in hidden]

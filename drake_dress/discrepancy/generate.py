@@ -6,7 +6,10 @@ step, other random draws, and a motion-capture system's noise and drop-outs on w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -103,6 +106,42 @@ def record(
         marker_noise=sensors.marker_noise,
         force_noise=sensors.force_noise,
     )
+
+
+def record_all(
+    scenario: Scenario,
+    base: Path,
+    effects: Sequence[Effect],
+    seed: Sequence[int],
+    duration: float,
+    sensors: Sensors,
+    workers: int | None = None,
+    done: Callable[[str], None] = lambda _: None,
+) -> list[Recording]:
+    """Returns a recording of every motion without noise; motions run side by side.
+
+    Args:
+        scenario: that knows nothing of the effects.
+        base: directory that a mesh file's name is relative to.
+        effects: of the truth.
+        seed: of what is drawn; each motion draws from its own source.
+        duration: of each, s.
+        sensors: their rate and number are used.
+        workers: processes; by default as many as there are cores.
+        done: told the name of each motion that is there.
+    """
+    lab = truth(scenario, base, effects)
+    context = multiprocessing.get_context("fork")
+    recordings = []
+    with ProcessPoolExecutor(workers or os.cpu_count() or 1, mp_context=context) as pool:
+        futures = [
+            pool.submit(record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
+            for k, name in enumerate(MOTIONS)
+        ]
+        for name, future in zip(MOTIONS, futures, strict=True):
+            recordings.append(future.result())
+            done(name)
+    return recordings
 
 
 def measured(recording: Recording, sensors: Sensors, rng: np.random.Generator) -> Recording:

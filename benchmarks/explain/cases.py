@@ -1,0 +1,92 @@
+"""What is hidden in which case, and how it is made; what was made once is kept."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pickle
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.discrepancy.generate import Sensors, measured, record_all
+from drake_dress.discrepancy.hidden import NOTHING, SIZES, draw_hidden
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.effects.effect import Effect
+
+DURATION = 4.0
+# The model run coarsely on purpose: five times the step, one iteration.
+COARSE = ("plant.time_step=0.02", "plant.iterations=1")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One set of recordings.
+
+    Attributes:
+        group: effect, nothing, pair or coarse.
+        hide: effects joined by "+", or nothing.
+        seed: of all that is drawn.
+        size: of the effect, times what matters.
+        marker_noise, force_noise: m, N.
+    """
+
+    group: str
+    hide: str
+    seed: int
+    size: float = 1.0
+    marker_noise: float = 1e-3
+    force_noise: float = 0.05
+
+    @property
+    def name(self) -> str:
+        """For files and tables."""
+        return f"{self.group}-{self.hide}-{self.seed}-{self.size:g}-{self.marker_noise:g}"
+
+
+def cases(groups: Sequence[str], draws: dict[str, int], seed: int, size: float, noise: float):
+    """Returns the cases of the groups asked for, `draws` of each."""
+    found: list[Case] = []
+    forces = 50.0 * noise
+
+    def add(group: str, hide: str, k: int) -> None:
+        found.append(Case(group, hide, seed + k, size, noise, forces))
+
+    for k in range(max(draws.values(), default=0)):
+        if "effect" in groups and k < draws["effect"]:
+            for name in SIZES:
+                add("effect", name, k)
+        if "nothing" in groups and k < draws["nothing"]:
+            add("nothing", NOTHING, k)
+        if "pair" in groups and k < draws["pair"]:
+            rng = np.random.default_rng([seed + k, 2])
+            add("pair", "+".join(rng.choice(list(SIZES), 2, replace=False)), k)
+        if "coarse" in groups and k < draws["coarse"]:
+            add("coarse", NOTHING, k)
+    return found
+
+
+def make(
+    case: Case, scenario: Scenario, base: Path, cache: Path
+) -> tuple[list[Effect], list[Recording]]:
+    """Returns what was hidden and what was measured; the truth without noise is kept in `cache`."""
+    seeds = [case.seed, *case.hide.encode()]
+    hidden = draw_hidden(case.hide, np.random.default_rng(seeds), case.size)
+    sensors = Sensors(marker_noise=case.marker_noise, force_noise=case.force_noise)
+    key = json.dumps(
+        [case.hide, case.seed, case.size, DURATION, *[repr(e) for e in hidden], str(scenario)]
+    )
+    path = cache / f"truth-{hashlib.sha256(key.encode()).hexdigest()[:16]}.pickle"
+    if path.exists():
+        clean = pickle.loads(path.read_bytes())
+    else:
+        clean = record_all(scenario, base, hidden, seeds, DURATION, sensors)
+        cache.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial")
+        partial.write_bytes(pickle.dumps(clean))
+        partial.replace(path)
+    rng = np.random.default_rng([case.seed, round(1e6 * case.marker_noise), *case.hide.encode()])
+    return hidden, [measured(r, sensors, rng) for r in clean]
