@@ -30,6 +30,8 @@ CLOSE, FEW = 3e-4, 20
 ENTERED, ATTEMPTS = 1e-6, 3
 # A way this short passes by no body unseen, m.
 SHORT_WAY = 0.005
+# Gap of nodes that nothing is near to, m.
+_FAR_GAP = 1e6
 # Farthest a node in contact is from the origin of a body, m.
 _LARGEST_ARM = 1.0
 
@@ -50,6 +52,28 @@ class Proximity:
     normal: FloatArray
     slope: FloatArray
     surface_velocity: FloatArray
+
+
+def out_of_reach(x: FloatArray, obstacles: Obstacles, distance: float) -> bool:
+    """Returns whether all of `x` (n,3) is farther than `distance`, m, from everything.
+
+    By bounding boxes: False may be too careful, True is not.
+    """
+    if obstacles.solids:
+        return False
+    o, plane = obstacles, obstacles.half_spaces
+    return bool(_out_of_reach(x, o.a, o.b, o.radius, plane.point, plane.normal, distance))
+
+
+def nothing_near(count: int) -> Proximity:
+    """Returns `count` nodes that are far from everything."""
+    return Proximity(
+        np.full(count, _FAR_GAP),
+        np.full(count, -1, dtype=np.int32),
+        np.zeros((count, 3)),
+        np.ones(count),
+        np.zeros((count, 3)),
+    )
 
 
 def find_proximity(
@@ -225,6 +249,31 @@ def _surface(
 def fastest(obstacles: Obstacles) -> float:
     """Returns a bound on the speed of surfaces near the garment, m/s."""
     return float(_fastest(*obstacles.twists()))
+
+
+@nb.njit(cache=True, nogil=True)
+def _out_of_reach(x, a, b, radius, point, normal, distance):  # type: ignore[no-untyped-def]
+    low, high = x[0].copy(), x[0].copy()
+    for i in range(x.shape[0]):
+        for c in range(3):
+            low[c] = min(low[c], x[i, c])
+            high[c] = max(high[c], x[i, c])
+    for k in range(radius.shape[0]):
+        apart2 = 0.0
+        for c in range(3):
+            below = min(a[k, c], b[k, c]) - high[c]
+            above = low[c] - max(a[k, c], b[k, c])
+            apart2 += max(below, above, 0.0) ** 2
+        if apart2 <= (radius[k] + distance) ** 2:
+            return False
+    for k in range(point.shape[0]):
+        height = 0.0
+        for c in range(3):
+            nearest = low[c] if normal[k, c] > 0.0 else high[c]
+            height += (nearest - point[k, c]) * normal[k, c]
+        if height <= distance:
+            return False
+    return True
 
 
 @nb.njit(cache=True, nogil=True)
