@@ -135,9 +135,7 @@ def _run(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(options.scenario, options.set, options.seed)
     source = Path(options.scenario)
-    out = Path(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
-    if out.exists() and not out.is_dir():
-        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
     return run_scenario(scenario, source, out, options.meshcat, options.realtime_rate)
 
 
@@ -150,9 +148,7 @@ def _replay(options: argparse.Namespace) -> int:
 def _explain(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.commands import explain_files
 
-    out = Path(options.out or Path("out") / f"explain-{Path(options.measured[0]).stem}")
-    if out.exists() and not out.is_dir():
-        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    out = _directory(options.out or Path("out") / f"explain-{Path(options.measured[0]).stem}")
     explain_files(options.measured, options.scenario, options.set, out, options.workers)
     return 0
 
@@ -161,9 +157,7 @@ def _dataset_measured(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.commands import write_dataset
     from drake_dress.discrepancy.generate import Sensors
 
-    out = Path(options.out)
-    if out.exists() and not out.is_dir():
-        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    out = _directory(options.out)
     sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
     write_dataset(
         options.hide, options.seed, out, options.scenario, options.set, options.size, sensors
@@ -184,6 +178,14 @@ def _bench(words: list[str]) -> int:
     module = importlib.import_module(f"benchmarks.{name}.__main__")
     status: int = module.main(arguments)
     return status
+
+
+def _directory(out: str | Path) -> Path:
+    """Returns where to write; it need not be there yet."""
+    out = Path(out)
+    if out.exists() and not out.is_dir():
+        raise UserError("--out", "", f"{out} is a file, expected a directory")
+    return out
 
 
 def _rate(text: str) -> float:

@@ -12,24 +12,17 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
+from benchmarks.parser import INTERRUPTED, OneLineParser
 from drake_dress.interrupt import caught_interrupt
 
-UNUSABLE, INTERRUPTED = 2, 130
 # In the order of the paper, then what it does not have.
 SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying", "layers")
 _PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
 _QUICK_LIMIT = 1.0
-
-
-class _Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(UNUSABLE, f"drake-dress: bench cloth: {message}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="drake-dress bench cloth", description=__doc__.splitlines()[0])
+    parser = OneLineParser(prog="drake-dress bench cloth", description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=_file, metavar="FILE", help="write all figures here")
     parser.add_argument("--png", type=_folder, metavar="DIR", help="write plots as cloth_*.png")
     parser.add_argument(

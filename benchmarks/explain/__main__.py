@@ -13,12 +13,13 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.explain.cases import COARSE, Case, cases, make
+from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation, explain
@@ -26,17 +27,9 @@ from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.effects.effect import Effect
 
-UNUSABLE, INTERRUPTED = 2, 130
 GROUPS = ("effect", "nothing", "pair", "coarse")
 _DRAWS = {"effect": 4, "nothing": 40, "pair": 20, "coarse": 10}
 _SCENARIO = Path(__file__).parents[2] / "scenarios" / "measured.yaml"
-
-
-class _Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(UNUSABLE, f"drake-dress: bench explain: {message}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -175,7 +168,7 @@ def _line(result: dict[str, Any]) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="drake-dress bench explain", description=__doc__)
+    parser = OneLineParser(prog="drake-dress bench explain", description=__doc__)
     parser.add_argument(
         "--only", type=_groups, default=list(GROUPS), metavar="GROUP,…", help=", ".join(GROUPS)
     )

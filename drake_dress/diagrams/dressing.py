@@ -19,7 +19,7 @@ from drake_dress.models.effects.sensing import TimeOffset
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
-from drake_dress.systems.delay import Delay
+from drake_dress.systems.delay import delayed
 from drake_dress.systems.garment_oracle import GarmentOracle
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
@@ -97,14 +97,10 @@ def make_dressing(
     late = -float(true_times(np.zeros(1), effects, TimeOffset.NAME)[0])
     for quantity in ("position", "velocity"):
         port = garment.GetOutputPort(f"estimated_{quantity}")
-        if late > 0.0:
-            still = np.zeros(port.size())
-            if quantity == "position":
-                held = station.cloth.start_position
-                still = np.asarray(transfer @ held).ravel()
-            line = builder.AddSystem(Delay(still, rates.command_period, late))
-            builder.Connect(port, line.get_input_port())
-            port = line.get_output_port()
+        still = np.zeros(port.size())
+        if quantity == "position":
+            still = np.asarray(transfer @ station.cloth.start_position).ravel()
+        port = delayed(builder, port, still, rates.command_period, late)
         builder.Connect(port, mpc.GetInputPort(f"garment_{quantity}"))
     connect(predictor, "predicted_joint_position", mpc, "predicted_joint_position")
     connect(mpc, "plan", follower, "plan")

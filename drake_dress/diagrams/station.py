@@ -13,7 +13,7 @@ What only simulation can know has the prefix `cheat_`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
@@ -23,15 +23,12 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.person import JointParameters, Person, add_person
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
 from drake_dress.models.effects.composition import (
     GarmentWithEffects,
-    MakeIntegrator,
     body_with_effects,
     true_times,
 )
@@ -43,7 +40,7 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_height
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.systems.cloth_plant import ClothPlant
-from drake_dress.systems.delay import Delay
+from drake_dress.systems.delay import delayed
 from drake_dress.systems.floating_gripper import FloatingGripper
 
 FloatArray = np.ndarray
@@ -136,11 +133,8 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
         for quantity in ("position", "velocity"):
             port = gripper.GetOutputPort(f"{quantity}_measured")
             builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
-            if late > 0.0:
-                first = grippers[i] if quantity == "position" else np.zeros(3)
-                line = builder.AddSystem(Delay(first, p.time_step, late))
-                builder.Connect(port, line.get_input_port())
-                port = line.get_output_port()
+            first = grippers[i] if quantity == "position" else np.zeros(3)
+            port = delayed(builder, port, first, p.time_step, late)
             builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
         builder.ExportInput(
             gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
@@ -160,38 +154,14 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
 
 def _integrator(p: StationParameters, held: np.ndarray) -> Integrator:
     """Returns what steps the plant's garment."""
-
-    def make(
-        elements: Elements,
-        material: Material,
-        gravity: FloatArray,
-        fibres: Fibres | None,
-        added_mass: FloatArray | None,
-    ) -> Integrator:
-        if p.integrator == "projective_dynamics":
-            return ProjectiveDynamicsCloth(
-                elements,
-                material,
-                p.time_step,
-                held,
-                gravity,
-                quasi_newton=True,
-                fibres=fibres,
-                added_mass=added_mass,
-            )
-        return ImplicitCloth(
-            elements,
-            material,
-            p.time_step,
-            held,
-            gravity,
-            tolerance=p.tolerance,
-            max_iterations=p.iterations,
-            fibres=fibres,
-            added_mass=added_mass,
-        )
-
-    integrator = _with_effects(p, make)
+    scheme = Scheme(
+        held,
+        p.time_step,
+        p.integrator == "projective_dynamics",
+        p.tolerance,
+        p.iterations,
+    )
+    integrator = _with_effects(p, scheme)
     return LayeredCloth(integrator) if p.self_collision else integrator
 
 
@@ -203,20 +173,7 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
 
 def settled(p: StationParameters, hung: FloatArray, held: np.ndarray) -> FloatArray:
     """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
-
-    def make(
-        elements: Elements,
-        material: Material,
-        gravity: FloatArray,
-        fibres: Fibres | None,
-        added_mass: FloatArray | None,
-    ) -> Integrator:
-        damped = replace(material, damping=_SETTLING_DAMPING)
-        return ImplicitCloth(
-            elements, damped, p.time_step, held, gravity, fibres=fibres, added_mass=added_mass
-        )
-
-    cloth = _with_effects(p, make)
+    cloth = _with_effects(p, Scheme(held, p.time_step, damping=_SETTLING_DAMPING))
     state = ClothState.at_rest(hung)
     still = np.zeros((len(held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):

@@ -33,13 +33,11 @@ class Screened:
         candidate: which.
         start: the effect with the coefficients found.
         gain: share of the held-out loss taken away.
-        z: that gain over its standard error between blocks.
     """
 
     candidate: Candidate
     start: Effect
     gain: float
-    z: float
 
 
 @dataclass(frozen=True)
@@ -53,10 +51,6 @@ class Comparison:
 
     whitening: Whitening
     told: dict[Level, list[Told]]
-
-    def loss(self, predicted: FloatArray) -> FloatArray:
-        """Returns (B,) the summed squared whitened residual of each block."""
-        return block_loss(self.whitening, predicted)
 
 
 def block_loss(whitening: Whitening, predicted: FloatArray) -> FloatArray:
@@ -73,7 +67,6 @@ def held_out(whitening: Whitening) -> npt.NDArray[np.bool_]:
 
 
 def screen(
-    experiment: Experiment,
     comparison: Comparison,
     columns: Sequence[tuple[Candidate, FloatArray]],
     predicted: FloatArray,
@@ -95,14 +88,12 @@ def screen(
             x = solve_bounded(matrix[train], residual[train], low, high)
             after[~train] -= matrix[~train] @ x
         saved = before - np.bincount(w.block, after * after)
-        error = max(float(saved.std()) * np.sqrt(len(saved)), 1e-12)
         x = solve_bounded(matrix, residual, low, high)
         found.append(
             Screened(
                 candidate,
                 candidate.effect(x),
                 float(saved.sum() / before.sum()),
-                float(saved.sum()) / error,
             )
         )
     return sorted(found, key=lambda s: -s.gain)

@@ -12,6 +12,7 @@ from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mass import LocalMass
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.garment.sampling import spread_out
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -89,7 +90,8 @@ def candidates(rest_position: FloatArray, on: Sequence[Effect] = ()) -> list[Can
         if name in taken:
             continue
         if kind is LocalMass:
-            for place in rest_position[_spread_out(rest_position, _PLACES)]:
+            lowest = int(np.argmin(rest_position[:, 2]))
+            for place in rest_position[spread_out(rest_position, _PLACES, lowest)]:
                 x, y, z = place.tolist()
                 mass = LocalMass(mass=0.05, x=x, y=y, z=z)
                 found.append(Candidate(name, (Probe(mass, "mass", 0.0),)))
@@ -111,13 +113,3 @@ def shifted(effect: Effect, parameter: str, by: float) -> Effect:
     value = getattr(effect, parameter)
     moved = value + by if p.low <= value + by <= p.high else value - by
     return replace(effect, **{parameter: moved})
-
-
-def _spread_out(points: FloatArray, count: int) -> npt.NDArray[np.int64]:
-    """Returns indices of `count` points (n,3) far from each other, the lowest first."""
-    chosen = [int(np.argmin(points[:, 2]))]
-    distance = np.linalg.norm(points - points[chosen[0]], axis=1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)

@@ -8,7 +8,7 @@ most of what was held out; look for another in what is left, until nothing more 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -112,7 +112,6 @@ class Explanation:
     numerics: float
     comparison: Comparison
     predicted: FloatArray
-    notes: list[str] = field(default_factory=list)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -147,7 +146,7 @@ def explain(
 
     stage("screening effects")
     columns = probe(experiment, comparison, (), progress)
-    screened = screen(experiment, comparison, columns, refined)
+    screened = screen(comparison, columns, refined)
     scores = {
         s.candidate.name: Score(s.candidate.name, s.gain, None, s.start)
         for s in best_of_each(screened)
@@ -194,7 +193,7 @@ def explain(
             rival = True
             causes.append(_cause(contenders[1 - best].fit, gains[1 - best], 1.0 - confidence))
             break
-        screened = screen(experiment, comparison, columns, predicted)
+        screened = screen(comparison, columns, predicted)
     return _concluded(
         comparison, causes, scores, scenario, refined, predicted, numerics, rival, rng
     )

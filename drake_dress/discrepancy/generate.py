@@ -23,6 +23,7 @@ from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.models.effects.composition import seen_points
 from drake_dress.models.effects.effect import Effect
+from drake_dress.models.garment.sampling import spread_out
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -93,7 +94,7 @@ def record(
     time = np.arange(round(duration * sensors.rate) + 1) / sensors.rate
     path = MOTIONS[motion](stage(lab), duration, rng)
     rest = lab.garment.rest_position
-    nodes = _spread_out(rest, sensors.markers, int(rng.integers(len(rest))))
+    nodes = spread_out(rest, sensors.markers, int(rng.integers(len(rest))))
     posed = lab.person([]).posed
     joints = seen_points(np.tile(posed, (len(time), 1, 1)), lab.effects)
     unseen = np.full((len(time), len(nodes), 3), np.nan)
@@ -164,13 +165,3 @@ def measured(recording: Recording, sensors: Sensors, rng: np.random.Generator) -
         marker_noise=sensors.marker_noise,
         force_noise=sensors.force_noise,
     )
-
-
-def _spread_out(points: FloatArray, count: int, first: int) -> npt.NDArray[np.int64]:
-    """Returns indices of `count` points (n,3) that are far from each other."""
-    chosen = [first]
-    distance = np.linalg.norm(points - points[first], axis=1)
-    while len(chosen) < count:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +12,12 @@ from drake_dress.diagrams.build import arm, effects, material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
-from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.implicit import ImplicitCloth
-from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.composition import GarmentWithEffects, body_with_effects
 from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.mounts import displaced, limb_forces
 from drake_dress.models.garment.grain import grain
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import (
@@ -30,6 +28,9 @@ from drake_dress.models.human.body import (
     body_capsules,
 )
 from drake_dress.models.sides import SIDES, Side
+
+# Distance to the fixed point at which Projective Dynamics stops, m.
+_ACCURACY = 2e-5
 
 
 @dataclass(frozen=True)
@@ -121,50 +122,23 @@ class Lab:
             time_step: in place of the numerics', s.
         """
         n = self.numerics
-        held = self.held[0]
-        h = time_step or n.time_step
-
-        def make(
-            elements: Elements,
-            fabric: Material,
-            gravity: FloatArray,
-            fibres: Fibres | None,
-            added_mass: FloatArray | None,
-        ) -> Integrator:
-            if damping is not None:
-                fabric = replace(fabric, damping=damping)
-            if n.integrator == "projective_dynamics" and damping is None:
-                return ProjectiveDynamicsCloth(
-                    elements,
-                    fabric,
-                    h,
-                    held,
-                    gravity,
-                    tolerance=2e-5,
-                    quasi_newton=True,
-                    fibres=fibres,
-                    added_mass=added_mass,
-                    predicted=True,
-                )
-            return ImplicitCloth(
-                elements,
-                fabric,
-                h,
-                held,
-                gravity,
-                tolerance=n.tolerance,
-                max_iterations=n.iterations,
-                fibres=fibres,
-                added_mass=added_mass,
-            )
-
+        scheme = Scheme(
+            self.held[0],
+            time_step or n.time_step,
+            n.integrator == "projective_dynamics" and damping is None,
+            n.tolerance,
+            n.iterations,
+            _ACCURACY,
+            predicted=True,
+            damping=damping,
+        )
         return GarmentWithEffects(
             self.garment.rest_position,
             self.garment.faces,
             grain(self.garment),
             self.material,
             self.with_effects(further),
-            make,
+            scheme,
         )
 
     def person(self, further: Sequence[Effect]) -> PersonShape:
@@ -212,10 +186,7 @@ class PersonShape:
 
     def displaced(self, bodies: Obstacles, displacement: FloatArray, rate: FloatArray) -> Obstacles:
         """Returns the person with limbs displaced by (4,3), m, at (4,3), m/s."""
-        rows = self.limb >= 0
-        u, w = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
-        u[rows], w[rows] = displacement[self.limb[rows]], rate[self.limb[rows]]
-        return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + w)
+        return displaced(bodies, self.limb, displacement, rate)
 
     def limb_forces(self, owner: IntArray, reaction: FloatArray) -> FloatArray:
         """Returns (4,3) the force of the garment on the limbs, N.
@@ -224,8 +195,4 @@ class PersonShape:
             owner: (n,) capsule that a node touches, −1 without.
             reaction: (n,3) of the person on the nodes, N.
         """
-        force = np.zeros((self.LIMBS, 3))
-        rows = np.flatnonzero(owner >= 0)
-        limb = self.limb[owner[rows]]
-        np.subtract.at(force, limb[limb >= 0], reaction[rows[limb >= 0]])
-        return force
+        return limb_forces(self.limb, self.LIMBS, owner, reaction)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,7 @@ from drake_dress.models.effects.composition import (
     seen_points,
     true_times,
     world_points,
+    world_rates,
 )
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mounts import Mounts, MountState
@@ -217,7 +219,7 @@ class Replayer:
         x, v, known = self._seen
         stamped = true_times(self.recording.time, effects, "time_offset")
         position = world_points(x, effects)
-        rate = world_points(v, effects) - world_points(np.zeros(3), effects)
+        rate = world_rates(v, effects)
         # between a frame that is known and one that is not, nothing is known
         share = np.floor(_at(clock, stamped, known.astype(np.float64)) + 1e-9)
         share[(clock < stamped[0]) | (clock > stamped[-1])] = 0.0
@@ -234,10 +236,10 @@ class Replayer:
         x, v, _ = self._joint_track
         return (
             _at(clock, stamped, world_points(x, effects)),
-            _at(clock, stamped, world_points(v, effects) - world_points(np.zeros(3), effects)),
+            _at(clock, stamped, world_rates(v, effects)),
         )
 
-    @property
+    @cached_property
     def _joint_track(self) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
         measured = self.recording.joint_position
         assert measured is not None

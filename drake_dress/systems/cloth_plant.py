@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from pydrake.common.value import Value
@@ -16,7 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
-from drake_dress.models.effects.mounts import Mounts, MountState
+from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.human.body import Capsule
 
 FloatArray = np.ndarray
@@ -159,7 +158,7 @@ class ClothPlant(LeafSystem):
         if not self._mounts.rigid:
             mount = self._mounted(context, state)
             target += mount.held
-            bodies = self._displaced(bodies, mount)
+            bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
             discrete.set_value(self._mount, mount.flat())
         held_velocity = (target[self._side] + self._offset - held) / h
         try:
@@ -176,18 +175,9 @@ class ClothPlant(LeafSystem):
     def _mounted(self, context: Context, state: ClothState) -> MountState:
         """Returns how far grippers and limbs have given way at the end of this step."""
         pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
-        rows = np.flatnonzero(state.owner >= 0)
-        limb = self._limb_of[state.owner[rows]]
         mount = MountState.of(context.get_discrete_state(self._mount).value())
-        force = np.zeros_like(mount.limb)
-        np.subtract.at(force, limb[limb >= 0], state.reaction[rows[limb >= 0]])
+        force = limb_forces(self._limb_of, len(mount.limb), state.owner, state.reaction)
         return self._mounts.step(mount, np.stack(pulled), force, self.cloth.time_step)
-
-    def _displaced(self, bodies: Obstacles, mount: MountState) -> Obstacles:
-        rows = self._limb_of >= 0
-        u, rate = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
-        u[rows], rate[rows] = mount.limb[self._limb_of[rows]], mount.limb_rate[self._limb_of[rows]]
-        return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + rate)
 
     def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""

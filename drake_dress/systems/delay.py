@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    LeafSystem,
+    OutputPort,
+)
 
 FloatArray = np.ndarray
 
@@ -46,3 +53,14 @@ class Delay(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state(self._line).value()[: self._size])
+
+
+def delayed(
+    builder: DiagramBuilder, port: OutputPort, start: FloatArray, period: float, delay: float
+) -> OutputPort:
+    """Returns `port` held back by a `Delay`; itself where the delay, s, is not positive."""
+    if delay <= 0.0:
+        return port
+    line = builder.AddSystem(Delay(start, period, delay))
+    builder.Connect(port, line.get_input_port())
+    return line.get_output_port()

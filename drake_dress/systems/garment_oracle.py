@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from drake_dress.models.effects.composition import seen_points
+from drake_dress.models.effects.composition import seen_points, seen_rates
 from drake_dress.models.effects.effect import Effect
 
 
@@ -47,9 +47,7 @@ class GarmentOracle(LeafSystem):
     def _calc(self, port: int, n: int):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
             value = self.get_input_port(port).Eval(context).reshape(n, 3)
-            seen = seen_points(np.asarray(self._transfer @ value), self._effects)
-            if port == 1:
-                seen = seen - seen_points(np.zeros(3), self._effects)
-            output.SetFromVector(seen.ravel())
+            see = (seen_points, seen_rates)[port]
+            output.SetFromVector(see(np.asarray(self._transfer @ value), self._effects).ravel())
 
         return calc

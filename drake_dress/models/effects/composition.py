@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -15,8 +15,8 @@ from drake_dress.models.cloth.elements import Elements, FloatArray, make_element
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.implicit import GRAVITY, ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
-from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.scheme import MakeIntegrator
 from drake_dress.models.effects.effect import (
     AdhesionEffect,
     BodyEffect,
@@ -37,10 +37,6 @@ from drake_dress.models.effects.effect import (
 )
 from drake_dress.models.human.body import BodyMeasures
 
-# Elements, fabric, gravity (3,), fibres and added mass (n,) to what steps the garment.
-MakeIntegrator = Callable[
-    [Elements, Material, FloatArray, Fibres | None, FloatArray | None], Integrator
-]
 Kind = TypeVar("Kind", bound=Effect)
 
 
@@ -166,6 +162,16 @@ def world_points(position: FloatArray, effects: Sequence[Effect]) -> FloatArray:
     for effect in reversed(of_kind(effects, CameraEffect)):
         position = effect.inverse(position)
     return position
+
+
+def seen_rates(rate: FloatArray, effects: Sequence[Effect]) -> FloatArray:
+    """Returns what cameras with these effects report of velocities (…,3), m/s."""
+    return seen_points(rate, effects) - seen_points(np.zeros(3), effects)
+
+
+def world_rates(rate: FloatArray, effects: Sequence[Effect]) -> FloatArray:
+    """Returns the velocities (…,3), m/s, that cameras with these effects report as `rate`."""
+    return world_points(rate, effects) - world_points(np.zeros(3), effects)
 
 
 def true_times(time: FloatArray, effects: Sequence[Effect], name: str) -> FloatArray:

@@ -8,11 +8,12 @@ in u. Cloth that slips in a gripper is displaced further, at a speed that depend
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.effects.effect import Effect, MountEffect
 from drake_dress.models.effects.grip import GripperCompliance, GripperSlip
 from drake_dress.models.effects.person import LimbCompliance
@@ -104,6 +105,32 @@ class Mounts:
         if self._slip is not None:
             slip = slip + h * self._slip.apply(gripper_force)
         return MountState(gripper, gripper_rate, slip, limb, limb_rate)
+
+
+def limb_forces(limb: IntArray, count: int, owner: IntArray, reaction: FloatArray) -> FloatArray:
+    """Returns (count,3) the force of the garment on each limb, N.
+
+    Args:
+        limb: (c,) which limb a body is of, −1 for none.
+        count: of limbs.
+        owner: (n,) body that a node touches, −1 without.
+        reaction: (n,3) of the bodies on the nodes, N.
+    """
+    force = np.zeros((count, 3))
+    rows = np.flatnonzero(owner >= 0)
+    which = limb[owner[rows]]
+    np.subtract.at(force, which[which >= 0], reaction[rows[which >= 0]])
+    return force
+
+
+def displaced(
+    bodies: Obstacles, limb: IntArray, displacement: FloatArray, rate: FloatArray
+) -> Obstacles:
+    """Returns bodies with those of limb k displaced by row k of (b,3), m, at (b,3), m/s."""
+    rows = limb >= 0
+    u, w = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
+    u[rows], w[rows] = displacement[limb[rows]], rate[limb[rows]]
+    return replace(bodies, a=bodies.a + u, b=bodies.b + u, velocity=bodies.velocity + w)
 
 
 def _settle(

@@ -3,9 +3,8 @@
 import numpy as np
 
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.composition import GarmentWithEffects
 from drake_dress.models.effects.effect import Sheet
 
@@ -33,20 +32,7 @@ def sheet():
 def cloth(effects, held=(), step=STEP, material=MATERIAL, mesh=None):
     """Returns a garment with effects, of a sheet held at nodes."""
     x, faces = mesh or sheet_mesh()
-    held = np.asarray(held, dtype=np.int32)
-
-    def make(elements, fabric, gravity, fibres: Fibres | None, added):
-        return ImplicitCloth(
-            elements,
-            fabric,
-            step,
-            held,
-            gravity,
-            tolerance=1e-8,
-            max_iterations=300,
-            fibres=fibres,
-            added_mass=added,
-        )
+    scheme = Scheme(np.asarray(held, dtype=np.int32), step, tolerance=1e-8, iterations=300)
 
     warp = np.tile([0.0, 0.0, -1.0], (len(faces), 1))
-    return GarmentWithEffects(x, faces, warp, material, effects, make)
+    return GarmentWithEffects(x, faces, warp, material, effects, scheme)

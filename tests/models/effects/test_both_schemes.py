@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.air import AirDrag
 from drake_dress.models.effects.composition import GarmentWithEffects
 from drake_dress.models.effects.contact import Adhesion, VelocityDependentFriction
@@ -28,32 +28,15 @@ def swung(effects, scheme, duration=0.3, step=1e-3):
     x, faces = sheet_mesh()
     top = np.flatnonzero(x[:, 2] == 0.0).astype(np.int32)
 
-    def make(elements, fabric, gravity, fibres, added):
-        if scheme == "implicit":
-            return ImplicitCloth(
-                elements,
-                fabric,
-                step,
-                top,
-                gravity,
-                tolerance=1e-6,
-                max_iterations=200,
-                fibres=fibres,
-                added_mass=added,
-            )
-        return ProjectiveDynamicsCloth(
-            elements,
-            fabric,
-            step,
-            top,
-            gravity,
-            tolerance=1e-7,
-            quasi_newton=True,
-            fibres=fibres,
-            added_mass=added,
-            predicted=True,
-        )
-
+    make = Scheme(
+        top,
+        step,
+        scheme == "projective",
+        tolerance=1e-6,
+        iterations=200,
+        accuracy=1e-7,
+        predicted=True,
+    )
     warp = np.tile([0.0, 0.0, -1.0], (len(faces), 1))
     garment = GarmentWithEffects(x, faces, warp, SOFT, effects, make)
     state = ClothState.at_rest(x)
@@ -93,13 +76,7 @@ def test_contact_effects_slow_a_sheet_that_slides(scheme, effect):
     none = np.zeros(0, dtype=np.int32)
     step = 2e-3
 
-    def make(elements, fabric, gravity, fibres, added):
-        if scheme == "implicit":
-            return ImplicitCloth(elements, fabric, step, none, gravity, tolerance=1e-8)
-        return ProjectiveDynamicsCloth(
-            elements, fabric, step, none, gravity, tolerance=1e-7, quasi_newton=True
-        )
-
+    make = Scheme(none, step, scheme == "projective", tolerance=1e-8, accuracy=1e-7)
     warp = np.tile([0.0, 1.0, 0.0], (len(faces), 1))
     garment = GarmentWithEffects(x, faces[:, ::-1], warp, MATERIAL, [effect], make)
     v = np.tile([0.5, 0.0, 0.0], (len(x), 1))

@@ -234,7 +234,7 @@ def test_viscous_friction_leaves_the_speed_at_which_it_bears_the_slope():
 def test_friction_across_and_along_the_warp_differ_as_the_contrast_says():
     """The warp of a flat sheet whose rest frame has it along −z is projected: along y here."""
     x, faces = flat_mesh(4, 4)
-    from drake_dress.models.cloth.implicit import ImplicitCloth
+    from drake_dress.models.cloth.scheme import Scheme
     from drake_dress.models.effects.composition import GarmentWithEffects
 
     x = x + [0.0, 0.0, MATERIAL.margin]
@@ -250,9 +250,7 @@ def test_friction_across_and_along_the_warp_differ_as_the_contrast_says():
             np.tile([1.0, 0.0, 0.0], (len(faces), 1)),
             MATERIAL,
             [tilt, AnisotropicFriction(contrast=0.5)],
-            lambda e, m, g, f, a: ImplicitCloth(
-                e, m, STEP, np.zeros(0, dtype=np.int32), g, tolerance=1e-8, max_iterations=300
-            ),
+            Scheme(np.zeros(0, dtype=np.int32), STEP, tolerance=1e-8, iterations=300),
         )
         down = np.array([*direction, 0.0])
         start = np.tile(0.05 * down, (len(x), 1))

@@ -1,0 +1,79 @@
+"""Which scheme steps a plant's garment, and how well it solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.fibres import Fibres
+from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+
+# Elements, fabric, gravity (3,), fibres and added mass (n,) to what steps the garment.
+MakeIntegrator = Callable[
+    [Elements, Material, FloatArray, Fibres | None, FloatArray | None], Integrator
+]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Makes an integrator when it is called with a garment; a `MakeIntegrator`.
+
+    Attributes:
+        held: (k,) nodes whose motion is prescribed.
+        time_step: s.
+        projective: Projective Dynamics instead of the linearly implicit scheme.
+        tolerance: relative residual of the implicit scheme's solver.
+        iterations: of it, at most.
+        accuracy: distance to the fixed point at which Projective Dynamics stops, m.
+        predicted: whether it starts from the linearly implicit step.
+        damping: in place of the fabric's, s.
+    """
+
+    held: IntArray
+    time_step: float
+    projective: bool = False
+    tolerance: float = 5e-3
+    iterations: int = 40
+    accuracy: float = 1e-5
+    predicted: bool = False
+    damping: float | None = None
+
+    def __call__(
+        self,
+        elements: Elements,
+        material: Material,
+        gravity: FloatArray,
+        fibres: Fibres | None,
+        added_mass: FloatArray | None,
+    ) -> Integrator:
+        """Returns what steps the garment."""
+        if self.damping is not None:
+            material = replace(material, damping=self.damping)
+        if self.projective:
+            return ProjectiveDynamicsCloth(
+                elements,
+                material,
+                self.time_step,
+                self.held,
+                gravity,
+                tolerance=self.accuracy,
+                quasi_newton=True,
+                fibres=fibres,
+                added_mass=added_mass,
+                predicted=self.predicted,
+            )
+        return ImplicitCloth(
+            elements,
+            material,
+            self.time_step,
+            self.held,
+            gravity,
+            tolerance=self.tolerance,
+            max_iterations=self.iterations,
+            fibres=fibres,
+            added_mass=added_mass,
+        )
