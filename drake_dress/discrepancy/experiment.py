@@ -26,6 +26,7 @@ from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.models.effects.effect import Effect
+from drake_dress.models.garment.transfer import barycentric_transfer
 
 FloatArray = npt.NDArray[np.float64]
 Level = Literal["screening", "scenario", "refined"]
@@ -33,6 +34,8 @@ LEVELS: tuple[Level, ...] = ("screening", "scenario", "refined")
 
 # ω of the observer, 1/s: soft enough to see what is wrong, hard enough not to lose the garment.
 GAIN = 6.0
+# Simulations of all recordings that are remembered.
+_REMEMBERED = 48
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ def levels(numerics: Numerics) -> dict[Level, Numerics]:
         "screening": replace(
             n,
             integrator="implicit",
-            spacing=min(1.2 * n.spacing, 0.06),
-            time_step=min(2.0 * n.time_step, 0.01),
+            spacing=min(1.45 * n.spacing, 0.06),
+            time_step=min(2.5 * n.time_step, 0.01),
             tolerance=max(n.tolerance, 2e-3),
         ),
         "scenario": n,
@@ -101,6 +104,7 @@ class Experiment:
         self.samples = [_samples(r, period) for r in self.recordings]
         self._workers = workers or os.cpu_count() or 1
         self._pool: ProcessPoolExecutor | None = None
+        self._told: dict[tuple[Level, tuple[Effect, ...]], list[Told]] = {}
 
     def __enter__(self) -> Experiment:
         replayers = {
@@ -108,11 +112,20 @@ class Experiment:
             for level in LEVELS
             for i, r in enumerate(self.recordings)
         }
-        # each level starts from what the level before has found
+        # the first level finds how the garment hangs, the others start from there
         self._open(replayers)
-        for key, start in zip(
-            replayers, self._map(_settle, [(key,) for key in replayers]), strict=True
-        ):
+        first = LEVELS[0]
+        count = len(self.recordings)
+        coarse = self._map(_settle, [((first, i), None) for i in range(count)])
+        others = [key for key in replayers if key[0] != first]
+        near = {
+            level: barycentric_transfer(self.labs[first].garment, self.labs[level].garment)
+            for level in LEVELS[1:]
+        }
+        fine = self._map(_settle, [(key, near[key[0]] @ coarse[key[1]]) for key in others])
+        for i in range(count):
+            replayers[first, i].start_from(coarse[i])
+        for key, start in zip(others, fine, strict=True):
             replayers[key].start_from(start)
         self._pool_or_fail().shutdown()
         self._open(replayers)
@@ -134,13 +147,16 @@ class Experiment:
             progress: called after each replay of one recording.
         """
         count = len(self.recordings)
-        work = [
-            (level, i, tuple(effects), self.samples[i])
-            for level, effects in jobs
-            for i in range(count)
-        ]
+        keys = [(level, tuple(effects)) for level, effects in jobs]
+        new = [key for key in dict.fromkeys(keys) if key not in self._told]
+        work = [(level, i, found, self.samples[i]) for level, found in new for i in range(count)]
         told = self._map(_replay, work, progress)
-        return [told[j * count : (j + 1) * count] for j in range(len(jobs))]
+        for j, key in enumerate(new):
+            self._told[key] = told[j * count : (j + 1) * count]
+        answer = [self._told[key] for key in keys]
+        while len(self._told) > _REMEMBERED:
+            del self._told[next(iter(self._told))]
+        return answer
 
     def tell_some(
         self,
@@ -191,8 +207,8 @@ class Experiment:
 _replayers: dict[tuple[Level, int], Replayer] = {}
 
 
-def _settle(key: tuple[Level, int]) -> FloatArray:
-    return _replayers[key].settled()
+def _settle(key: tuple[Level, int], near: FloatArray | None) -> FloatArray:
+    return _replayers[key].settled(near)
 
 
 def _replay(

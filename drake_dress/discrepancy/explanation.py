@@ -8,7 +8,7 @@ most of what was held out; look for another in what is left, until nothing more 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +42,9 @@ _SURE = 0.9
 # A second candidate is refined too where it takes away this share of what the best does, unless the
 # best is the better one in this share of the resamples.
 _NEAR, _CERTAIN = 0.3, 0.99
+# Refinements of a fit at most; it is settled where a step is within its uncertainty, or this share.
+# Who has less than `_NEAR_REFINED` of the best one's gain is not refined further.
+_POLISHED, _STEADY, _NEAR_REFINED = 3, 0.04, 0.7
 # A residual is unexplained where so many times the noise's variance is left, and less than this
 # share of what exceeds noise has been explained.
 _LEFT, _EXPLAINED = 2.0, 0.5
@@ -141,7 +144,7 @@ def explain(
     refined = w.vector(comparison.told["refined"])
     judged = held_out(w)
     training = ~judged[w.block]
-    numerics = _rms((scenario - refined) * w.scale, ~w.is_force)
+    numerics = _rms(w.size(scenario - refined), ~w.is_force)
     causes = _coarse(comparison, scenario, refined, numerics)
 
     stage("screening effects")
@@ -177,10 +180,23 @@ def explain(
         if _confidence(before, after, best, judged, rng) >= _CERTAIN:
             near = [best]
         stage(f"refining {', '.join(chosen[i].candidate.name for i in near)}")
-        contenders = [_polished(experiment, comparison, fits[i], training, progress) for i in near]
-        after = [block_loss(w, c.predicted) for c in contenders]
-        gains = [1.0 - float(a[judged].sum() / before[judged].sum()) for a in after]
-        best = int(np.argmax(gains))
+        contenders = [_refined(experiment, comparison, fits[i], progress) for i in near]
+        for _ in range(_POLISHED):
+            due = [c for c in contenders if not c.settled]
+            if not due:
+                break
+            for c in due:
+                contenders[contenders.index(c)] = _polished(
+                    experiment, comparison, c, training, progress
+                )
+            after = [block_loss(w, c.predicted) for c in contenders]
+            gains = [1.0 - float(a[judged].sum() / before[judged].sum()) for a in after]
+            best = int(np.argmax(gains))
+            # who falls behind is not refined further
+            contenders = [
+                replace(c, settled=c.settled or g < _NEAR_REFINED * gains[best])
+                for c, g in zip(contenders, gains, strict=True)
+            ]
         confidence = _confidence(before, after, best, judged, rng)
         fit, reference, predicted = (
             contenders[best].fit,
@@ -201,39 +217,55 @@ def explain(
 
 @dataclass(frozen=True)
 class _Polished:
+    """A fit, what the refined simulation says at it, and that with what is held out held out."""
+
     fit: Fit
     reference: FloatArray
     predicted: FloatArray
+    settled: bool = False
+
+
+def _refined(
+    experiment: Experiment,
+    comparison: Comparison,
+    fit: Fit,
+    progress: Callable[[], None] | None,
+) -> _Polished:
+    told = comparison.whitening.vector(experiment.tell([("refined", fit.effects)], progress)[0])
+    return _Polished(fit, told, told + fit.predicted - fit.predicted_all)
 
 
 def _polished(
     experiment: Experiment,
     comparison: Comparison,
-    fit: Fit,
+    last: _Polished,
     training: npt.NDArray[np.bool_],
     progress: Callable[[], None] | None,
 ) -> _Polished:
-    """Returns a fit about what the refined simulation says at it.
+    """Returns a fit about what the refined simulation says at the last one.
 
     Coarse contact feels friction more than fine contact does: by the slopes of the screening level
     alone a coefficient of friction came out at half of what it was.
     """
-    w = comparison.whitening
-    told = w.vector(experiment.tell([("refined", fit.effects)], progress)[0])
+    effects = last.fit.effects
     (better,) = fit_all(
         experiment,
-        w,
-        told,
-        [fit.effects],
+        comparison.whitening,
+        last.reference,
+        [effects],
         training,
         level="scenario",
-        about=fit.effects,
+        about=effects,
         iterations=1,
         progress=progress,
     )
-    reference = w.vector(experiment.tell([("refined", better.effects)], progress)[0])
-    # what training says on held-out blocks, with the refined simulation at the fit of all
-    return _Polished(better, reference, reference + better.predicted - better.predicted_all)
+    moved = [
+        abs(getattr(new, p.name) - getattr(old, p.name))
+        <= max(better.std[new.NAME][p.name], _STEADY * abs(getattr(new, p.name)))
+        for old, new in zip(effects, better.effects, strict=True)
+        for p in new.parameters()
+    ]
+    return replace(_refined(experiment, comparison, better, progress), settled=all(moved))
 
 
 def _coarse(
@@ -242,9 +274,9 @@ def _coarse(
     """Returns discretisation as a cause where it is one."""
     w = comparison.whitening
     markers = ~w.is_force
-    noise = _rms(w.noise_share * w.scale, markers)
-    before = max(_rms((w.data - scenario) * w.scale, markers) ** 2 - noise**2, 1e-12)
-    after = _rms((w.data - refined) * w.scale, markers) ** 2 - noise**2
+    noise = _rms(w.sensor, markers)
+    before = max(_rms(w.size(w.data - scenario), markers) ** 2 - noise**2, 1e-12)
+    after = _rms(w.size(w.data - refined), markers) ** 2 - noise**2
     mended = 1.0 - after / before
     if numerics < _COARSE * noise or mended < _MENDED:
         return []
@@ -310,8 +342,7 @@ def _concluded(
         verdict = "named"
     entries = judged[w.block]
 
-    def sizes(vector: FloatArray) -> tuple[float, float]:
-        residual = vector * w.scale
+    def sizes(residual: FloatArray) -> tuple[float, float]:
         return _rms(residual, entries & ~w.is_force), _rms(residual, entries & w.is_force, 1)
 
     ranked = sorted(scores.values(), key=lambda s: -(s.fitted or s.screened))
@@ -325,9 +356,9 @@ def _concluded(
             "extended": left,
         },
         gain,
-        sizes(w.data - start),
-        sizes(w.data - predicted),
-        sizes(w.noise_share),
+        sizes(w.size(w.data - start)),
+        sizes(w.size(w.data - predicted)),
+        sizes(w.sensor),
         numerics,
         comparison,
         predicted,

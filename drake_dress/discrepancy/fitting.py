@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from drake_dress.discrepancy.candidates import bounded, shifted
 from drake_dress.discrepancy.experiment import Experiment, Level
-from drake_dress.discrepancy.whitening import Whitening
+from drake_dress.discrepancy.whitening import NUMERICS_SHARE, Whitening
 from drake_dress.models.effects.effect import Effect, Parameter
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,6 +20,7 @@ BoolArray = npt.NDArray[np.bool_]
 # Step of derivatives and largest step of an iteration, in sizes that matter.
 _DIFFERENCE, _TRUST = 0.25, 4.0
 _RIDGE = 1e-6
+_ANY = 1e6
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class Fit:
 
     Attributes:
         effects: with parameters from all the data.
-        std: of each parameter, by effect's name and parameter; robust to what the blocks share.
+        std: of each parameter, by effect's name and parameter: of what is random, robust to what
+            the blocks share, and of what the numerics leave open.
         predicted: (N,) whitened, with parameters from the training blocks.
         predicted_all: (N,) with those of `effects`.
         count: of parameters.
@@ -42,7 +44,7 @@ class Fit:
 
 
 def solve_bounded(
-    columns: FloatArray, residual: FloatArray, low: FloatArray, high: FloatArray
+    columns: FloatArray, residual: FloatArray, low: FloatArray | float, high: FloatArray | float
 ) -> FloatArray:
     """Returns x (k,) with least ‖columns x − residual‖ between the bounds; columns (N,k)."""
     normal = columns.T @ columns
@@ -90,7 +92,13 @@ def fit_all(
         for p in problems:
             here = whitening.vector(next(told))
             columns = [whitening.vector(next(told)) - here for _ in p.free]
-            p.improve(reference + here - base, np.stack(columns, axis=1), whitening, training)
+            p.improve(
+                reference + here - base,
+                np.stack(columns, axis=1),
+                reference - base,
+                whitening,
+                training,
+            )
     return [p.fit() for p in problems]
 
 
@@ -121,10 +129,15 @@ class _Problem:
         self,
         predicted: FloatArray,
         change: FloatArray,
+        numerics: FloatArray,
         whitening: Whitening,
         training: BoolArray,
     ) -> None:
-        """Takes one step from what is predicted (N,) and its changes (N,k) by `moved`."""
+        """Takes one step from what is predicted (N,) and its changes (N,k) by `moved`.
+
+        What finer numerics change, `numerics` (N,), moves the parameters too: a share of that is
+        part of their uncertainty.
+        """
         now = self._values
         step = np.array(
             [getattr(self.moved(i)[k], p.name) - now[i] for i, (k, p) in enumerate(self.free)]
@@ -137,7 +150,9 @@ class _Problem:
         best = solve_bounded(columns, residual, low, high)
         self._predicted = predicted + columns @ trained
         self._predicted_all = predicted + columns @ best
-        self._std = self._size * _robust_std(columns, residual - columns @ best, whitening.block)
+        drawn = _robust_std(columns, residual - columns @ best, whitening.block)
+        biased = NUMERICS_SHARE * np.abs(solve_bounded(columns, numerics, -_ANY, _ANY))
+        self._std = self._size * np.hypot(drawn, biased)
         values = now + best * self._size
         for k, effect in enumerate(self.effects):
             mine = {p.name: v for (j, p), v in zip(self.free, values, strict=True) if j == k}

@@ -109,9 +109,17 @@ class Replayer:
         self._path = r.gripper_path
         self._start: FloatArray | None = None
 
-    def settled(self) -> FloatArray:
-        """Returns (n,3) how the garment hangs at the start without effects, m; remembered."""
-        if self._start is None:
+    def settled(self, near: FloatArray | None = None) -> FloatArray:
+        """Returns (n,3) how the garment hangs at the start without effects, m; remembered.
+
+        Args:
+            near: (n,3) about how it hangs, m, if that is known.
+        """
+        if self._start is None and near is not None:
+            x = near.copy()
+            x[self._held] = self._path(self.recording.time[0])[self._side] + self._offset
+            self._start = self._settle([], x, _FROM_REST[-1])
+        elif self._start is None:
             rest = self.lab.garment.rest_position
             held = self._path(self.recording.time[0])[self._side] + self._offset
             x = rest + (held - rest[self._held]).mean(axis=0)
@@ -170,6 +178,7 @@ class Replayer:
         kept = np.array([] if keep is None else np.rint((np.asarray(keep) - begin) / h), dtype=int)
         positions, velocities = np.empty((len(kept), *x.shape)), np.empty((len(kept), *x.shape))
         positions[kept == 0], velocities[kept == 0] = x, v
+        before = state.v
         static = not joint_rate.any() and mounts.rigid
         bodies = person.obstacles(joints[0], joint_rate[0])
         for k in range(steps):
@@ -183,7 +192,10 @@ class Replayer:
             pull = Influences()
             if gain > 0.0:
                 pull = Influences(force=self._pull(cloth, state, seen[k], rate[k], known[k], gain))
-            state, _ = cloth.step(state, bodies, (target - state.x[self._held]) / h, pull)
+            velocity = (target - state.x[self._held]) / h
+            # the garment goes on as it has accelerated
+            ahead, before = 2.0 * state.v - before, state.v
+            state, _ = cloth.step(state, bodies, velocity, pull, ahead)
             markers[k + 1] = self._map @ state.x
             force[k + 1] = self._forces(state)
             touching[k + 1] = np.count_nonzero(state.owner >= 0) / len(x)

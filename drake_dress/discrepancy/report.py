@@ -151,9 +151,13 @@ class _Residuals:
         discrete = any(c.name == DISCRETISATION for c in x.causes)
         first = x.comparison.told["scenario" if discrete else "refined"]
         self._w, self._experiment = w, experiment
-        self._pairs = (
-            ("before", _BEFORE, w.data - w.vector(first)),
-            ("after", _AFTER, w.data - x.predicted),
+        # name, colour, whitened residual, residual in m and N
+        self._pairs = tuple(
+            (name, color, w.data - predicted, w.size(w.data - predicted))
+            for name, color, predicted in (
+                ("before", _BEFORE, w.vector(first)),
+                ("after", _AFTER, x.predicted),
+            )
         )
 
     def course(self, axes: list[Axes]) -> None:
@@ -162,8 +166,8 @@ class _Residuals:
         for i, (ax, r) in enumerate(zip(axes, self._experiment.recordings, strict=True)):
             rows = (w.recording == i) & ~w.is_force
             at, index = np.unique(w.time[rows], return_inverse=True)
-            for name, color, residual in self._pairs:
-                squared = (residual[rows] * w.scale[rows]) ** 2
+            for name, color, _, size in self._pairs:
+                squared = size[rows] ** 2
                 rms = 1e3 * np.sqrt(
                     3.0 * np.bincount(index, squared) / np.maximum(np.bincount(index), 1)
                 )
@@ -180,11 +184,11 @@ class _Residuals:
         rest = self._experiment.labs["scenario"].garment.rest_position
         sizes = []
         points = []
-        for _, _, residual in self._pairs:
+        for _, _, _, size in self._pairs:
             values, places = [], []
             for i, r in enumerate(self._experiment.recordings):
                 rows = (w.recording == i) & ~w.is_force
-                squared = (residual[rows] * w.scale[rows]) ** 2
+                squared = size[rows] ** 2
                 count = np.bincount(w.marker[rows], minlength=len(r.marker_rest_position))
                 total = np.bincount(w.marker[rows], squared, len(r.marker_rest_position))
                 seen = count > 0
@@ -219,7 +223,7 @@ class _Residuals:
     def spectrum(self, axes: list[Axes]) -> None:
         """Draws power spectrum and autocorrelation of whitened marker residuals."""
         w = self._w
-        for name, color, residual in self._pairs:
+        for name, color, residual, _ in self._pairs:
             powers, correlations, period = [], [], 0.02
             for i, (r, s) in enumerate(
                 zip(self._experiment.recordings, self._experiment.samples, strict=True)

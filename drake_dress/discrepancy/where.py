@@ -56,8 +56,8 @@ def spots(
     """
     w = whitening
     squared = (w.data - predicted) ** 2
-    size = (w.data - predicted) * w.scale
-    noise = w.noise_share * w.scale
+    size = w.size(w.data - predicted)
+    noise = w.sensor
     found: list[Spot] = []
 
     def add(kind: str, name: str, rows: npt.NDArray[np.bool_]) -> None:

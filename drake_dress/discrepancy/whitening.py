@@ -1,7 +1,13 @@
-"""Markers and forces of all recordings as one vector in units of their noise.
+"""Markers and forces of all recordings as one vector whose entries are noise of variance 1.
 
 What the simulation's own numerics leave open counts as noise too: where the refined replay differs
-from the scenario's, nothing finer than a share of that difference can be held against physics.
+from the scenario's, nothing finer than a share of that difference can be held against physics. Such
+an error stays for a while, other than the sensors'. So a signal's noise is taken for
+
+    σ ε_t + s_t z_t,    z an Ornstein–Uhlenbeck process of variance 1 and memory τ,
+
+with σ of the sensor and s_t of the numerics, and a residual is whitened by the innovations of the
+Kalman filter of that model: what a long quiet offset is worth, it is worth once.
 """
 
 from __future__ import annotations
@@ -9,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
@@ -17,11 +24,17 @@ from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.recording import Recording
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 # Share of the difference between scenario and refined replay that the refined one may still be off.
-NUMERICS_SHARE = 0.75
-# Length of a block that is judged as one, s; time over which numerics are averaged, s.
-BLOCK, _AVERAGED = 0.5, 0.3
+NUMERICS_SHARE = 0.6
+# Memory τ of errors of numerics, s; time over which their size is averaged, s.
+MEMORY, _AVERAGED = 0.4, 0.3
+# One pair of simulations says little about a marker's error: so much comes from it, the rest from
+# all markers that touch, or do not touch, the person.
+_OWN = 0.3
+# Length of a block that is judged as one, s.
+BLOCK = 0.5
 
 
 @dataclass(frozen=True)
@@ -29,29 +42,74 @@ class Whitening:
     """Maps what simulations say to one vector.
 
     Attributes:
-        data: (N,) what was measured over its noise.
+        data: (N,) what was measured, whitened.
         block: (N,) number of the block that an entry is in.
         recording: (N,) its recording; time: (N,) s.
         is_force: (N,) whether it is a force.
         marker: (N,) which marker, or gripper for forces.
-        noise_share: (N,) sensors' noise over all noise, standard deviations.
-        scale: (N,) what one unit is, m or N.
+        sensor: (N,) standard deviation of the sensor's noise, m or N.
+        filters: of the recordings.
     """
 
     data: FloatArray
     block: npt.NDArray[np.int64]
     recording: npt.NDArray[np.int64]
     time: FloatArray
-    is_force: npt.NDArray[np.bool_]
+    is_force: BoolArray
     marker: npt.NDArray[np.int64]
-    noise_share: FloatArray
-    scale: FloatArray
-    _kept: npt.NDArray[np.bool_]
+    sensor: FloatArray
+    filters: tuple[NoiseFilter, ...]
 
     def vector(self, told: Sequence[Told]) -> FloatArray:
-        """Returns (N,) what simulations say of the recordings, in units of the noise."""
-        values: FloatArray = _stacked(told)[self._kept] / self.scale
-        return values
+        """Returns (N,) what simulations say of the recordings, whitened."""
+        return np.concatenate(
+            [f.whitened(_series(t)) for f, t in zip(self.filters, told, strict=True)]
+        )
+
+    def size(self, residual: FloatArray) -> FloatArray:
+        """Returns a whitened residual (N,) in m and N."""
+        begin, parts = 0, []
+        for f in self.filters:
+            parts.append(f.unwhitened(residual[begin : begin + f.count]))
+            begin += f.count
+        return np.concatenate(parts)
+
+
+class NoiseFilter:
+    """Whitens the signals of one recording.
+
+    Args:
+        time: (S,) s, of the samples.
+        sensor: (C,) standard deviation of the sensors' noise.
+        numerics: (S,C) of the numerics' error.
+        kept: (S,C) which were measured.
+
+    Attributes:
+        count: of entries that were measured.
+    """
+
+    def __init__(
+        self, time: FloatArray, sensor: FloatArray, numerics: FloatArray, kept: BoolArray
+    ) -> None:
+        self._kept, self._numerics = kept, numerics
+        self._decay = np.exp(-np.diff(time, append=time[-1]) / MEMORY)
+        self._gain, self._scale = _gains(sensor, numerics, kept, self._decay)
+        self.count = int(np.count_nonzero(kept))
+
+    def whitened(self, values: FloatArray) -> FloatArray:
+        """Returns (count,) the innovations of `values` (S,C), in standard deviations."""
+        out = np.where(self._kept, values, 0.0)
+        _whiten(out, self._numerics, self._kept, self._decay, self._gain, self._scale)
+        kept: FloatArray = out[self._kept]
+        return kept
+
+    def unwhitened(self, innovations: FloatArray) -> FloatArray:
+        """Returns (count,) the values whose innovations are given."""
+        out = np.zeros(self._kept.shape)
+        out[self._kept] = innovations
+        _unwhiten(out, self._numerics, self._kept, self._decay, self._gain, self._scale)
+        kept: FloatArray = out[self._kept]
+        return kept
 
 
 def whiten(
@@ -68,59 +126,119 @@ def whiten(
         scenario: what the scenario's simulation says.
         refined: what the refined one says.
     """
-    measured, noise = [], []
-    rows: dict[str, list[npt.NDArray]] = {k: [] for k in ("recording", "time", "force", "marker")}
-    for i, (r, s, coarse, fine) in enumerate(
-        zip(recordings, samples, scenario, refined, strict=True)
-    ):
+    numerics = _numerics(recordings, samples, scenario, refined)
+    filters, data = [], []
+    rows: dict[str, list[npt.NDArray]] = {
+        k: [] for k in ("recording", "time", "force", "marker", "sensor")
+    }
+    for i, (r, s, off) in enumerate(zip(recordings, samples, numerics, strict=True)):
         force = np.full((len(s), 2, 3), np.nan) if r.gripper_force is None else r.gripper_force[s]
-        measured.append(Told(r.marker_position[s], force, np.zeros(len(s))))
-        window = max(1, round(_AVERAGED / float(np.median(np.diff(r.time[s])))))
-        noise.append(
-            Told(
-                _noise(r.marker_noise, fine.marker - coarse.marker, window),
-                _noise(r.force_noise, fine.force - coarse.force, window),
-                np.zeros(len(s)),
-            )
-        )
-        for is_force, shape in ((False, fine.marker.shape), (True, fine.force.shape)):
-            rows["recording"].append(np.full(np.prod(shape), i))
-            when = r.time[s] - r.time[0]
-            rows["time"].append(np.repeat(when, np.prod(shape[1:])))
-            rows["force"].append(np.full(np.prod(shape), is_force))
-            rows["marker"].append(np.tile(np.repeat(np.arange(shape[1]), 3), shape[0]))
-    values, scale = _stacked(measured), _stacked(noise)
-    kept = np.isfinite(values)
-    flat = {k: np.concatenate(v)[kept] for k, v in rows.items()}
+        measured = _series(Told(r.marker_position[s], force, np.zeros(len(s))))
+        markers = r.marker_position.shape[1]
+        sensor = np.repeat([r.marker_noise, r.force_noise], [3 * markers, 6])
+        kept: BoolArray = np.asarray(np.isfinite(measured))
+        filters.append(NoiseFilter(r.time[s], sensor, off, kept))
+        data.append(filters[-1].whitened(measured))
+        signal = np.concatenate([np.repeat(np.arange(markers), 3), np.repeat(np.arange(2), 3)])
+        forces = np.repeat([False, True], [3 * markers, 6])
+        for name, values in (("marker", signal), ("force", forces), ("sensor", sensor)):
+            rows[name].append(np.broadcast_to(values, kept.shape)[kept])
+        when = r.time[s] - r.time[0]
+        rows["time"].append(np.broadcast_to(when[:, None], kept.shape)[kept])
+        rows["recording"].append(np.full(filters[-1].count, i))
+    flat = {k: np.concatenate(v) for k, v in rows.items()}
     blocks = (flat["time"] / BLOCK).astype(np.int64)
     block = np.unique(flat["recording"] * 10**6 + blocks, return_inverse=True)[1]
-    sensor = np.concatenate(
-        [
-            np.full(a.size, n)
-            for r, t in zip(recordings, refined, strict=True)
-            for a, n in ((t.marker, r.marker_noise), (t.force, r.force_noise))
-        ]
-    )[kept]
     return Whitening(
-        values[kept] / scale[kept],
+        np.concatenate(data),
         block,
         flat["recording"],
         flat["time"],
         flat["force"],
         flat["marker"],
-        sensor / scale[kept],
-        scale[kept],
-        kept,
+        flat["sensor"],
+        tuple(filters),
     )
 
 
-def _noise(sensor: float, numerics: FloatArray, window: int) -> FloatArray:
-    """Returns (S,k,3) the standard deviation of a coordinate."""
-    squared = np.mean(numerics**2, axis=2)
-    averaged = uniform_filter1d(squared, window, axis=0, mode="nearest")
-    deviation: FloatArray = np.sqrt(sensor**2 + NUMERICS_SHARE**2 * averaged)
-    return np.repeat(deviation[:, :, None], 3, axis=2)
+def _numerics(
+    recordings: Sequence[Recording],
+    samples: Sequence[npt.NDArray[np.int64]],
+    scenario: Sequence[Told],
+    refined: Sequence[Told],
+) -> list[FloatArray]:
+    """Returns (S,C) for each recording: standard deviation of the numerics' error."""
+    own: list[tuple[FloatArray, FloatArray]] = []
+    for r, s, coarse, fine in zip(recordings, samples, scenario, refined, strict=True):
+        window = max(1, round(_AVERAGED / float(np.median(np.diff(r.time[s])))))
+
+        def squared(a: FloatArray, window: int = window) -> FloatArray:
+            mean = uniform_filter1d(np.mean(a**2, axis=2), window, axis=0, mode="nearest")
+            return np.maximum(mean, 0.0)
+
+        own.append((squared(fine.marker - coarse.marker), squared(fine.force - coarse.force)))
+    touching = np.concatenate([t.contact > 0.0 for t in refined])
+    pooled = []
+    for k in (0, 1):
+        rows = np.concatenate([v[k].mean(axis=1) for v in own])
+        whole = float(rows.mean())
+        free, touched = (
+            float(rows[which].mean()) if which.any() else whole for which in (~touching, touching)
+        )
+        pooled.append((free, touched))
+    found = []
+    for fine, variances in zip(refined, own, strict=True):
+        columns = []
+        for (free, touched), variance in zip(pooled, variances, strict=True):
+            others = np.where(fine.contact > 0.0, touched, free)[:, None]
+            mixed = _OWN * variance + (1.0 - _OWN) * others
+            columns.append(np.repeat(NUMERICS_SHARE * np.sqrt(mixed), 3, axis=1))
+        found.append(np.concatenate(columns, axis=1))
+    return found
 
 
-def _stacked(told: Sequence[Told]) -> FloatArray:
-    return np.concatenate([np.concatenate([t.marker.ravel(), t.force.ravel()]) for t in told])
+def _series(told: Told) -> FloatArray:
+    """Returns (S,C): coordinates of the markers, then components of the forces."""
+    count = len(told.marker)
+    return np.concatenate([told.marker.reshape(count, -1), told.force.reshape(count, -1)], axis=1)
+
+
+@nb.njit(cache=True, nogil=True)
+def _gains(sensor, numerics, kept, decay):  # type: ignore[no-untyped-def]
+    """Returns gains and scales (S,C) of the filters of all signals."""
+    gain, scale = np.zeros(kept.shape), np.zeros(kept.shape)
+    for c in range(kept.shape[1]):
+        variance = 1.0
+        for t in range(kept.shape[0]):
+            if kept[t, c]:
+                s = numerics[t, c]
+                whole = s * s * variance + sensor[c] * sensor[c]
+                scale[t, c] = np.sqrt(whole)
+                gain[t, c] = s * variance / whole
+                variance -= gain[t, c] * s * variance
+            variance = decay[t] ** 2 * variance + 1.0 - decay[t] ** 2
+    return gain, scale
+
+
+@nb.njit(cache=True, nogil=True)
+def _whiten(values, numerics, kept, decay, gain, scale):  # type: ignore[no-untyped-def]
+    for c in range(values.shape[1]):
+        state = 0.0
+        for t in range(values.shape[0]):
+            if kept[t, c]:
+                innovation = values[t, c] - numerics[t, c] * state
+                values[t, c] = innovation / scale[t, c]
+                state += gain[t, c] * innovation
+            state *= decay[t]
+
+
+@nb.njit(cache=True, nogil=True)
+def _unwhiten(values, numerics, kept, decay, gain, scale):  # type: ignore[no-untyped-def]
+    for c in range(values.shape[1]):
+        state = 0.0
+        for t in range(values.shape[0]):
+            if kept[t, c]:
+                innovation = values[t, c] * scale[t, c]
+                values[t, c] = innovation + numerics[t, c] * state
+                state += gain[t, c] * innovation
+            state *= decay[t]

@@ -170,6 +170,7 @@ class ImplicitCloth:
         obstacles: Obstacles,
         held_velocity: FloatArray,
         influences: Influences = NO_INFLUENCES,
+        guess: FloatArray | None = None,
     ) -> tuple[ClothState, StepInfo]:
         """Returns the state one time step later.
 
@@ -178,6 +179,7 @@ class ImplicitCloth:
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
             influences: what else acts on the garment.
+            guess: (n,3) what the velocity after the step may be, m/s; free fall by default.
 
         Raises:
             ValueError: something is not finite; the message names it.
@@ -221,7 +223,7 @@ class ImplicitCloth:
         friction = np.zeros_like(x)
         _initial_friction(state.reaction, near.normal, h, mu, adhesion, mode, friction)
 
-        velocity = self._start(v, held_velocity, mode, near.normal, rhs)
+        velocity = self._start(v, held_velocity, mode, near.normal, rhs, guess)
         total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
         refactored = self._renew_factor(mode)
         max_passes = self._max_passes if np.any(near.gap < _NEAR) else 1
@@ -297,14 +299,16 @@ class ImplicitCloth:
         mode: IntArray,
         normal: FloatArray,
         rhs: FloatArray,
+        guess: FloatArray | None,
     ) -> FloatArray:
-        """Returns where conjugate gradients start: at rest in motion or in free fall.
+        """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
 
         A hanging garment keeps its velocity, a falling one gains h g; whichever leaves the smaller
         residual. Starting a hanging coat from free fall doubled the iterations.
         """
+        other = v + self.time_step * self.gravity if guess is None else guess.copy()
         best, least = v, np.inf
-        for start in (v.copy(), v + self.time_step * self.gravity):
+        for start in (v.copy(), other):
             start[self.held] = held_velocity
             residual = self._system.product(start, self._block) - rhs
             project(residual, mode, normal)

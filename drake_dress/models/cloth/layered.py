@@ -40,6 +40,7 @@ class Integrator(Protocol):
         obstacles: Obstacles,
         held_velocity: FloatArray,
         influences: Influences = NO_INFLUENCES,
+        guess: FloatArray | None = None,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later, and how it was solved."""
 
@@ -72,9 +73,10 @@ class LayeredCloth:
         obstacles: Obstacles,
         held_velocity: FloatArray,
         influences: Influences = NO_INFLUENCES,
+        guess: FloatArray | None = None,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
-        after, info = self._integrator.step(state, obstacles, held_velocity, influences)
+        after, info = self._integrator.step(state, obstacles, held_velocity, influences, guess)
         near = find_proximity(state.x, obstacles, self.material.margin)
         barred = np.where((near.gap < _ON_THE_PERSON)[:, None], near.normal, 0.0)
         x, v = separate(

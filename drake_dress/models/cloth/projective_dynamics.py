@@ -30,6 +30,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.cloth.contact.detection import fastest, out_of_reach
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
@@ -52,6 +53,9 @@ _WINDOW = 5
 # Decrease that a line search asks for, as a share of what the slope promises.
 _ARMIJO = 1e-4
 _MOST_HALVINGS = 12
+# A garment farther from everybody than `_REACH`, m, and so many times its way in a step, with what
+# it falls, m/s², cannot land.
+_REACH, _HASTE, _FALL = 0.05, 2.0, 9.81
 # E is known to about this share of its parts: a rise within it is rounding.
 _ROUNDING = 1e-14
 
@@ -125,7 +129,7 @@ class ProjectiveDynamicsCloth:
         self._fibres = fibres
         self._tolerance = tolerance
         self._max_iterations = max_iterations
-        self._quasi_newton = quasi_newton
+        self._history = CurvatureHistory(_WINDOW, elements.node_count) if quasi_newton else None
 
         bending = bending_matrix(elements, material)
         stiffness = stretch_matrix(elements, material) + bending
@@ -154,6 +158,7 @@ class ProjectiveDynamicsCloth:
         obstacles: Obstacles,
         held_velocity: FloatArray,
         influences: Influences = NO_INFLUENCES,
+        guess: FloatArray | None = None,
     ) -> tuple[ClothState, ProjectiveInfo]:
         """Returns the state one time step later.
 
@@ -162,6 +167,7 @@ class ProjectiveDynamicsCloth:
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
             influences: what else acts on the garment.
+            guess: (n,3) what the velocity after the step may be, m/s; for the predictor.
 
         Raises:
             ValueError: something in the input is not finite.
@@ -169,6 +175,9 @@ class ProjectiveDynamicsCloth:
         h, n = self.time_step, len(state.x)
         if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):
             explain_not_finite(state.x, state.v, held_velocity, self.held)
+        speed = fastest(obstacles) + max(_largest(state.v), _largest(held_velocity))
+        if out_of_reach(state.x, obstacles, _REACH + _HASTE * h * (speed + _FALL * h)):
+            obstacles = Obstacles.none()
         material = self.material
         mu, adhesion = influences.contact_law(material.friction, n)
         contact = IteratedContact(
@@ -196,10 +205,12 @@ class ProjectiveDynamicsCloth:
         falls = equations.energy(fall) < equations.energy(steady)
         guess = fall if falls else steady
         if self._predictor is not None:
-            ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences)
+            ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences, guess)
             guess = steady = ahead.x
         x = contact.place(guess, steady)
-        history = CurvatureHistory(_WINDOW, n) if self._quasi_newton else None
+        history = self._history
+        if history is not None:
+            history.clear()
         stop = StoppingRule(self._tolerance)
         before = x.copy()
         old_gradient = np.zeros((0, 3))
@@ -212,7 +223,7 @@ class ProjectiveDynamicsCloth:
                 if changes:
                     stop.restart()
                 else:
-                    stop.add(_largest(x, before))
+                    stop.add(_largest(x - before))
                 if stop.reached() or iterations >= self._max_iterations:
                     break
             if history is not None:
@@ -311,6 +322,9 @@ class _Equations:
         self._fibres = cloth._fibres
         self._damping = cloth.time_step * m.damping
         self._bending = cloth._bending
+        # a line search ends where the next iteration starts
+        self._at = np.full_like(x, np.nan)
+        self._energy_there, self._damped_there = np.nan, np.empty(0)
         if self._damping > 0.0:
             self._block = prepare_filtered(self._elements, m.stretch_stiffness, x)
             if self._fibres is not None:
@@ -318,13 +332,17 @@ class _Equations:
 
     def energy(self, x: FloatArray) -> float:
         """Returns h² E(x), kg m²."""
+        if np.array_equal(x, self._at):
+            return self._energy_there
         elastic = elastic_energy(self._elements, *self._stiffness, x)
         if self._fibres is not None:
             elastic += self._fibres.energy(x)
         total = float(_inertia_energy(x, self._inertial, self._mass)) + self._h2 * elastic
         if self._damping > 0.0:
             motion = x - self._before
-            total += 0.5 * dot(motion, self._damped(motion))
+            self._damped_there = self._damped(motion)
+            total += 0.5 * dot(motion, self._damped_there)
+        self._at, self._energy_there = x.copy(), total
         return total
 
     def gradient(self, x: FloatArray) -> FloatArray:
@@ -334,7 +352,8 @@ class _Equations:
             self._fibres.add_force(x, out)
         _add_inertia(x, self._inertial, self._mass, self._h2, out)
         if self._damping > 0.0:
-            out += self._damped(x - self._before)
+            there = np.array_equal(x, self._at)
+            out += self._damped_there if there else self._damped(x - self._before)
         return out
 
     def _damped(self, motion: FloatArray) -> FloatArray:
@@ -370,12 +389,9 @@ def _add_inertia(x, inertial, mass, h2, force):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _largest(x, before):  # type: ignore[no-untyped-def]
-    """Returns the largest distance of two rows (n,3)."""
+def _largest(x):  # type: ignore[no-untyped-def]
+    """Returns the largest length of a row (n,3)."""
     largest = 0.0
     for i in range(x.shape[0]):
-        size2 = 0.0
-        for c in range(3):
-            size2 += (x[i, c] - before[i, c]) ** 2
-        largest = max(largest, size2)
+        largest = max(largest, x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2)
     return np.sqrt(largest)

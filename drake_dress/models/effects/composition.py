@@ -111,11 +111,11 @@ class GarmentWithEffects:
         obstacles: Obstacles,
         held_velocity: FloatArray,
         influences: Influences = NO_INFLUENCES,
+        guess: FloatArray | None = None,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
-        return self._inner.step(
-            state, obstacles, held_velocity, self._with_effects(influences, state, obstacles)
-        )
+        influences = self._with_effects(influences, state, obstacles)
+        return self._inner.step(state, obstacles, held_velocity, influences, guess)
 
     def _with_effects(
         self, given: Influences, state: ClothState, obstacles: Obstacles

@@ -262,8 +262,10 @@ class IteratedContact:
 
     def _carry(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
         """Returns `x` with each node that a surface could reach carried by the nearest."""
-        near = find_proximity(x, obstacles, self._margin)
         v, omega = obstacles.twists()
+        if not v.any() and not omega.any():
+            return x.copy()
+        near = find_proximity(x, obstacles, self._margin)
         reach = np.zeros(len(x))
         for i in range(obstacles.count):
             arm = np.linalg.norm(x - self._before[i], axis=1)
@@ -281,6 +283,8 @@ class IteratedContact:
 def advanced(obstacles: Obstacles, h: float) -> tuple[Obstacles, FloatArray]:
     """Returns the obstacles `h` s later and how each has turned, (count,3,3)."""
     v, omega = obstacles.twists()
+    if not v.any() and not omega.any():
+        return obstacles, np.tile(np.eye(3), (len(v), 1, 1))
     turn = np.array([_rotation(h * w) for w in omega]).reshape(-1, 3, 3)
     m, k = len(obstacles.radius), len(obstacles.half_spaces.point)
     a = obstacles.a + h * v[:m]
