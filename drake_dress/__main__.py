@@ -111,6 +111,9 @@ def _parser() -> argparse.ArgumentParser:
     dataset = verbs.add_parser("dataset", help="make data")
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
     hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
+    hidden.add_argument(
+        "--motions", default="sway,lift,drag,shift,pull", help="also drop; default %(default)s"
+    )
     hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
     hidden.add_argument("--seed", type=int, default=0, metavar="N")
     hidden.add_argument("--out", metavar="DIR", required=True)
@@ -160,7 +163,14 @@ def _dataset_measured(options: argparse.Namespace) -> int:
     out = _directory(options.out)
     sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
     write_dataset(
-        options.hide, options.seed, out, options.scenario, options.set, options.size, sensors
+        options.hide,
+        options.seed,
+        out,
+        options.scenario,
+        options.set,
+        options.size,
+        sensors,
+        options.motions.split(","),
     )
     return 0
 

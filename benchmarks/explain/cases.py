@@ -14,6 +14,7 @@ import numpy as np
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.generate import Sensors, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, SIZES, draw_hidden
+from drake_dress.discrepancy.outside import OUTSIDE
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.effects.effect import Effect
 
@@ -27,7 +28,7 @@ class Case:
     """One set of recordings.
 
     Attributes:
-        group: effect, nothing, pair or coarse.
+        group: effect, nothing, pair, coarse or outside.
         hide: effects joined by "+", or nothing.
         seed: of all that is drawn.
         size: of the effect, times what matters.
@@ -66,6 +67,9 @@ def cases(groups: Sequence[str], draws: dict[str, int], seed: int, size: float, 
             add("pair", "+".join(rng.choice(list(SIZES), 2, replace=False)), k)
         if "coarse" in groups and k < draws["coarse"]:
             add("coarse", NOTHING, k)
+        if "outside" in groups and k < draws["outside"]:
+            for name in OUTSIDE:
+                add("outside", name, k)
     return found
 
 

@@ -17,13 +17,14 @@ from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.generate import Sensors, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, RANDOM, draw_hidden
-from drake_dress.discrepancy.motions import MOTIONS
+from drake_dress.discrepancy.motions import MOTIONS, USUAL
 from drake_dress.discrepancy.reading import read_recordings
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml, write_json, write_text
 from drake_dress.discrepancy.sentences import headline
 from drake_dress.discrepancy.suggestion import suggest
 from drake_dress.discrepancy.where import spots
+from drake_dress.discrepancy.windows import windows
 from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.errors import UserError
 
@@ -57,7 +58,6 @@ def explain_files(
         stage("settling")
         with Experiment(scenario, base, recordings, workers=workers) as experiment:
             found = explain(experiment, scenario.seed, stage, tick)
-            stage("writing")
             told = found.comparison.told["refined"]
             off = spots(
                 found.comparison.whitening,
@@ -67,13 +67,15 @@ def explain_files(
                 [t.contact for t in told],
                 experiment.samples,
             )
+            stage("running on its own")
+            alone = windows(experiment, found, tick)
             advice = suggest(found, scenario, base, stage)
-            page = report_page(found, experiment, off, advice, resolved_yaml(scenario))
+            page = report_page(found, experiment, off, alone, advice, resolved_yaml(scenario))
             yaml_text = extended_yaml(scenario, experiment, found)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "extended.yaml", yaml_text)
     write_text(out / "report.html", page)
-    write_json(out / "explanation.json", as_json(found, off, advice))
+    write_json(out / "explanation.json", as_json(found, off, alone, advice))
     print(headline(found))
     print(f"report, explanation and extended scenario: {out}")
     return found
@@ -87,6 +89,7 @@ def write_dataset(
     overrides: Sequence[str] = (),
     size: float = 1.0,
     sensors: Sensors | None = None,
+    motions: Sequence[str] = USUAL,
 ) -> None:
     """Writes measured.h5, and apart answer.json.
 
@@ -98,19 +101,23 @@ def write_dataset(
         overrides: KEY=VALUE changes of it.
         size: of the effect, times what matters.
         sensors: noise, markers, rate.
+        motions: what is done with the garment.
 
     Raises:
         UserError: an effect has no such name, or the scenario cannot be used.
     """
     if seed < 0:
         raise UserError("--seed", "", f"is {seed}, expected 0 or more")
+    for name in motions:
+        if name not in MOTIONS:
+            raise UserError("--motions", name, f"is no motion, expected {', '.join(MOTIONS)}")
     scenario = load_scenario(scenario_file, overrides)
     seeds = [seed, *hide.encode()]
     rng = np.random.default_rng(seeds)
     hidden = draw_hidden(hide, rng, size)
     sensors = sensors or Sensors()
     with _progress() as (stage, _):
-        stage(f"recording {', '.join(MOTIONS)}")
+        stage(f"recording {', '.join(motions)}")
         clean = record_all(
             scenario,
             Path(scenario_file).parent,
@@ -119,6 +126,7 @@ def write_dataset(
             DURATION,
             sensors,
             done=lambda name: stage(f"recorded {name}"),
+            motions=motions,
         )
     recordings = [measured(r, sensors, rng) for r in clean]
     out.mkdir(parents=True, exist_ok=True)

@@ -34,6 +34,8 @@ LEVELS: tuple[Level, ...] = ("screening", "scenario", "refined")
 
 # ω of the observer, 1/s: soft enough to see what is wrong, hard enough not to lose the garment.
 GAIN = 6.0
+# About how long the simulation runs on its own, s; the least that is a window, in samples.
+_WINDOW, _LEAST_SAMPLES = 1.0, 5
 # Simulations of all recordings that are remembered.
 _REMEMBERED = 48
 
@@ -51,6 +53,36 @@ class Told:
     marker: FloatArray
     force: FloatArray
     contact: FloatArray
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of a recording that the simulation ran through on its own.
+
+    Attributes:
+        sample: (W,) indices of the recording; time: (W,) s.
+        marker: (W,m,3) m; disturbed: started a little off; None where that was not asked for.
+    """
+
+    sample: npt.NDArray[np.int64]
+    time: FloatArray
+    marker: FloatArray
+    disturbed: FloatArray | None
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """What a simulation says of one recording without looking at the markers.
+
+    Attributes:
+        windows: each started where the replay in step with the markers is then.
+        length: of a window at most, s.
+        whole: (T,m,3) from the start of the recording to its end, m.
+    """
+
+    windows: tuple[Window, ...]
+    length: float
+    whole: FloatArray
 
 
 def levels(numerics: Numerics) -> dict[Level, Numerics]:
@@ -182,6 +214,26 @@ class Experiment:
             for _, _, which in jobs
         ]
 
+    def tell_free(
+        self,
+        jobs: Sequence[tuple[Level, Sequence[Effect], bool]],
+        progress: Callable[[], None] | None = None,
+    ) -> list[list[FreeRun]]:
+        """Returns what simulations say of each recording on their own.
+
+        Args:
+            jobs: level, effects, and whether windows are run a second time, started a little off.
+            progress: called after each recording.
+        """
+        count = len(self.recordings)
+        work = [
+            (level, i, tuple(effects), disturbed)
+            for level, effects, disturbed in jobs
+            for i in range(count)
+        ]
+        told = self._map(_run_free, work, progress)
+        return [told[j * count : (j + 1) * count] for j in range(len(jobs))]
+
     def _open(self, replayers: dict[tuple[Level, int], Replayer]) -> None:
         global _replayers
         _replayers = replayers
@@ -216,6 +268,30 @@ def _replay(
 ) -> Told:
     p = _replayers[level, index].run(effects, gain=GAIN)
     return Told(p.marker_position[samples], p.gripper_force[samples], p.contact[samples])
+
+
+def _run_free(level: Level, index: int, effects: tuple[Effect, ...], disturbed: bool) -> FreeRun:
+    replayer = _replayers[level, index]
+    time = replayer.recording.time
+    count = max(1, round(replayer.recording.duration / _WINDOW))
+    length = replayer.recording.duration / count
+    begins = time[0] + length * np.arange(count)
+    kept = replayer.run(effects, gain=GAIN, keep=begins)
+    rng = np.random.default_rng(index)
+    found = []
+    for begin, x, v in zip(begins, kept.position, kept.velocity, strict=True):
+        sample = np.flatnonzero((time >= begin - 1e-9) & (time <= begin + length + 1e-9))
+        if len(sample) < _LEAST_SAMPLES:
+            continue
+        starts = [(x, v)]
+        if disturbed:
+            starts.append((x + replayer.error(rng), v))
+        told = [
+            replayer.run(effects, 0.0, start, begin, begin + length).marker_position[sample]
+            for start in starts
+        ]
+        found.append(Window(sample, time[sample], told[0], told[1] if disturbed else None))
+    return FreeRun(tuple(found), length, replayer.run(effects, 0.0).marker_position)
 
 
 def _samples(recording: Recording, period: float) -> npt.NDArray[np.int64]:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.lab import Lab, Numerics
-from drake_dress.discrepancy.motions import MOTIONS, Stage
+from drake_dress.discrepancy.motions import MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.models.effects.composition import seen_points
@@ -118,8 +118,9 @@ def record_all(
     sensors: Sensors,
     workers: int | None = None,
     done: Callable[[str], None] = lambda _: None,
+    motions: Sequence[str] = USUAL,
 ) -> list[Recording]:
-    """Returns a recording of every motion without noise; motions run side by side.
+    """Returns a recording of each motion without noise; they run side by side.
 
     Args:
         scenario: that knows nothing of the effects.
@@ -130,6 +131,7 @@ def record_all(
         sensors: their rate and number are used.
         workers: processes; by default as many as there are cores.
         done: told the name of each motion that is there.
+        motions: of `MOTIONS`.
     """
     lab = truth(scenario, base, effects)
     context = multiprocessing.get_context("fork")
@@ -137,9 +139,9 @@ def record_all(
     with ProcessPoolExecutor(workers or os.cpu_count() or 1, mp_context=context) as pool:
         futures = [
             pool.submit(record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
-            for k, name in enumerate(MOTIONS)
+            for k, name in enumerate(motions)
         ]
-        for name, future in zip(MOTIONS, futures, strict=True):
+        for name, future in zip(motions, futures, strict=True):
             recordings.append(future.result())
             done(name)
     return recordings

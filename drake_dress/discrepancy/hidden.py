@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from drake_dress.discrepancy.outside import OUTSIDE
 from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
@@ -20,18 +21,19 @@ def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effec
     """Returns the effect called `name` with parameters drawn at `size` times what matters.
 
     Args:
-        name: of `EFFECTS`.
+        name: of `EFFECTS` or `OUTSIDE`.
         rng: source of chance.
         size: factor on how strong it is.
     """
-    return EFFECTS[name](**SIZES[name](rng, size))
+    kind = EFFECTS.get(name) or OUTSIDE[name]
+    return kind(**ALL_SIZES[name](rng, size))
 
 
 def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[Effect]:
     """Returns what is hidden.
 
     Args:
-        what: names of effects joined by "+", `nothing`, or `random` for any of them or nothing.
+        what: names of effects joined by "+", `nothing`, or `random` for any of the list or nothing.
         rng: source of chance.
         size: factor on how strong it is.
 
@@ -44,9 +46,10 @@ def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[
         return []
     names = what.split("+")
     for name in names:
-        if name not in SIZES:
-            near = difflib.get_close_matches(name, SIZES, n=1)
-            expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(SIZES)}"
+        if name not in ALL_SIZES:
+            near = difflib.get_close_matches(name, ALL_SIZES, n=1)
+            listed = f"expected one of {', '.join(ALL_SIZES)}"
+            expected = f"did you mean {near[0]}?" if near else listed
             raise UserError("--hide", name, f"is no effect that can be hidden, {expected}")
     return [draw_effect(name, rng, size) for name in names]
 
@@ -95,6 +98,26 @@ def _slip(rng: np.random.Generator, size: float) -> dict[str, float]:
     return {"rate": size * rng.uniform(0.006, 0.012), "threshold": 0.0}
 
 
+def _magnetised_cuff(rng: np.random.Generator, size: float) -> dict[str, float]:
+    return {
+        "strength": size * rng.uniform(1.5, 3.0),
+        "x": rng.uniform(-0.1, 0.1),
+        "y": rng.uniform(0.15, 0.3),
+        "z": rng.uniform(-0.35, -0.25),
+    }
+
+
+def _snag(rng: np.random.Generator, size: float) -> dict[str, float]:
+    # where the front of a garment passes that is pressed against the arm held out
+    return {
+        "stiffness": size * rng.uniform(4.0, 8.0),
+        "radius": 0.05,
+        "x": rng.uniform(0.12, 0.2),
+        "y": rng.uniform(0.5, 0.7),
+        "z": rng.uniform(1.05, 1.25),
+    }
+
+
 SIZES: Mapping[str, Draw] = {
     "air_drag": _one("coefficient", 1.5, 3.0),
     "wind": _wind,
@@ -119,4 +142,11 @@ SIZES: Mapping[str, Draw] = {
     "camera_rotation": _direction("x y z", 0.008, 0.016),
     "camera_translation": _direction("x y z", 0.008, 0.016),
     "gravity_tilt": _direction("about_x about_y", 0.025, 0.05),
+}
+
+ALL_SIZES: Mapping[str, Draw] = {
+    **SIZES,
+    "magnetised_cuff": _magnetised_cuff,
+    "snag": _snag,
+    "sliding_layer": _one("stress", 0.4, 0.8),
 }

@@ -115,13 +115,29 @@ def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
     return path
 
 
+def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns a garment that is let down fast and caught, twice, in the open."""
+    first, second = rng.uniform(0.12, 0.16), rng.uniform(0.2, 0.25)
+
+    def path(t: FloatArray) -> FloatArray:
+        middle = np.tile(stage.free, (len(t), 1))
+        middle[:, 2] -= first * (ease(t, _STILL, 0.62) - ease(t, 1.0, 1.9))
+        middle[:, 2] -= second * (ease(t, 2.0, 2.4) - ease(t, 2.8, duration - _STILL))
+        return _both(middle, stage.spread)
+
+    return path
+
+
 MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
     "sway": sway,
     "lift": lift,
     "drag": drag,
     "shift": shift,
     "pull": pull,
+    "drop": drop,
 }
+# What a lab records unless told otherwise.
+USUAL = ("sway", "lift", "drag", "shift", "pull")
 
 
 def _both(middle: FloatArray, spread: FloatArray) -> FloatArray:

@@ -212,6 +212,13 @@ class Replayer:
             velocities,
         )
 
+    def error(self, rng: np.random.Generator) -> FloatArray:
+        """Returns (n,3) how far off a state is that is as good as the markers' noise, m."""
+        r = self.recording
+        noise = r.marker_noise * rng.standard_normal(r.marker_rest_position.shape)
+        off: FloatArray = self._interpolation @ noise
+        return off
+
     def _forces(self, state: ClothState) -> FloatArray:
         """Returns (2,3) of the garment on the grippers, N."""
         reaction = state.reaction[self._held]

@@ -16,6 +16,7 @@ from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.sentences import headline, plain, values
 from drake_dress.discrepancy.where import Spot
+from drake_dress.discrepancy.windows import Windows
 from drake_dress.report.page import embedded, html_page
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,6 +29,7 @@ def report_page(
     explanation: Explanation,
     experiment: Experiment,
     spots: Sequence[Spot],
+    alone: Windows,
     suggestion: str | None,
     scenario_text: str,
 ) -> str:
@@ -37,6 +39,7 @@ def report_page(
         explanation: what was found.
         experiment: its recordings are drawn.
         spots: where the simulation was off, worst first.
+        alone: how it does on its own.
         suggestion: what to record next.
         scenario_text: resolved YAML of the scenario.
     """
@@ -65,6 +68,16 @@ def report_page(
             1,
             residuals.spectrum,
             2,
+        ),
+        "<h2>On its own</h2>",
+        _alone(alone, experiment),
+        _chart(
+            "Since a restart",
+            "The simulation is started from the state that the replay in step with the markers has "
+            "at every second, and runs on its own; RMS over the markers. Past the horizon (dotted) "
+            "an error of the markers' size has grown threefold, and a residual says little.",
+            len(experiment.recordings),
+            lambda axes: _since(alone, experiment, axes),
         ),
         "<h2>Where the simulation was off most</h2>",
         _spots(spots),
@@ -141,6 +154,41 @@ def _spots(spots: Sequence[Spot]) -> str:
         "<table><thead><tr><th></th><th>part</th><th>RMS</th><th>noise</th>"
         f"<th>squared, in noise</th></tr></thead><tbody>{body}</tbody></table>"
     )
+
+
+def _alone(alone: Windows, experiment: Experiment) -> str:
+    rows = (
+        ("within the horizon", alone.strayed),
+        ("whole recordings from their start", alone.whole),
+    )
+    body = "".join(
+        f"<tr><td>{name}</td><td>{1e3 * pair[0]:.2f}</td><td>{1e3 * pair[1]:.2f}</td></tr>"
+        for name, pair in rows
+    )
+    horizons = ", ".join(
+        f"{r.name} {'over ' if h >= alone.since[-1] else ''}{h:.2f} s"
+        for r, h in zip(experiment.recordings, alone.horizon, strict=True)
+    )
+    return (
+        "<table><thead><tr><th>markers, RMS, mm</th><th>before</th><th>after</th></tr></thead>"
+        f"<tbody>{body}</tbody></table><p class='note'>Horizon: {html.escape(horizons)}; noise "
+        f"{1e3 * alone.noise:.2f} mm.</p>"
+    )
+
+
+def _since(alone: Windows, experiment: Experiment, axes: list[Axes]) -> None:
+    for i, (ax, r) in enumerate(zip(axes, experiment.recordings, strict=True)):
+        for name, color, course in (
+            ("before", _BEFORE, alone.before[i]),
+            ("after", _AFTER, alone.after[i]),
+        ):
+            ax.plot(alone.since, 1e3 * course, color=color, label=name)
+        ax.axhline(1e3 * alone.noise, color=_NOISE, ls=":", label="noise")
+        ax.axvline(alone.horizon[i], color=_NOISE, ls=":")
+        ax.set_ylim(bottom=0.0)
+        ax.set_ylabel(f"{r.name}, mm")
+    axes[0].legend(frameon=False, fontsize=9, ncols=3)
+    axes[-1].set_xlabel("time since a restart, s")
 
 
 class _Residuals:

@@ -15,11 +15,14 @@ from drake_dress.diagrams.scenario import Scenario, resolved_yaml
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.where import Spot
+from drake_dress.discrepancy.windows import Windows
 
 _SPOTS = 12
 
 
-def as_json(explanation: Explanation, spots: list[Spot], suggestion: str | None) -> dict[str, Any]:
+def as_json(
+    explanation: Explanation, spots: list[Spot], alone: Windows, suggestion: str | None
+) -> dict[str, Any]:
     """Returns the content of explanation.json."""
     x = explanation
     causes = []
@@ -59,6 +62,12 @@ def as_json(explanation: Explanation, spots: list[Spot], suggestion: str | None)
         },
         "gain": {"value": x.gain[0], "low": x.gain[1], "high": x.gain[2], "level": 0.9},
         "numerics_m": x.numerics,
+        "alone": {
+            "horizon_s": list(alone.horizon),
+            "within_horizon_m": dict(zip(("before", "after"), alone.strayed, strict=True)),
+            "whole_m": dict(zip(("before", "after"), alone.whole, strict=True)),
+            "noise_m": alone.noise,
+        },
         "loss": x.loss,
         "where": [vars(s) for s in spots[:_SPOTS]],
     }

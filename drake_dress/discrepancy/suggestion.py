@@ -23,6 +23,7 @@ _WORDS = {
     "lift": "heave and twist the garment in the open",
     "drag": "press the garment against the held-out arm and draw it up and down",
     "shift": "press the garment against the held-out arm and draw it along the arm",
+    "drop": "let the garment down fast and catch it, in the open",
     "pull": "draw the garment taut between the grippers",
 }
 
@@ -46,7 +47,7 @@ def suggest(
     """
     if explanation.verdict == "unexplained":
         return (
-            "Record each of sway, lift, drag, shift and pull on its own, a few times, to see in "
+            f"Record each of {', '.join(MOTIONS)} on its own, a few times, to see in "
             "which the residual appears; the list of effects may lack its cause."
         )
     if explanation.verdict != "ambiguous":

@@ -14,6 +14,7 @@ from drake_dress.discrepancy.fitting import solve_bounded
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml
 from drake_dress.discrepancy.where import spots
+from drake_dress.discrepancy.windows import windows
 from drake_dress.models.effects.mass import SurfaceDensity
 from tests.discrepancy.data import SCENARIO, quick_scenario, recordings
 
@@ -57,12 +58,13 @@ def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
         [t.contact for t in told],
         heavy.samples,
     )
-    content = json.loads(json.dumps(as_json(found, off, None), allow_nan=False))
+    alone = windows(heavy, found)
+    content = json.loads(json.dumps(as_json(found, off, alone, None), allow_nan=False))
     assert content["verdict"] == "named"
     assert content["causes"][0]["parameters"]["added"]["unit"] == "kg/m²"
     assert len(content["candidates"]) == len({c["effect"] for c in content["candidates"]})
     assert content["where"][0]["kind"] == "signal"
-    page = report_page(found, heavy, off, None, text)
+    page = report_page(found, heavy, off, alone, None, text)
     assert "weight of the cloth" in page and page.count("data:image/svg+xml") >= 4
 
 
@@ -86,3 +88,13 @@ def test_effects_that_are_on_already_are_not_tried():
     rest = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 3))
     names = {c.name for c in candidates(rest, [SurfaceDensity(added=0.1)])}
     assert "surface_density" not in names and "air_drag" in names
+
+
+def test_the_extended_simulation_strays_less_on_its_own(heavy, found):
+    alone = windows(heavy, found)
+    assert alone.strayed[1] < 0.7 * alone.strayed[0]
+    assert alone.whole[1] < 0.7 * alone.whole[0]
+    assert len(alone.horizon) == len(heavy.recordings)
+    # a restart is as near to the markers as the replay that is kept in step
+    assert np.nanmax(alone.after[:, 0]) < 3.0 * alone.noise
+    assert np.all(alone.growth[:, 0] < 1.5)

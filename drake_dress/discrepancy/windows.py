@@ -1,0 +1,142 @@
+"""How long the simulation can be believed on its own, and how far it strays within that time.
+
+A replay of the inputs alone is chaotic: where cloth folds, two runs that start a hair apart are
+soon centimetres apart. So the simulation is started anew at every second from the state that the
+replay in step with the markers has then, runs on its own, and is compared for as long as an error
+of the markers' size does not grow beyond a few times that: the predictability horizon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.experiment import Experiment, FreeRun, Level
+from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
+from drake_dress.discrepancy.recording import Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+# An error that has grown to so many times its size at the start is past the horizon.
+_GROWN = 3.0
+# The least time that is compared, s; steps of the curves, s.
+_LEAST, _BIN = 0.2, 0.05
+
+
+@dataclass(frozen=True)
+class Windows:
+    """How the simulation does on its own, before and after it was extended.
+
+    Attributes:
+        horizon: of each recording, s; the windows' length where errors do not grow that far.
+        growth: (R,K) by how much an error of the markers' size grows.
+        since: (K,) time since a restart, s.
+        before, after: (R,K) RMS of the markers' residual, m, NaN where nothing was seen.
+        strayed: RMS within the horizon, before and after, m.
+        whole: RMS over the whole recordings, each replayed from its start, before and after, m.
+        noise: RMS of the markers' noise, m.
+    """
+
+    horizon: tuple[float, ...]
+    growth: FloatArray
+    since: FloatArray
+    before: FloatArray
+    after: FloatArray
+    strayed: tuple[float, float]
+    whole: tuple[float, float]
+    noise: float
+
+
+def windows(
+    experiment: Experiment,
+    explanation: Explanation,
+    progress: Callable[[], None] | None = None,
+) -> Windows:
+    """Returns how the scenario's simulation does on its own, and how the extended one does.
+
+    Args:
+        experiment: open.
+        explanation: of it.
+        progress: called after each replay of one recording.
+    """
+    finer = any(c.name == DISCRETISATION for c in explanation.causes)
+    level: Level = "refined" if finer else "scenario"
+    jobs = [("scenario", (), True), (level, explanation.effects, False)]
+    before, after = experiment.tell_free(jobs, progress)  # type: ignore[arg-type]
+    recordings = experiment.recordings
+    length = before[0].length
+    since: FloatArray = _BIN * (np.arange(round(length / _BIN), dtype=np.float64) + 0.5)
+    growth = np.stack([_growth(run, since) for run in before])
+    horizon = tuple(_horizon(g, since, length) for g in growth)
+    sides = [_binned(runs, recordings, since) for runs in (before, after)]
+    courses, strayed = [], []
+    for total, count in sides:
+        with np.errstate(invalid="ignore"):
+            courses.append(np.sqrt(total / count))
+        within = since[None, :] < np.array(horizon)[:, None]
+        strayed.append(float(np.sqrt(total[within].sum() / max(count[within].sum(), 1))))
+    return Windows(
+        horizon,
+        growth,
+        since,
+        courses[0],
+        courses[1],
+        (strayed[0], strayed[1]),
+        (_whole(before, recordings), _whole(after, recordings)),
+        float(np.sqrt(3.0 * np.mean([r.marker_noise**2 for r in recordings]))),
+    )
+
+
+def _growth(run: FreeRun, since: FloatArray) -> FloatArray:
+    """Returns (K,) the size of an error over its size at the start, median over the windows."""
+    sizes = []
+    for window in run.windows:
+        if window.disturbed is None:
+            continue
+        apart = np.sqrt(np.mean(np.sum((window.disturbed - window.marker) ** 2, axis=2), axis=1))
+        sizes.append(np.interp(since, window.time - window.time[0], apart / max(apart[0], 1e-12)))
+    median: FloatArray = np.median(sizes, axis=0)
+    return median
+
+
+def _horizon(growth: FloatArray, since: FloatArray, length: float) -> float:
+    """Returns the time until an error has grown too far, s."""
+    past = np.flatnonzero(growth > _GROWN)
+    return length if not len(past) else max(_LEAST, float(since[past[0]] - 0.5 * _BIN))
+
+
+def _binned(
+    runs: Sequence[FreeRun], recordings: Sequence[Recording], since: FloatArray
+) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Returns squared residuals and their count by recording and time since a restart, (R,K)."""
+    total = np.zeros((len(runs), len(since)))
+    count = np.zeros((len(runs), len(since)), dtype=np.int64)
+    for i, (run, r) in enumerate(zip(runs, recordings, strict=True)):
+        for window in run.windows:
+            squared = _squared(r.marker_position[window.sample], window.marker)
+            seen = np.isfinite(squared)
+            at = np.minimum(((window.time - window.time[0]) / _BIN).astype(int), len(since) - 1)
+            rows = np.broadcast_to(at[:, None], squared.shape)[seen]
+            total[i] += np.bincount(rows, squared[seen], len(since))
+            count[i] += np.bincount(rows, minlength=len(since))
+    return total, count
+
+
+def _whole(runs: Sequence[FreeRun], recordings: Sequence[Recording]) -> float:
+    """Returns the RMS over whole recordings, m."""
+    squared = np.concatenate(
+        [
+            _squared(r.marker_position, run.whole).ravel()
+            for run, r in zip(runs, recordings, strict=True)
+        ]
+    )
+    return float(np.sqrt(np.nanmean(squared)))
+
+
+def _squared(seen: FloatArray, told: FloatArray) -> FloatArray:
+    """Returns (S,m) squared distances, m², NaN where nothing was seen."""
+    squared: FloatArray = np.sum((seen - told) ** 2, axis=2)
+    return squared
