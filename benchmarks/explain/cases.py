@@ -74,7 +74,7 @@ def cases(groups: Sequence[str], draws: dict[str, int], seed: int, size: float, 
 
 
 def make(
-    case: Case, scenario: Scenario, base: Path, cache: Path
+    case: Case, scenario: Scenario, base: Path, cache: Path, workers: int | None = None
 ) -> tuple[list[Effect], list[Recording]]:
     """Returns what was hidden and what was measured; the truth without noise is kept in `cache`."""
     seeds = [case.seed, *case.hide.encode()]
@@ -87,7 +87,7 @@ def make(
     if path.exists():
         clean = pickle.loads(path.read_bytes())
     else:
-        clean = record_all(scenario, base, hidden, seeds, DURATION, sensors)
+        clean = record_all(scenario, base, hidden, seeds, DURATION, sensors, workers)
         cache.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(".partial")
         partial.write_bytes(pickle.dumps(clean))

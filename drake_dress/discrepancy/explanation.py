@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 
 DISCRETISATION = "discretisation"
 # Least share of the held-out loss that a cause takes away; what numerics can feign stays below.
-LEAST_GAIN = 0.09
+LEAST_GAIN = 0.03
 # Numerics are named where they are off by so many times the markers' noise, and refining them takes
 # away at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
@@ -43,11 +43,10 @@ _SURE = 0.9
 # best is the better one in this share of the resamples.
 _NEAR, _CERTAIN = 0.3, 0.99
 # Refinements of a fit at most; it is settled where a step is within its uncertainty, or this share.
-# Who has less than `_NEAR_REFINED` of the best one's gain is not refined further.
-_POLISHED, _STEADY, _NEAR_REFINED = 3, 0.04, 0.7
+_POLISHED, _STEADY = 3, 0.04
 # A residual is unexplained where so many times the noise's variance is left, and less than this
 # share of what exceeds noise has been explained.
-_LEFT, _EXPLAINED = 2.0, 0.5
+_LEFT, _EXPLAINED = 1.12, 0.7
 _MOST_CAUSES = 3
 _RESAMPLES = 1000
 
@@ -182,22 +181,23 @@ def explain(
         stage(f"refining {', '.join(chosen[i].candidate.name for i in near)}")
         contenders = [_refined(experiment, comparison, fits[i], progress) for i in near]
         for _ in range(_POLISHED):
-            due = [c for c in contenders if not c.settled]
-            if not due:
+            if all(c.settled for c in contenders):
                 break
-            for c in due:
-                contenders[contenders.index(c)] = _polished(
-                    experiment, comparison, c, training, progress
-                )
+            contenders = [
+                c if c.settled else _polished(experiment, comparison, c, training, progress)
+                for c in contenders
+            ]
             after = [block_loss(w, c.predicted) for c in contenders]
             gains = [1.0 - float(a[judged].sum() / before[judged].sum()) for a in after]
             best = int(np.argmax(gains))
+            confidence = _confidence(before, after, best, judged, rng)
             # who falls behind is not refined further
             contenders = [
-                replace(c, settled=c.settled or g < _NEAR_REFINED * gains[best])
-                for c, g in zip(contenders, gains, strict=True)
+                replace(c, settled=c.settled or (k != best and confidence >= _CERTAIN))
+                for k, c in enumerate(contenders)
             ]
-        confidence = _confidence(before, after, best, judged, rng)
+        if gains[best] < LEAST_GAIN:
+            break
         fit, reference, predicted = (
             contenders[best].fit,
             contenders[best].reference,
@@ -265,7 +265,10 @@ def _polished(
         for old, new in zip(effects, better.effects, strict=True)
         for p in new.parameters()
     ]
-    return replace(_refined(experiment, comparison, better, progress), settled=all(moved))
+    if all(moved):
+        # so short a step is linear
+        return _Polished(better, better.predicted_all, better.predicted, settled=True)
+    return _refined(experiment, comparison, better, progress)
 
 
 def _coarse(

@@ -131,6 +131,7 @@ class Lab:
             _ACCURACY,
             predicted=True,
             damping=damping,
+            sampled=True,
         )
         return GarmentWithEffects(
             self.garment.rest_position,

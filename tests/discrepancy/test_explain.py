@@ -11,6 +11,7 @@ from drake_dress.discrepancy.candidates import candidates
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import explain
 from drake_dress.discrepancy.fitting import solve_bounded
+from drake_dress.discrepancy.lab import Numerics
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml
 from drake_dress.discrepancy.where import spots
@@ -22,7 +23,8 @@ from tests.discrepancy.data import SCENARIO, quick_scenario, recordings
 @pytest.fixture(scope="module")
 def heavy():
     """An experiment whose garment is heavier than the scenario's."""
-    made = recordings(("sway", "lift"), [SurfaceDensity(added=0.06)], duration=2.4)
+    finer = Numerics(0.05, 0.004, "projective_dynamics")
+    made = recordings(("sway", "lift"), [SurfaceDensity(added=0.06)], 2.4, numerics=finer)
     with Experiment(quick_scenario(), SCENARIO.parent, made) as experiment:
         yield experiment
 
@@ -35,7 +37,9 @@ def found(heavy):
 def test_the_cause_is_named_with_its_size(found):
     assert found.verdict == "named"
     assert found.causes[0].name == "surface_density"
-    assert found.causes[0].effect.added == pytest.approx(0.06, rel=0.1)
+    # on another mesh, with another integrator, and as sure as it says it is
+    cause = found.causes[0]
+    assert abs(cause.effect.added - 0.06) < min(3.0 * cause.std["added"], 0.01)
     assert found.gain[1] <= found.gain[0] <= found.gain[2]
     assert found.after[1] < 0.65 * found.before[1]
 
@@ -92,8 +96,9 @@ def test_effects_that_are_on_already_are_not_tried():
 
 def test_the_extended_simulation_strays_less_on_its_own(heavy, found):
     alone = windows(heavy, found)
-    assert alone.strayed[1] < 0.7 * alone.strayed[0]
-    assert alone.whole[1] < 0.7 * alone.whole[0]
+    # what is left is the coarse scenario's own numerics
+    assert alone.strayed[1] < 0.9 * alone.strayed[0]
+    assert alone.whole[1] < 0.9 * alone.whole[0]
     assert len(alone.horizon) == len(heavy.recordings)
     # a restart is as near to the markers as the replay that is kept in step
     assert np.nanmax(alone.after[:, 0]) < 3.0 * alone.noise

@@ -30,7 +30,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.contact.detection import fastest, out_of_reach
+from drake_dress.models.cloth.contact.detection import depth_of_elements, fastest, out_of_reach
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
@@ -86,8 +86,9 @@ class ProjectiveInfo:
 class ProjectiveDynamicsCloth:
     """Steps a garment by Projective Dynamics.
 
-    Contact is at nodes only, unlike `ImplicitCloth`'s: thin things slip between them. With friction
-    a step of 0.1 s that lands has more than one fixed point; which is found depends on the way.
+    By default contact is at nodes only, unlike `ImplicitCloth`'s: thin things slip between them.
+    With friction a step of 0.1 s that lands has more than one fixed point; which is found depends
+    on the way.
 
     Args:
         elements: the rest shape.
@@ -102,6 +103,8 @@ class ProjectiveDynamicsCloth:
         added_mass: (n,) further mass of the nodes, kg.
         predicted: start each step from the linearly implicit one; where that is near, few
             iterations are left.
+        sample_elements: contact at edge midpoints and face centroids too, by where they are at the
+            start of a step.
     """
 
     def __init__(
@@ -117,6 +120,7 @@ class ProjectiveDynamicsCloth:
         fibres: Fibres | None = None,
         added_mass: FloatArray | None = None,
         predicted: bool = False,
+        sample_elements: bool = False,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -128,6 +132,7 @@ class ProjectiveDynamicsCloth:
             self.mass = self.mass + added_mass
         self._fibres = fibres
         self._tolerance = tolerance
+        self._sampled = sample_elements
         self._max_iterations = max_iterations
         self._history = CurvatureHistory(_WINDOW, elements.node_count) if quasi_newton else None
 
@@ -147,7 +152,7 @@ class ProjectiveDynamicsCloth:
                 held,
                 gravity,
                 tolerance=1e-3,
-                sample_elements=False,
+                sample_elements=sample_elements,
                 fibres=fibres,
                 added_mass=added_mass,
             )
@@ -191,7 +196,7 @@ class ProjectiveDynamicsCloth:
             h,
             mu,
             adhesion,
-            material.margin,
+            self._margins(state.x, obstacles),
             self._tolerance,
         )
         self._system.start_counting()
@@ -262,6 +267,14 @@ class ProjectiveDynamicsCloth:
             self._system.solves,
             changes,
         )
+
+    def _margins(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
+        """Returns (n,) the distance that nodes keep, so that elements between them keep theirs."""
+        margin = np.full(len(x), self.material.margin)
+        if self._sampled:
+            e = self.elements
+            margin += depth_of_elements(x, obstacles, e.edge, e.triangle)
+        return margin
 
     def _motion(
         self, gradient: FloatArray, contact: IteratedContact, history: CurvatureHistory | None

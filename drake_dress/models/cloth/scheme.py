@@ -31,6 +31,7 @@ class Scheme:
         accuracy: distance to the fixed point at which Projective Dynamics stops, m.
         predicted: whether it starts from the linearly implicit step.
         damping: in place of the fabric's, s.
+        sampled: whether Projective Dynamics has contact between nodes too.
     """
 
     held: IntArray
@@ -41,6 +42,7 @@ class Scheme:
     accuracy: float = 1e-5
     predicted: bool = False
     damping: float | None = None
+    sampled: bool = False
 
     def __call__(
         self,
@@ -65,6 +67,7 @@ class Scheme:
                 fibres=fibres,
                 added_mass=added_mass,
                 predicted=self.predicted,
+                sample_elements=self.sampled,
             )
         return ImplicitCloth(
             elements,

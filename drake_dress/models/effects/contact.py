@@ -105,7 +105,7 @@ class Adhesion(AdhesionEffect):
     """
 
     NAME = "adhesion"
-    strength: float = parameter("Pa", 0.0, 500.0, 8.0)
+    strength: float = parameter("Pa", 0.0, 500.0, 30.0)
 
     def apply(self, sheet: Sheet) -> FloatArray:
         """Returns (n,) N."""

@@ -449,3 +449,22 @@ def test_input_that_is_not_finite_names_its_node_and_changes_nothing(name: str) 
         cloth.step(state, Obstacles.none(), np.zeros((2, 3)))
     np.testing.assert_array_equal(state.x, kept[0])
     np.testing.assert_array_equal(state.v, kept[1])
+
+
+def test_a_thin_rod_does_not_slip_between_nodes_where_elements_are_sampled() -> None:
+    x, e = sheet_elements(9, 9, 0.06)
+    material = Material(friction=0.3)
+    rod = capsule(0.01)
+    lowest = {}
+    for sampled in (False, True):
+        cloth = ProjectiveDynamicsCloth(
+            e, material, 0.005, NO_NODES, quasi_newton=True, sample_elements=sampled
+        )
+        # the rod lies between two rows of nodes
+        state = ClothState.at_rest(x - x.mean(axis=0) + [0.0, 0.03, 0.03])
+        for _ in range(40):
+            state, _ = cloth.step(state, rod, NOTHING)
+        middle = 0.5 * (state.x[e.edge[:, 0]] + state.x[e.edge[:, 1]])
+        lowest[sampled] = find_proximity(middle, rod, 0.0).gap.min()
+    assert lowest[False] < -0.005
+    assert lowest[True] > 0.0

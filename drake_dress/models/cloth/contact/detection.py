@@ -90,12 +90,30 @@ def find_proximity(
     owner = np.empty(n, dtype=np.int32)
     nearest_obstacle(x, shapes, gap, owner)
     if obstacles.count and edge is not None and triangle is not None:
-        lent = gap.copy()
-        # Only elements within their own size of a surface can enter it.
-        _lend_depth(x, edge, shapes, gap, lent)
-        _lend_depth(x, triangle, shapes, gap, lent)
-        gap = lent
+        gap = _with_elements(x, shapes, edge, triangle, gap)
     return Proximity(gap - margin, owner, *_surface(x, obstacles, owner))
+
+
+def depth_of_elements(
+    x: FloatArray, obstacles: Obstacles, edge: IntArray, triangle: IntArray
+) -> FloatArray:
+    """Returns (n,) by how much edges (E,2) and faces (F,3) are nearer than their nodes, m."""
+    gap = np.empty(len(x))
+    if not obstacles.count:
+        return np.zeros(len(x))
+    nearest_obstacle(x, obstacles.packed, gap, np.empty(len(x), dtype=np.int32))
+    return gap - _with_elements(x, obstacles.packed, edge, triangle, gap)
+
+
+def _with_elements(
+    x: FloatArray, shapes: Any, edge: IntArray, triangle: IntArray, distance: FloatArray
+) -> FloatArray:
+    """Returns (n,) the least distance of each node and of the middles of its elements."""
+    lent = distance.copy()
+    # Only elements within their own size of a surface can enter it.
+    _lend_depth(x, edge, shapes, distance, lent)
+    _lend_depth(x, triangle, shapes, distance, lent)
+    return lent
 
 
 @dataclass(frozen=True)
