@@ -32,7 +32,7 @@ _FINER, _SHORTER = 0.84, 0.5
 # Where the garment hangs: free, before the person, and just before the limb, m.
 _FREE_DISTANCE, _ABOVE_SHOULDERS, _BEFORE_LIMB, _ABOVE_LIMB = 0.8, 0.05, 0.25, 0.24
 # Where along the arm it is drawn over, from shoulder (0) to hand (1).
-_ON_ARM = 0.72
+_ON_ARM = 0.55
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def _snag(rng: np.random.Generator, size: float) -> dict[str, float]:
         "stiffness": size * rng.uniform(4.0, 8.0),
         "radius": 0.05,
         "x": rng.uniform(0.12, 0.2),
-        "y": rng.uniform(0.5, 0.7),
+        "y": rng.uniform(0.4, 0.62),
         "z": rng.uniform(1.05, 1.25),
     }
 

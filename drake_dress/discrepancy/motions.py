@@ -79,12 +79,11 @@ def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a garment that is laid over a limb and drawn up and down over it."""
-    rub = rng.uniform(0.05, 0.065)
-    over = _over(stage, rng)
+    """Returns a garment that is pressed against a limb and drawn up and down over it."""
+    press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.055, 0.065)
 
     def path(t: FloatArray) -> FloatArray:
-        middle = over(t)
+        middle = stage.before + press * ease(t, _STILL, 1.5)[:, None] * stage.across
         middle[:, 2] += rub * (ease(t, 1.5, 2.4) - 2.0 * ease(t, 2.5, 3.1) + ease(t, 3.2, 3.7))
         return _both(middle, stage.spread)
 
@@ -92,12 +91,11 @@ def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a garment that is laid over a limb and drawn along it, there and back."""
-    rub = rng.uniform(0.09, 0.12) * rng.choice([-1.0, 1.0])
-    over = _over(stage, rng)
+    """Returns a garment that is pressed against a limb and drawn along it, there and back."""
+    press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.09, 0.11) * rng.choice([-1.0, 1.0])
 
     def path(t: FloatArray) -> FloatArray:
-        middle = over(t)
+        middle = stage.before + press * ease(t, _STILL, 1.5)[:, None] * stage.across
         along = rub * (ease(t, 1.5, 2.4) - 1.6 * ease(t, 2.5, 3.1))
         return _both(middle + along[:, None] * stage.along, stage.spread)
 
@@ -140,18 +138,6 @@ MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
 }
 # What a lab records unless told otherwise.
 USUAL = ("sway", "lift", "drag", "shift", "pull")
-
-
-def _over(stage: Stage, rng: np.random.Generator) -> Path:
-    """Returns the way of the middle (T,3) that lays the garment over the limb: across and down."""
-    press, lower = rng.uniform(0.32, 0.36), rng.uniform(0.08, 0.12)
-
-    def path(t: FloatArray) -> FloatArray:
-        middle = stage.before + press * ease(t, _STILL, 1.5)[:, None] * stage.across
-        middle[:, 2] -= lower * ease(t, 0.8, 1.6)
-        return middle
-
-    return path
 
 
 def _both(middle: FloatArray, spread: FloatArray) -> FloatArray:

@@ -21,8 +21,8 @@ _DURATION, _RATE, _MARKERS = 4.0, 50.0, 40
 _WORDS = {
     "sway": "sway the garment to and fro in the open",
     "lift": "heave and twist the garment in the open",
-    "drag": "lay the garment over the held-out arm and draw it up and down",
-    "shift": "lay the garment over the held-out arm and draw it along the arm",
+    "drag": "press the garment against the held-out arm and draw it up and down",
+    "shift": "press the garment against the held-out arm and draw it along the arm",
     "drop": "let the garment down fast and catch it, in the open",
     "pull": "draw the garment taut between the grippers",
 }
