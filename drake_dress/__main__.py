@@ -112,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
     hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
     hidden.add_argument(
-        "--motions", default="sway,lift,drag,shift,pull", help="also drop; default %(default)s"
+        "--motions", metavar="NAME,…", help="sway, lift, drag, shift, pull, drop; default: not drop"
     )
     hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
     hidden.add_argument("--seed", type=int, default=0, metavar="N")
@@ -159,6 +159,7 @@ def _explain(options: argparse.Namespace) -> int:
 def _dataset_measured(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.commands import write_dataset
     from drake_dress.discrepancy.generate import Sensors
+    from drake_dress.discrepancy.motions import USUAL
 
     out = _directory(options.out)
     sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
@@ -170,7 +171,7 @@ def _dataset_measured(options: argparse.Namespace) -> int:
         options.set,
         options.size,
         sensors,
-        options.motions.split(","),
+        options.motions.split(",") if options.motions else USUAL,
     )
     return 0
 

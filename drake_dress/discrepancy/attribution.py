@@ -1,4 +1,4 @@
-"""Names what a simulation lacks: screens all effects, fits the likely ones, adds them one by one.
+"""Screens which effects may be what a simulation lacks.
 
 Half of the blocks of time train, the others judge. A candidate's gain is the share of the squared
 whitened residual on held-out blocks that it takes away, beyond what noise leaves (1 a sample).
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.discrepancy.candidates import NEED_CONTACT, Candidate, candidates
-from drake_dress.discrepancy.experiment import Experiment, Level, Told
-from drake_dress.discrepancy.fitting import Fit, fit_all, solve_bounded
+from drake_dress.discrepancy.candidates import Candidate, candidates
+from drake_dress.discrepancy.experiment import Experiment, Level, Told, level_of
+from drake_dress.discrepancy.regression import Extrapolation, solve_bounded
 from drake_dress.discrepancy.whitening import Whitening, whiten
 from drake_dress.models.effects.effect import Effect
 
@@ -47,10 +47,12 @@ class Comparison:
     Attributes:
         whitening: of the data.
         told: what each level says of each recording.
+        extrapolation: of the refined one.
     """
 
     whitening: Whitening
     told: dict[Level, list[Told]]
+    extrapolation: Extrapolation
 
 
 def block_loss(whitening: Whitening, predicted: FloatArray) -> FloatArray:
@@ -72,69 +74,57 @@ def screen(
     predicted: FloatArray,
 ) -> list[Screened]:
     """Returns all candidates by their linear gain over `predicted` (N,), best first."""
-    w = comparison.whitening
+    w, free = comparison.whitening, comparison.extrapolation
     residual = w.data - predicted
-    before = np.bincount(w.block, residual * residual)
-    fold = w.block % 2
+    folds = [w.block % 2 != k for k in (0, 1)]
+    left = [free.without(residual, train) for train in folds]
+    before = sum(float(r[~train] @ r[~train]) for r, train in zip(left, folds, strict=True))
     found = []
     for candidate, matrix in columns:
         if not matrix.any():
             continue
         low = np.array([p.low for p in candidate.probes])
         high = np.full(len(low), np.inf)
-        after = residual.copy()
-        for k in (0, 1):
-            train = fold != k
-            x = solve_bounded(matrix[train], residual[train], low, high)
-            after[~train] -= matrix[~train] @ x
-        saved = before - np.bincount(w.block, after * after)
-        x = solve_bounded(matrix, residual, low, high)
-        found.append(
-            Screened(
-                candidate,
-                candidate.effect(x),
-                float(saved.sum() / before.sum()),
-            )
-        )
+        after, x = 0.0, np.zeros(len(low))
+        for r, train in zip(left, folds, strict=True):
+            reduced = free.without(matrix, train)
+            half = solve_bounded(matrix[train], reduced[train], r[train], low, high)
+            x += 0.5 * half
+            r = r[~train] - reduced[~train] @ half
+            after += float(r @ r)
+        found.append(Screened(candidate, candidate.effect(x), 1.0 - after / before))
     return sorted(found, key=lambda s: -s.gain)
 
 
 def probe(
     experiment: Experiment,
     comparison: Comparison,
-    about: Sequence[Effect] = (),
     progress: Callable[[], None] | None = None,
 ) -> list[tuple[Candidate, FloatArray]]:
-    """Returns the columns (N,k) of every candidate, at the screening level."""
+    """Returns the columns (N,k) of every candidate, each at the level that tells it."""
     lab = experiment.labs["screening"]
-    base = comparison.told["screening"]
-    touched = [bool(t.contact.any()) for t in base]
-    found = candidates(lab.garment.rest_position, [*lab.effects, *about])
-    jobs = []
-    for c in found:
-        for p in c.probes:
-            skipped = c.name in NEED_CONTACT
-            jobs.append((p.effect, [i for i in range(len(base)) if touched[i] or not skipped]))
-    told = experiment.tell_some(
-        [("screening", (*about, effect), which) for effect, which in jobs], base, progress
-    )
-    zero = comparison.whitening.vector(base)
-    vectors = iter(told)
-    return [
-        (c, np.stack([comparison.whitening.vector(next(vectors)) - zero for _ in c.probes], 1))
-        for c in found
+    found = candidates(lab.garment.rest_position, lab.effects)
+    jobs: list[tuple[Level, Sequence[Effect]]] = [
+        (level_of(p.effect), (p.effect,)) for c in found for p in c.probes
     ]
+    w = comparison.whitening
+    zero = {level: w.vector(told) for level, told in comparison.told.items()}
+    columns = iter(
+        w.vector(told) - zero[level]
+        for (level, _), told in zip(jobs, experiment.tell(jobs, progress), strict=True)
+    )
+    return [(c, np.stack([next(columns) for _ in c.probes], 1)) for c in found]
 
 
 def compare(experiment: Experiment, progress: Callable[[], None] | None = None) -> Comparison:
     """Returns the data against the simulation at all levels."""
-    order: list[Level] = ["refined", "scenario", "screening"]
+    order: list[Level] = ["refined", "doubled", "scenario", "screening"]
     told = dict(
         zip(order, experiment.tell([(level, ()) for level in order], progress), strict=True)
     )
-    return Comparison(
-        whiten(experiment.recordings, experiment.samples, told["scenario"], told["refined"]), told
-    )
+    w = whiten(experiment.recordings, experiment.samples, told["scenario"], told["refined"])
+    halving = w.vector(told["refined"]) - w.vector(told["doubled"])
+    return Comparison(w, told, Extrapolation(halving, w.voice))
 
 
 def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
@@ -152,18 +142,3 @@ def shortlist(screened: Sequence[Screened]) -> list[Screened]:
         return []
     least = _PROMISING * ranked[0].gain
     return [s for s in ranked if s.gain >= least][:_SHORTLIST]
-
-
-def fitted(
-    experiment: Experiment,
-    comparison: Comparison,
-    reference: FloatArray,
-    about: Sequence[Effect],
-    chosen: Sequence[Screened],
-    progress: Callable[[], None] | None = None,
-) -> list[Fit]:
-    """Returns a fit of each chosen candidate beside the effects `about`."""
-    w = comparison.whitening
-    training = ~held_out(w)[w.block]
-    starts = [[*about, s.start] for s in chosen]
-    return fit_all(experiment, w, reference, starts, training, about=about, progress=progress)

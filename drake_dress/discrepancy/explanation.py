@@ -7,8 +7,8 @@ most of what was held out; look for another in what is left, until nothing more 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -18,36 +18,21 @@ from drake_dress.discrepancy.attribution import (
     best_of_each,
     block_loss,
     compare,
-    fitted,
     held_out,
-    probe,
-    screen,
-    shortlist,
 )
 from drake_dress.discrepancy.experiment import Experiment
-from drake_dress.discrepancy.fitting import Fit, fit_all
+from drake_dress.discrepancy.search import Found, Model, Named, Search
 from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
 
 DISCRETISATION = "discretisation"
-# Least share of the held-out loss that a cause takes away; what numerics can feign stays below.
-LEAST_GAIN = 0.03
 # Numerics are named where they are off by so many times the markers' noise, and refining them takes
 # away at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
-# Two causes are not told apart where the first is the better one in less than this share of the
-# resamples of blocks.
-_SURE = 0.9
-# A second candidate is refined too where it takes away this share of what the best does, unless the
-# best is the better one in this share of the resamples.
-_NEAR, _CERTAIN = 0.3, 0.99
-# Refinements of a fit at most; it is settled where a step is within its uncertainty, or this share.
-_POLISHED, _STEADY = 3, 0.04
 # A residual is unexplained where so many times the noise's variance is left, and less than this
 # share of what exceeds noise has been explained.
 _LEFT, _EXPLAINED = 1.12, 0.7
-_MOST_CAUSES = 3
 _RESAMPLES = 1000
 
 
@@ -138,137 +123,12 @@ def explain(
     rng = np.random.default_rng(seed)
     stage("comparing")
     comparison = compare(experiment, progress)
+    found = Search(experiment, comparison, rng, stage, progress).run()
     w = comparison.whitening
-    scenario = w.vector(comparison.told["scenario"])
-    refined = w.vector(comparison.told["refined"])
-    judged = held_out(w)
-    training = ~judged[w.block]
+    scenario, refined = (w.vector(comparison.told[k]) for k in ("scenario", "refined"))
     numerics = _rms(w.size(scenario - refined), ~w.is_force)
-    causes = _coarse(comparison, scenario, refined, numerics)
-
-    stage("screening effects")
-    columns = probe(experiment, comparison, (), progress)
-    screened = screen(comparison, columns, refined)
-    scores = {
-        s.candidate.name: Score(s.candidate.name, s.gain, None, s.start)
-        for s in best_of_each(screened)
-    }
-    predicted, reference = refined, refined
-    found: tuple[Effect, ...] = ()
-    rival = False
-    for round_ in range(_MOST_CAUSES):
-        named = {e.NAME for e in found}
-        chosen = [s for s in shortlist(screened) if s.candidate.name not in named]
-        if not chosen or chosen[0].gain < 0.5 * LEAST_GAIN:
-            break
-        stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
-        fits = fitted(experiment, comparison, reference, found, chosen, progress)
-        before = block_loss(w, predicted)
-        after = [block_loss(w, f.predicted) for f in fits]
-        order = np.argsort([a[judged].sum() for a in after])
-        gains = [1.0 - float(a[judged].sum() / before[judged].sum()) for a in after]
-        if round_ == 0:
-            for s, f, g in zip(chosen, fits, gains, strict=True):
-                name = s.candidate.name
-                scores[name] = Score(name, scores[name].screened, g, f.effects[-1])
-        best = int(order[0])
-        if gains[best] < LEAST_GAIN:
-            break
-        # those that come near the best, if any, are told apart by the refined simulation
-        near = [i for i in order[:2].tolist() if gains[i] >= _NEAR * gains[best]]
-        if _confidence(before, after, best, judged, rng) >= _CERTAIN:
-            near = [best]
-        stage(f"refining {', '.join(chosen[i].candidate.name for i in near)}")
-        contenders = [_refined(experiment, comparison, fits[i], progress) for i in near]
-        for _ in range(_POLISHED):
-            if all(c.settled for c in contenders):
-                break
-            contenders = [
-                c if c.settled else _polished(experiment, comparison, c, training, progress)
-                for c in contenders
-            ]
-            after = [block_loss(w, c.predicted) for c in contenders]
-            gains = [1.0 - float(a[judged].sum() / before[judged].sum()) for a in after]
-            best = int(np.argmax(gains))
-            confidence = _confidence(before, after, best, judged, rng)
-            # who falls behind is not refined further
-            contenders = [
-                replace(c, settled=c.settled or (k != best and confidence >= _CERTAIN))
-                for k, c in enumerate(contenders)
-            ]
-        if gains[best] < LEAST_GAIN:
-            break
-        fit, reference, predicted = (
-            contenders[best].fit,
-            contenders[best].reference,
-            contenders[best].predicted,
-        )
-        causes = _updated(causes, fit) + [_cause(fit, gains[best], confidence)]
-        found = fit.effects
-        if confidence < _SURE and len(contenders) > 1:
-            rival = True
-            causes.append(_cause(contenders[1 - best].fit, gains[1 - best], 1.0 - confidence))
-            break
-        screened = screen(comparison, columns, predicted)
-    return _concluded(
-        comparison, causes, scores, scenario, refined, predicted, numerics, rival, rng
-    )
-
-
-@dataclass(frozen=True)
-class _Polished:
-    """A fit, what the refined simulation says at it, and that with what is held out held out."""
-
-    fit: Fit
-    reference: FloatArray
-    predicted: FloatArray
-    settled: bool = False
-
-
-def _refined(
-    experiment: Experiment,
-    comparison: Comparison,
-    fit: Fit,
-    progress: Callable[[], None] | None,
-) -> _Polished:
-    told = comparison.whitening.vector(experiment.tell([("refined", fit.effects)], progress)[0])
-    return _Polished(fit, told, told + fit.predicted - fit.predicted_all)
-
-
-def _polished(
-    experiment: Experiment,
-    comparison: Comparison,
-    last: _Polished,
-    training: npt.NDArray[np.bool_],
-    progress: Callable[[], None] | None,
-) -> _Polished:
-    """Returns a fit about what the refined simulation says at the last one.
-
-    Coarse contact feels friction more than fine contact does: by the slopes of the screening level
-    alone a coefficient of friction came out at half of what it was.
-    """
-    effects = last.fit.effects
-    (better,) = fit_all(
-        experiment,
-        comparison.whitening,
-        last.reference,
-        [effects],
-        training,
-        level="scenario",
-        about=effects,
-        iterations=1,
-        progress=progress,
-    )
-    moved = [
-        abs(getattr(new, p.name) - getattr(old, p.name))
-        <= max(better.std[new.NAME][p.name], _STEADY * abs(getattr(new, p.name)))
-        for old, new in zip(effects, better.effects, strict=True)
-        for p in new.parameters()
-    ]
-    if all(moved):
-        # so short a step is linear
-        return _Polished(better, better.predicted_all, better.predicted, settled=True)
-    return _refined(experiment, comparison, better, progress)
+    coarse = _coarse(comparison, scenario, refined, numerics)
+    return _concluded(comparison, found, coarse, scenario, numerics, rng)
 
 
 def _coarse(
@@ -286,58 +146,50 @@ def _coarse(
     return [Cause(DISCRETISATION, None, {}, mended, float(np.clip(mended, 0.0, 1.0)))]
 
 
-def _cause(fit: Fit, gain: float, confidence: float) -> Cause:
-    effect = fit.effects[-1]
-    return Cause(effect.NAME, effect, fit.std[effect.NAME], gain, confidence)
+def _causes(found: Found) -> list[Cause]:
+    pairs = [(n, found.model) for n in found.named]
+    if found.rival is not None and found.rival_named is not None:
+        pairs.append((found.rival_named, found.rival))
+    return [_cause(named, model) for named, model in pairs]
 
 
-def _updated(causes: list[Cause], fit: Fit) -> list[Cause]:
-    """Returns earlier causes with the parameters of a joint fit."""
-    new = {e.NAME: e for e in fit.effects}
-    return [
-        Cause(c.name, new[c.name], fit.std[c.name], c.gain, c.confidence) if c.name in new else c
-        for c in causes
-    ]
+def _cause(named: Named, model: Model) -> Cause:
+    assert model.fit is not None
+    effect = next(e for e in model.effects if e.NAME == named.name)
+    return Cause(named.name, effect, model.fit.std[named.name], named.gain, named.confidence)
 
 
-def _confidence(
-    before: FloatArray,
-    after: Sequence[FloatArray],
-    best: int,
-    judged: npt.NDArray[np.bool_],
-    rng: np.random.Generator,
-) -> float:
-    """Returns the share of block resamples in which the best stays the best, and is a gain."""
-    rows = np.flatnonzero(judged)
-    draws = rng.integers(len(rows), size=(_RESAMPLES, len(rows)))
-    totals = np.stack([a[rows][draws].sum(axis=1) for a in after])
-    wins = (totals.argmin(axis=0) == best) & (totals[best] < before[rows][draws].sum(axis=1))
-    return float(wins.mean())
+def _scores(found: Found) -> list[Score]:
+    """Returns how every effect did at the start, best first."""
+    scores = []
+    for s in best_of_each(found.screened):
+        effect, gain = found.fitted.get(s.candidate.name, (s.start, None))
+        scores.append(Score(s.candidate.name, s.gain, gain, effect))
+    return sorted(scores, key=lambda s: -(s.fitted or s.screened))
 
 
 def _concluded(
     comparison: Comparison,
-    causes: list[Cause],
-    scores: dict[str, Score],
+    found: Found,
+    coarse: list[Cause],
     scenario: FloatArray,
-    refined: FloatArray,
-    predicted: FloatArray,
     numerics: float,
-    rival: bool,
     rng: np.random.Generator,
 ) -> Explanation:
     w = comparison.whitening
+    physical = _causes(found)
+    causes = coarse + physical
+    predicted = found.model.predicted
     judged = held_out(w)
     size = np.bincount(w.block)[judged]
     # with discretisation among the causes, the scenario is what is mended
-    start = scenario if any(c.name == DISCRETISATION for c in causes) else refined
+    start = scenario if coarse else found.plain.predicted
     first, last = block_loss(w, start)[judged], block_loss(w, predicted)[judged]
     gain = _interval(first - size, last - size, rng)
     left = float(last.sum() / size.sum())
-    physical = [c for c in causes if c.name != DISCRETISATION]
     if not causes:
         verdict = "unexplained" if left > _LEFT else "nothing"
-    elif rival:
+    elif found.rival is not None:
         verdict = "ambiguous"
     elif physical and left > _LEFT and gain[0] < _EXPLAINED:
         verdict = "unexplained"
@@ -348,14 +200,13 @@ def _concluded(
     def sizes(residual: FloatArray) -> tuple[float, float]:
         return _rms(residual, entries & ~w.is_force), _rms(residual, entries & w.is_force, 1)
 
-    ranked = sorted(scores.values(), key=lambda s: -(s.fitted or s.screened))
     return Explanation(
         verdict,
         causes,
-        ranked,
+        _scores(found),
         {
             "scenario": float(block_loss(w, scenario)[judged].sum() / size.sum()),
-            "refined": float(block_loss(w, refined)[judged].sum() / size.sum()),
+            "refined": float(block_loss(w, found.plain.predicted)[judged].sum() / size.sum()),
             "extended": left,
         },
         gain,

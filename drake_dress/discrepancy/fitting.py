@@ -7,10 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
 
 from drake_dress.discrepancy.candidates import bounded, shifted
-from drake_dress.discrepancy.experiment import Experiment, Level
+from drake_dress.discrepancy.experiment import Experiment, Level, level_of
+from drake_dress.discrepancy.regression import (
+    Extrapolation,
+    Solution,
+    misleading,
+    solve_pooled,
+)
 from drake_dress.discrepancy.whitening import NUMERICS_SHARE, Whitening
 from drake_dress.models.effects.effect import Effect, Parameter
 
@@ -19,8 +24,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 # Step of derivatives and largest step of an iteration, in sizes that matter.
 _DIFFERENCE, _TRUST = 0.25, 4.0
-_RIDGE = 1e-6
-_ANY = 1e6
 
 
 @dataclass(frozen=True)
@@ -31,39 +34,24 @@ class Fit:
         effects: with parameters from all the data.
         std: of each parameter, by effect's name and parameter: of what is random, robust to what
             the blocks share, and of what the numerics leave open.
-        predicted: (N,) whitened, with parameters from the training blocks.
-        predicted_all: (N,) with those of `effects`.
-        count: of parameters.
+        told: (N,) whitened, what the simulation is taken to say with `effects`.
+        change: (N,) of that with parameters from the training blocks alone.
     """
 
     effects: tuple[Effect, ...]
     std: dict[str, dict[str, float]]
-    predicted: FloatArray
-    predicted_all: FloatArray
-    count: int
-
-
-def solve_bounded(
-    columns: FloatArray, residual: FloatArray, low: FloatArray | float, high: FloatArray | float
-) -> FloatArray:
-    """Returns x (k,) with least ‖columns x − residual‖ between the bounds; columns (N,k)."""
-    normal = columns.T @ columns
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-    normal = normal / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
-    factor = np.linalg.cholesky(normal)
-    right = np.linalg.solve(factor, columns.T @ residual / scale)
-    low, high = low * scale, np.maximum(high * scale, low * scale + 1e-12)
-    found: FloatArray = lsq_linear(factor.T, right, (low, high)).x / scale
-    return found
+    told: FloatArray
+    change: FloatArray
 
 
 def fit_all(
     experiment: Experiment,
     whitening: Whitening,
+    extrapolation: Extrapolation,
     reference: FloatArray,
     start: Sequence[Sequence[Effect]],
     training: BoolArray,
-    level: Level = "screening",
+    level: Level | None = None,
     about: Sequence[Effect] = (),
     iterations: int = 3,
     progress: Callable[[], None] | None = None,
@@ -73,30 +61,33 @@ def fit_all(
     Args:
         experiment: with its recordings.
         whitening: of them.
+        extrapolation: of the refined simulation.
         reference: (N,) whitened, what the refined simulation says with the effects `about`.
         start: sets of effects with parameters to start from.
         training: (N,) entries that are fitted; the others are held out.
-        level: at which simulations are run.
+        level: at which simulations are run; by default the coarsest that tells the effects.
         about: effects that `reference` holds.
         iterations: of Gauss–Newton.
         progress: called after each replay.
     """
-    problems = [_Problem(list(effects)) for effects in start]
-    base = whitening.vector(experiment.tell([(level, tuple(about))], progress)[0])
+    problems = [_Problem(list(effects), level or level_of(*effects)) for effects in start]
+    told = experiment.tell([(p.level, tuple(about)) for p in problems], progress)
+    base = [whitening.vector(t) for t in told]
     for _ in range(iterations):
         jobs: list[tuple[Level, Sequence[Effect]]] = []
         for p in problems:
-            jobs.append((level, tuple(p.effects)))
-            jobs += [(level, tuple(p.moved(i))) for i in range(len(p.free))]
-        told = iter(experiment.tell(jobs, progress))
-        for p in problems:
-            here = whitening.vector(next(told))
-            columns = [whitening.vector(next(told)) - here for _ in p.free]
+            jobs.append((p.level, tuple(p.effects)))
+            jobs += [(p.level, tuple(p.moved(i))) for i in range(len(p.free))]
+        vectors = iter([whitening.vector(t) for t in experiment.tell(jobs, progress)])
+        for p, zero in zip(problems, base, strict=True):
+            here = next(vectors)
+            columns = [next(vectors) - here for _ in p.free]
             p.improve(
-                reference + here - base,
+                reference + here - zero,
                 np.stack(columns, axis=1),
-                reference - base,
+                reference - zero,
                 whitening,
+                extrapolation,
                 training,
             )
     return [p.fit() for p in problems]
@@ -105,8 +96,8 @@ def fit_all(
 class _Problem:
     """One set of effects on its way to the best parameters; lengths in sizes that matter."""
 
-    def __init__(self, effects: list[Effect]) -> None:
-        self.effects = effects
+    def __init__(self, effects: list[Effect], level: Level) -> None:
+        self.effects, self.level = effects, level
         self.free: list[tuple[int, Parameter]] = [
             (k, p) for k, e in enumerate(effects) for p in e.parameters()
         ]
@@ -131,6 +122,7 @@ class _Problem:
         change: FloatArray,
         numerics: FloatArray,
         whitening: Whitening,
+        extrapolation: Extrapolation,
         training: BoolArray,
     ) -> None:
         """Takes one step from what is predicted (N,) and its changes (N,k) by `moved`.
@@ -143,17 +135,27 @@ class _Problem:
             [getattr(self.moved(i)[k], p.name) - now[i] for i, (k, p) in enumerate(self.free)]
         )
         columns = change * (self._size / step)
-        residual = whitening.data - predicted
         low = np.maximum((self._low - now) / self._size, -_TRUST)
         high = np.minimum((self._high - now) / self._size, _TRUST)
-        trained = solve_bounded(columns[training], residual[training], low, high)
-        best = solve_bounded(columns, residual, low, high)
-        self._predicted = predicted + columns @ trained
-        self._predicted_all = predicted + columns @ best
-        drawn = _robust_std(columns, residual - columns @ best, whitening.block)
-        biased = NUMERICS_SHARE * np.abs(solve_bounded(columns, numerics, -_ANY, _ANY))
-        self._std = self._size * np.hypot(drawn, biased)
-        values = now + best * self._size
+        every = np.ones_like(training)
+        residual = whitening.data - predicted
+
+        def solved(rows: BoolArray) -> tuple[Solution, FloatArray, FloatArray]:
+            reduced, left = (extrapolation.without(v, rows) for v in (columns, residual))
+            found = solve_pooled(
+                columns[rows], reduced[rows], left[rows], whitening.voice[rows], low, high
+            )
+            return found, reduced, left
+
+        trained = solved(training)[0].x
+        best, reduced, left = solved(every)
+        self._told = predicted + columns @ best.x
+        self._change = columns @ (trained - best.x)
+        drawn = _robust_std(reduced, left - reduced @ best.x, whitening.block)
+        finer = extrapolation.without(numerics, every)
+        biased = NUMERICS_SHARE * misleading(columns, reduced, finer, whitening.voice)
+        self._std = self._size * np.hypot(np.maximum(drawn, best.std), biased)
+        values = now + best.x * self._size
         for k, effect in enumerate(self.effects):
             mine = {p.name: v for (j, p), v in zip(self.free, values, strict=True) if j == k}
             self.effects[k] = bounded(type(effect), mine)
@@ -163,7 +165,7 @@ class _Problem:
         std: dict[str, dict[str, float]] = {}
         for (k, p), s in zip(self.free, self._std, strict=True):
             std.setdefault(self.effects[k].NAME, {})[p.name] = float(s)
-        return Fit(tuple(self.effects), std, self._predicted, self._predicted_all, len(self.free))
+        return Fit(tuple(self.effects), std, self._told, self._change)
 
 
 def _robust_std(

@@ -60,6 +60,11 @@ class Whitening:
     sensor: FloatArray
     filters: tuple[NoiseFilter, ...]
 
+    @property
+    def voice(self) -> npt.NDArray[np.int64]:
+        """(N,) number of the recording and the kind of signal that an entry is of."""
+        return 2 * self.recording + self.is_force
+
     def vector(self, told: Sequence[Told]) -> FloatArray:
         """Returns (N,) what simulations say of the recordings, whitened."""
         return np.concatenate(

@@ -10,7 +10,6 @@ from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.candidates import candidates
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import explain
-from drake_dress.discrepancy.fitting import solve_bounded
 from drake_dress.discrepancy.lab import Numerics
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml
@@ -75,17 +74,6 @@ def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
 def test_effects_that_need_contact_are_not_blamed_where_there_is_none(found):
     scored = {s.name: s.screened for s in found.scores}
     assert "friction" not in scored and "surface_density" in scored
-
-
-def test_bounded_least_squares_keeps_its_bounds():
-    rng = np.random.default_rng(0)
-    columns = rng.standard_normal((200, 3))
-    truth = np.array([1.0, -2.0, 0.5])
-    residual = columns @ truth
-    free = solve_bounded(columns, residual, np.full(3, -np.inf), np.full(3, np.inf))
-    np.testing.assert_allclose(free, truth, rtol=1e-4)
-    bound = solve_bounded(columns, residual, np.zeros(3), np.full(3, 0.8))
-    assert np.all((bound >= -1e-9) & (bound <= 0.8 + 1e-9)) and bound[1] == pytest.approx(0.0)
 
 
 def test_effects_that_are_on_already_are_not_tried():

@@ -16,7 +16,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.contact.detection import find_proximity, nothing_near, out_of_reach
+from drake_dress.models.cloth.contact.detection import cannot_land, find_proximity, nothing_near
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
@@ -50,8 +50,6 @@ _LANDING_SLIP_SPEED = 5e-3
 _REFACTOR_AFTER = 40
 # Gap within which a node may land during a step, m.
 _NEAR = 0.05
-# A garment farther than this from everybody cannot land during a step, m.
-_REACH = 0.15
 # The passes before the last only find the modes: their tolerance is this much coarser.
 _COARSER = 6.0
 # Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
@@ -198,7 +196,7 @@ class ImplicitCloth:
             force += influences.force
         rhs = self.mass[:, None] * v + h * force
 
-        if out_of_reach(x, obstacles, _REACH):
+        if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
         else:
             near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)

@@ -30,7 +30,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.contact.detection import depth_of_elements, fastest, out_of_reach
+from drake_dress.models.cloth.contact.detection import cannot_land, depth_of_elements
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
@@ -53,9 +53,6 @@ _WINDOW = 5
 # Decrease that a line search asks for, as a share of what the slope promises.
 _ARMIJO = 1e-4
 _MOST_HALVINGS = 12
-# A garment farther from everybody than `_REACH`, m, and so many times its way in a step, with what
-# it falls, m/s², cannot land.
-_REACH, _HASTE, _FALL = 0.05, 2.0, 9.81
 # E is known to about this share of its parts: a rise within it is rounding.
 _ROUNDING = 1e-14
 
@@ -180,8 +177,7 @@ class ProjectiveDynamicsCloth:
         h, n = self.time_step, len(state.x)
         if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):
             explain_not_finite(state.x, state.v, held_velocity, self.held)
-        speed = fastest(obstacles) + max(_largest(state.v), _largest(held_velocity))
-        if out_of_reach(state.x, obstacles, _REACH + _HASTE * h * (speed + _FALL * h)):
+        if cannot_land(state.x, state.v, held_velocity, obstacles, h):
             obstacles = Obstacles.none()
         material = self.material
         mu, adhesion = influences.contact_law(material.friction, n)
@@ -208,11 +204,11 @@ class ProjectiveDynamicsCloth:
         fall[self.held] = steady[self.held] = state.x[self.held] + h * held_velocity
         # a falling garment falls on, a hanging one goes on as before
         falls = equations.energy(fall) < equations.energy(steady)
-        guess = fall if falls else steady
+        start = fall if falls else steady
         if self._predictor is not None:
             ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences, guess)
-            guess = steady = ahead.x
-        x = contact.place(guess, steady)
+            start = steady = ahead.x
+        x = contact.place(start, steady)
         history = self._history
         if history is not None:
             history.clear()

@@ -30,6 +30,9 @@ CLOSE, FEW = 3e-4, 20
 ENTERED, ATTEMPTS = 1e-6, 3
 # A way this short passes by no body unseen, m.
 SHORT_WAY = 0.005
+# A garment farther from everybody than `_REACH`, m, and so many times its way in a step, with what
+# it falls, m/s², cannot land.
+_REACH, _HASTE, _FALL = 0.15, 2.0, 9.81
 # Gap of nodes that nothing is near to, m.
 _FAR_GAP = 1e6
 # Farthest a node in contact is from the origin of a body, m.
@@ -63,6 +66,22 @@ def out_of_reach(x: FloatArray, obstacles: Obstacles, distance: float) -> bool:
         return False
     o, plane = obstacles, obstacles.half_spaces
     return bool(_out_of_reach(x, o.a, o.b, o.radius, plane.point, plane.normal, distance))
+
+
+def cannot_land(
+    x: FloatArray, v: FloatArray, held_velocity: FloatArray, obstacles: Obstacles, time_step: float
+) -> bool:
+    """Returns whether nobody is so near that a garment may touch them within a time step.
+
+    Args:
+        x: (n,3) of the nodes, m.
+        v: (n,3) of them, m/s.
+        held_velocity: (k,3) of the held nodes, m/s.
+        obstacles: with velocities.
+        time_step: s.
+    """
+    speed = fastest(obstacles) + max(_largest(v), _largest(held_velocity)) + _FALL * time_step
+    return out_of_reach(x, obstacles, _REACH + _HASTE * time_step * speed)
 
 
 def nothing_near(count: int) -> Proximity:
@@ -267,6 +286,15 @@ def _surface(
 def fastest(obstacles: Obstacles) -> float:
     """Returns a bound on the speed of surfaces near the garment, m/s."""
     return float(_fastest(*obstacles.twists()))
+
+
+@nb.njit(cache=True, nogil=True)
+def _largest(v):  # type: ignore[no-untyped-def]
+    """Returns the largest length of a row (n,3)."""
+    largest = 0.0
+    for i in range(v.shape[0]):
+        largest = max(largest, v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2)
+    return np.sqrt(largest)
 
 
 @nb.njit(cache=True, nogil=True)

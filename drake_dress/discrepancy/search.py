@@ -1,0 +1,304 @@
+"""The search for causes: rounds of screening, fitting and refining that each add one effect.
+
+The simulations of a fit are coarse, so the fits that come near the best are held against the
+refined simulation, and fitted again about what that says, until they stay where they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.attribution import (
+    Comparison,
+    Screened,
+    block_loss,
+    held_out,
+    probe,
+    screen,
+    shortlist,
+)
+from drake_dress.discrepancy.experiment import Experiment, Level, level_of
+from drake_dress.discrepancy.fitting import Fit, fit_all
+from drake_dress.models.effects.effect import Effect
+
+FloatArray = npt.NDArray[np.float64]
+
+# Least share of the held-out loss that a cause takes away; what numerics can feign stays below.
+LEAST_GAIN = 0.03
+# Two causes are not told apart where the first is the better one in less than this share of the
+# resamples of blocks.
+_SURE = 0.9
+# A second candidate is refined too where it takes away this share of what the best does, unless the
+# best is the better one in this share of the resamples.
+_NEAR, _CERTAIN = 0.3, 0.99
+# Refinements of a fit at most; it is settled where a step is within its uncertainty, or this share.
+_POLISHED, _STEADY = 3, 0.04
+_MOST_CAUSES = 3
+_RESAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class Model:
+    """The simulation with effects.
+
+    Attributes:
+        fit: of the effects; None without any.
+        reference: (N,) whitened, what the refined simulation says with them.
+        predicted: (N,) that by the training blocks alone: parameters, and what is left of the step.
+        settled: whether another fit would leave them where they are.
+    """
+
+    fit: Fit | None
+    reference: FloatArray
+    predicted: FloatArray
+    settled: bool = True
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """With their parameters."""
+        return () if self.fit is None else self.fit.effects
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect that was named.
+
+    Attributes:
+        name: of the effect.
+        gain: share of the held-out loss that it took away when it was found.
+        confidence: share of the resamples in which it is the best.
+    """
+
+    name: str
+    gain: float
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where the search ended.
+
+    Attributes:
+        plain: without effects; model: with all that was found.
+        named: in the order found.
+        rival: a model that explains nearly as much with another effect in the last one's place.
+        rival_named: that effect.
+        screened: all candidates at the start.
+        fitted: effect and gain of the candidates that were fitted in the first round, by name.
+    """
+
+    plain: Model
+    model: Model
+    named: tuple[Named, ...]
+    rival: Model | None
+    rival_named: Named | None
+    screened: list[Screened]
+    fitted: dict[str, tuple[Effect, float]]
+
+
+class Search:
+    """A search for what the refined simulation lacks.
+
+    Args:
+        experiment: open.
+        comparison: of its levels without effects.
+        rng: of the resampling.
+        stage: told what is being done.
+        progress: called after each replay.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        comparison: Comparison,
+        rng: np.random.Generator,
+        stage: Callable[[str], None],
+        progress: Callable[[], None] | None,
+    ) -> None:
+        self._experiment, self._rng = experiment, rng
+        self._stage, self._progress = stage, progress
+        self._comparison, self._whitening = comparison, comparison.whitening
+        self._judged = held_out(self._whitening)
+        self._training = ~self._judged[self._whitening.block]
+        refined = self._whitening.vector(comparison.told["refined"])
+        self._plain = self._model(None, refined)
+
+    def run(self) -> Found:
+        """Returns what was found."""
+        self._stage("screening effects")
+        columns = probe(self._experiment, self._comparison, self._progress)
+        first = screened = screen(self._comparison, columns, self._plain.reference)
+        model, named = self._plain, list[Named]()
+        fitted: dict[str, tuple[Effect, float]] = {}
+        while len(model.effects) < _MOST_CAUSES:
+            there = {e.NAME for e in model.effects}
+            chosen = [s for s in shortlist(screened) if s.candidate.name not in there]
+            if not chosen or chosen[0].gain < 0.5 * LEAST_GAIN:
+                break
+            self._stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
+            fits = self._fits(model, [(*model.effects, s.start) for s in chosen])
+            if model is self._plain:
+                fitted = {f.effects[-1].NAME: (f.effects[-1], self._gain(model, f)) for f in fits}
+            best, rest, confidence = self._best(model, fits)
+            gain = self._gain(model, best)
+            if gain < LEAST_GAIN:
+                break
+            news = [Named(best.effects[-1].NAME, gain, confidence)]
+            if rest is not None and confidence < _SURE:
+                other = Named(rest.effects[-1].NAME, self._gain(model, rest), 1.0 - confidence)
+                both = self._both(model, best, rest)
+                if both is None:
+                    return Found(self._plain, best, (*named, *news), rest, other, first, fitted)
+                news = [
+                    replace(news[0], confidence=self._confidence(rest, [both])),
+                    replace(other, confidence=self._confidence(best, [both])),
+                ]
+                best = both
+            model, named = self._lean(best, named + news)
+            screened = screen(self._comparison, columns, model.reference)
+        return Found(self._plain, model, tuple(named), None, None, first, fitted)
+
+    def _gain(self, before: Model, after: Model) -> float:
+        """Returns the share of the held-out loss of one model that another takes away."""
+        return 1.0 - self._loss(after) / self._loss(before)
+
+    def _loss(self, model: Model) -> float:
+        return float(self._blocks(model).sum())
+
+    def _blocks(self, model: Model) -> FloatArray:
+        """Returns the loss of each held-out block."""
+        return block_loss(self._whitening, model.predicted)[self._judged]
+
+    def _fits(self, about: Model, start: Sequence[Sequence[Effect]]) -> list[Model]:
+        """Returns fits of sets of effects, told from a model by coarse simulations."""
+        fits = fit_all(
+            self._experiment,
+            self._whitening,
+            self._comparison.extrapolation,
+            about.reference,
+            start,
+            self._training,
+            about=about.effects,
+            progress=self._progress,
+        )
+        return [self._model(f, f.told, settled=False) for f in fits]
+
+    def _model(self, fit: Fit | None, reference: FloatArray, settled: bool = True) -> Model:
+        """Returns the model whose refined simulation says `reference` (N,)."""
+        told = reference if fit is None else reference + fit.change
+        data = self._whitening.data
+        left = self._comparison.extrapolation.without(data - told, self._training)
+        return Model(fit, reference, data - left, settled)
+
+    def _best(self, before: Model, fits: Sequence[Model]) -> tuple[Model, Model | None, float]:
+        """Returns the best of fits, the one that comes near it if any, and how sure that is."""
+        ranked = sorted(fits, key=self._loss)[:2]
+        gains = [self._gain(before, f) for f in ranked]
+        if gains[0] < LEAST_GAIN:
+            return ranked[0], None, 0.0
+        confidence = self._confidence(before, ranked)
+        if confidence >= _CERTAIN or gains[-1] < _NEAR * gains[0]:
+            ranked = ranked[:1]
+        self._stage(f"refining {', '.join(f.effects[-1].NAME for f in ranked)}")
+        ranked = [self._refined(f) for f in ranked]
+        for _ in range(_POLISHED):
+            # who falls behind is not refined further
+            behind = confidence >= _CERTAIN
+            if all(f.settled or (k > 0 and behind) for k, f in enumerate(ranked)):
+                break
+            ranked = [
+                f if f.settled or (k > 0 and behind) else self._polished(f)
+                for k, f in enumerate(ranked)
+            ]
+            ranked.sort(key=self._loss)
+            confidence = self._confidence(before, ranked)
+        return ranked[0], ranked[1] if len(ranked) > 1 else None, confidence
+
+    def _settled(self, model: Model) -> Model:
+        """Returns a fit refined until it is settled."""
+        model = self._refined(model)
+        for _ in range(_POLISHED):
+            if model.settled:
+                break
+            model = self._polished(model)
+        return model
+
+    def _both(self, before: Model, one: Model, other: Model) -> Model | None:
+        """Returns the model with the last effects of both, if either adds to the other."""
+        effects = (*one.effects, other.effects[-1])
+        if len(effects) > _MOST_CAUSES:
+            return None
+        self._stage(f"fitting {' with '.join(e.NAME for e in effects[len(before.effects) :])}")
+        (both,) = self._fits(one, [effects])
+        if self._gain(one, both) < LEAST_GAIN:
+            return None
+        both = self._settled(both)
+        return both if self._gain(one, both) >= LEAST_GAIN else None
+
+    def _lean(self, model: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
+        """Returns the model without earlier effects that the later ones have made idle."""
+        named = list(named)
+        for name in [n.name for n in named[:-1]]:
+            rest = [e for e in model.effects if e.NAME != name]
+            self._stage(f"fitting {', '.join(e.NAME for e in rest)} alone")
+            (leaner,) = self._fits(self._plain, [rest])
+            # the refined simulation may better a fit, but not by so much
+            if self._gain(leaner, model) > 5.0 * LEAST_GAIN:
+                continue
+            leaner = self._settled(leaner)
+            if self._gain(leaner, model) < LEAST_GAIN:
+                model, named = leaner, [n for n in named if n.name != name]
+        if len(named) == 1:
+            named = [replace(named[0], gain=self._gain(self._plain, model))]
+        return model, named
+
+    def _refined(self, model: Model) -> Model:
+        """Returns a fit with what the refined simulation says in place of the coarse one."""
+        fit = model.fit
+        assert fit is not None
+        told = self._whitening.vector(
+            self._experiment.tell([("refined", fit.effects)], self._progress)[0]
+        )
+        return self._model(fit, told, settled=False)
+
+    def _polished(self, last: Model) -> Model:
+        """Returns a fit about what the refined simulation says at the last one.
+
+        Coarse contact feels friction more than fine contact does: by the slopes of the screening
+        level alone a coefficient of friction came out at half of what it was.
+        """
+        level: Level = "scenario" if level_of(*last.effects) == "screening" else "refined"
+        (better,) = fit_all(
+            self._experiment,
+            self._whitening,
+            self._comparison.extrapolation,
+            last.reference,
+            [last.effects],
+            self._training,
+            level=level,
+            about=last.effects,
+            iterations=1,
+            progress=self._progress,
+        )
+        moved = [
+            abs(getattr(new, p.name) - getattr(old, p.name))
+            <= max(better.std[new.NAME][p.name], _STEADY * abs(getattr(new, p.name)))
+            for old, new in zip(last.effects, better.effects, strict=True)
+            for p in new.parameters()
+        ]
+        if all(moved):
+            # so short a step is linear
+            return self._model(better, better.told)
+        return self._refined(self._model(better, better.told))
+
+    def _confidence(self, before: Model, after: Sequence[Model]) -> float:
+        """Returns the share of resamples of blocks in which the first is best, and is a gain."""
+        start, losses = self._blocks(before), [self._blocks(m) for m in after]
+        draws = self._rng.integers(len(start), size=(_RESAMPLES, len(start)))
+        totals = np.stack([a[draws].sum(axis=1) for a in losses])
+        wins = (totals.argmin(axis=0) == 0) & (totals[0] < start[draws].sum(axis=1))
+        return float(wins.mean())
