@@ -112,7 +112,9 @@ def _parser() -> argparse.ArgumentParser:
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
     hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
     hidden.add_argument(
-        "--motions", metavar="NAME,…", help="sway, lift, drag, shift, pull, drop; default: not drop"
+        "--motions",
+        metavar="NAME,…",
+        help="sway, lift, drag, shift, pull, drop, dress; default: all but shift and drop",
     )
     hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
     hidden.add_argument("--seed", type=int, default=0, metavar="N")

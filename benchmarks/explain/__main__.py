@@ -30,6 +30,7 @@ from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation, explain
+from drake_dress.discrepancy.results import write_json
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.effects.effect import Effect
@@ -101,9 +102,7 @@ def _run(case: Case, cache: Path, workers: int) -> dict[str, Any]:
         found = explain(experiment, case.seed)
     result = _result(case, hidden, found, time.perf_counter() - begin, workers)
     cache.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_json(path, result)
     return result
 
 

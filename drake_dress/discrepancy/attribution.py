@@ -1,7 +1,7 @@
 """Screens which effects may be what a simulation lacks.
 
-Half of the blocks of time train, the others judge. A candidate's gain is the share of the squared
-whitened residual on held-out blocks that it takes away, beyond what noise leaves (1 a sample).
+Every other block of time trains, the others judge, and the other way round. A candidate's gain is
+the share of the squared whitened residual that it takes away where it was judged.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str, int], None]
 
 # Fits that are tried after screening, and the least share of the best one's gain they must promise.
-_SHORTLIST, _PROMISING = 4, 0.4
+_SHORTLIST, _PROMISING = 4, 0.3
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,6 @@ def block_loss(whitening: Whitening, predicted: FloatArray) -> FloatArray:
     return loss
 
 
-def held_out(whitening: Whitening) -> npt.NDArray[np.bool_]:
-    """Returns (B,) which blocks judge: every other one."""
-    odd: npt.NDArray[np.bool_] = np.arange(int(whitening.block.max()) + 1) % 2 == 1
-    return odd
-
-
 def screen(
     comparison: Comparison,
     columns: Sequence[tuple[Candidate, FloatArray]],
@@ -76,7 +70,7 @@ def screen(
     """Returns all candidates by their linear gain over `predicted` (N,), best first."""
     w, free = comparison.whitening, comparison.extrapolation
     residual = w.data - predicted
-    folds = [w.block % 2 != k for k in (0, 1)]
+    folds = w.trained_on
     left = [free.without(residual, train) for train in folds]
     before = sum(float(r[~train] @ r[~train]) for r, train in zip(left, folds, strict=True))
     found = []

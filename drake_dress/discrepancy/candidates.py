@@ -96,8 +96,15 @@ def candidates(rest_position: FloatArray, on: Sequence[Effect] = ()) -> list[Can
                 mass = LocalMass(mass=0.05, x=x, y=y, z=z)
                 found.append(Candidate(name, (Probe(mass, "mass", 0.0),)))
             continue
+        (first, *more) = kind.parameters()
+        if name in NEED_CONTACT and not more and first.low < first.off:
+            # what sticks or slides does not answer to both signs alike
+            for size in (first.typical, -first.typical):
+                probe = Probe(kind(**{first.name: size}), first.name, 0.0)
+                found.append(Candidate(name, (probe,)))
+            continue
         probes = []
-        for p in kind.parameters():
+        for p in (first, *more):
             if name == "gripper_slip" and p.name == "threshold":
                 continue
             size = _PROBED_WIND if kind is Wind else p.typical

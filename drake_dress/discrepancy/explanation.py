@@ -8,7 +8,7 @@ most of what was held out; look for another in what is left, until nothing more 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from drake_dress.discrepancy.attribution import (
     best_of_each,
     block_loss,
     compare,
-    held_out,
 )
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.search import Found, Model, Named, Search
@@ -31,8 +30,12 @@ DISCRETISATION = "discretisation"
 # away at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
 # A residual is unexplained where so many times the noise's variance is left, and less than this
-# share of what exceeds noise has been explained.
-_LEFT, _EXPLAINED = 1.12, 0.7
+# share of what exceeds noise has been explained: contact leaves some, whatever is right.
+_LEFT, _EXPLAINED = 1.12, 0.3
+_MUCH, _MOST = 1.5, 0.85
+# A cause is believed in proportion to what exceeds noise and is explained, up to this share, unless
+# less than so many times the noise's variance is left.
+_WHOLE, _AT_NOISE = 0.85, 1.06
 _RESAMPLES = 1000
 
 
@@ -45,7 +48,7 @@ class Cause:
         effect: with its values; None for discretisation.
         std: of its parameters.
         gain: share of the held-out loss that it takes away.
-        confidence: that it is this one.
+        confidence: that it is this one, and that it is not something else that no effect is like.
     """
 
     name: str
@@ -80,12 +83,12 @@ class Explanation:
         verdict: nothing, named, ambiguous or unexplained.
         causes: in the order found.
         scores: of every effect tried, best first, in the first round.
-        loss: mean squared whitened residual on held-out blocks: scenario, refined, extended.
+        loss: mean squared whitened residual on blocks held out: scenario, refined, extended.
         gain: 1 − (after − 1) / (before − 1) of it, and its 90 % interval.
-        before, after: RMS of the residual on held-out blocks, m and N; noise likewise.
+        before, after: RMS of the residual on blocks held out, m and N; noise likewise.
         numerics: RMS difference of scenario and refined simulation, m.
         comparison: all levels without further effects.
-        predicted: (N,) whitened, with all causes, fitted on the training blocks.
+        predicted: (N,) whitened, with all causes, fitted on other blocks.
     """
 
     verdict: str
@@ -178,35 +181,34 @@ def _concluded(
 ) -> Explanation:
     w = comparison.whitening
     physical = _causes(found)
-    causes = coarse + physical
     predicted = found.model.predicted
-    judged = held_out(w)
-    size = np.bincount(w.block)[judged]
+    size = np.bincount(w.block)
     # with discretisation among the causes, the scenario is what is mended
     start = scenario if coarse else found.plain.predicted
-    first, last = block_loss(w, start)[judged], block_loss(w, predicted)[judged]
+    first, last = block_loss(w, start), block_loss(w, predicted)
     gain = _interval(first - size, last - size, rng)
     left = float(last.sum() / size.sum())
+    trust = 1.0 if left < _AT_NOISE else float(np.clip(gain[0] / _WHOLE, 0.0, 1.0))
+    causes = coarse + [replace(c, confidence=trust * c.confidence) for c in physical]
     if not causes:
         verdict = "unexplained" if left > _LEFT else "nothing"
     elif found.rival is not None:
         verdict = "ambiguous"
-    elif physical and left > _LEFT and gain[0] < _EXPLAINED:
+    elif physical and left > _LEFT and gain[0] < (_MOST if left > _MUCH else _EXPLAINED):
         verdict = "unexplained"
     else:
         verdict = "named"
-    entries = judged[w.block]
 
     def sizes(residual: FloatArray) -> tuple[float, float]:
-        return _rms(residual, entries & ~w.is_force), _rms(residual, entries & w.is_force, 1)
+        return _rms(residual, ~w.is_force), _rms(residual, w.is_force, 1)
 
     return Explanation(
         verdict,
         causes,
         _scores(found),
         {
-            "scenario": float(block_loss(w, scenario)[judged].sum() / size.sum()),
-            "refined": float(block_loss(w, found.plain.predicted)[judged].sum() / size.sum()),
+            "scenario": float(block_loss(w, scenario).sum() / size.sum()),
+            "refined": float(block_loss(w, found.plain.predicted).sum() / size.sum()),
             "extended": left,
         },
         gain,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,146 +26,176 @@ BoolArray = npt.NDArray[np.bool_]
 _DIFFERENCE, _TRUST = 0.25, 4.0
 
 
+# A step shorter than this, in sizes that matter, says nothing about slopes.
+_TELLING = 0.03
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What fits are made and judged by.
+
+    Attributes:
+        whitening: with the data.
+        extrapolation: of the refined simulation.
+        numerics: (N,) what refining the scenario's simulation has changed.
+    """
+
+    whitening: Whitening
+    extrapolation: Extrapolation
+    numerics: FloatArray
+
+
 @dataclass(frozen=True)
 class Fit:
-    """Effects fitted jointly.
+    """Effects fitted jointly; lengths of steps are in sizes that matter.
 
     Attributes:
         effects: with parameters from all the data.
         std: of each parameter, by effect's name and parameter: of what is random, robust to what
             the blocks share, and of what the numerics leave open.
         told: (N,) whitened, what the simulation is taken to say with `effects`.
-        change: (N,) of that with parameters from the training blocks alone.
+        change: (N,) of that with parameters from the blocks of which an entry is none.
+        slopes: (N,k) of `told` by the parameters.
+        step: (k,) that led here.
     """
 
     effects: tuple[Effect, ...]
     std: dict[str, dict[str, float]]
     told: FloatArray
     change: FloatArray
+    slopes: FloatArray
+    step: FloatArray
 
 
 def fit_all(
     experiment: Experiment,
-    whitening: Whitening,
-    extrapolation: Extrapolation,
+    evidence: Evidence,
     reference: FloatArray,
     start: Sequence[Sequence[Effect]],
-    training: BoolArray,
-    level: Level | None = None,
     about: Sequence[Effect] = (),
     iterations: int = 3,
     progress: Callable[[], None] | None = None,
 ) -> list[Fit]:
     """Returns a fit for each set of effects in `start`; all run side by side.
 
+    Simulations are run at the coarsest level that tells the effects.
+
     Args:
         experiment: with its recordings.
-        whitening: of them.
-        extrapolation: of the refined simulation.
+        evidence: of them.
         reference: (N,) whitened, what the refined simulation says with the effects `about`.
         start: sets of effects with parameters to start from.
-        training: (N,) entries that are fitted; the others are held out.
-        level: at which simulations are run; by default the coarsest that tells the effects.
         about: effects that `reference` holds.
         iterations: of Gauss–Newton.
         progress: called after each replay.
     """
-    problems = [_Problem(list(effects), level or level_of(*effects)) for effects in start]
-    told = experiment.tell([(p.level, tuple(about)) for p in problems], progress)
-    base = [whitening.vector(t) for t in told]
+    w = evidence.whitening
+    sets = [tuple(effects) for effects in start]
+    levels = [level_of(*effects) for effects in sets]
+    told = experiment.tell([(level, tuple(about)) for level in levels], progress)
+    base = [w.vector(t) for t in told]
+    fits: list[Fit] = []
     for _ in range(iterations):
         jobs: list[tuple[Level, Sequence[Effect]]] = []
-        for p in problems:
-            jobs.append((p.level, tuple(p.effects)))
-            jobs += [(p.level, tuple(p.moved(i))) for i in range(len(p.free))]
-        vectors = iter([whitening.vector(t) for t in experiment.tell(jobs, progress)])
-        for p, zero in zip(problems, base, strict=True):
+        for level, effects in zip(levels, sets, strict=True):
+            jobs.append((level, effects))
+            jobs += [(level, moved) for moved, _ in _moved(effects)]
+        vectors = iter([w.vector(t) for t in experiment.tell(jobs, progress)])
+        fits = []
+        for effects, zero in zip(sets, base, strict=True):
             here = next(vectors)
-            columns = [next(vectors) - here for _ in p.free]
-            p.improve(
-                reference + here - zero,
-                np.stack(columns, axis=1),
-                reference - zero,
-                whitening,
-                extrapolation,
-                training,
+            slopes = [(next(vectors) - here) / step for _, step in _moved(effects)]
+            fits.append(
+                _stepped(evidence, effects, reference + here - zero, np.stack(slopes, axis=1))
             )
-    return [p.fit() for p in problems]
+        sets = [f.effects for f in fits]
+    return fits
 
 
-class _Problem:
-    """One set of effects on its way to the best parameters; lengths in sizes that matter."""
+def fit_again(evidence: Evidence, fit: Fit, told: FloatArray) -> Fit:
+    """Returns a fit one step on, from what a better simulation says, with the slopes known so far.
 
-    def __init__(self, effects: list[Effect], level: Level) -> None:
-        self.effects, self.level = effects, level
-        self.free: list[tuple[int, Parameter]] = [
-            (k, p) for k, e in enumerate(effects) for p in e.parameters()
-        ]
-        self._size = np.array([p.typical for _, p in self.free])
-        self._low = np.array([p.low for _, p in self.free])
-        self._high = np.array([p.high for _, p in self.free])
+    Args:
+        evidence: of the recordings.
+        fit: to go on from.
+        told: (N,) whitened, what that simulation says with the fit's effects.
+    """
+    return _stepped(evidence, fit.effects, told, fit.slopes)
 
-    @property
-    def _values(self) -> FloatArray:
-        return np.array([getattr(self.effects[k], p.name) for k, p in self.free])
 
-    def moved(self, index: int) -> list[Effect]:
-        """Returns the effects with one parameter a little further."""
-        k, p = self.free[index]
-        changed = list(self.effects)
-        changed[k] = shifted(self.effects[k], p.name, _DIFFERENCE * p.typical)
-        return changed
+def bettered(fit: Fit, change: FloatArray) -> Fit:
+    """Returns a fit with slopes that agree with what its step has changed (Broyden 1965).
 
-    def improve(
-        self,
-        predicted: FloatArray,
-        change: FloatArray,
-        numerics: FloatArray,
-        whitening: Whitening,
-        extrapolation: Extrapolation,
-        training: BoolArray,
-    ) -> None:
-        """Takes one step from what is predicted (N,) and its changes (N,k) by `moved`.
+    Args:
+        fit: after its step.
+        change: (N,) whitened, of what the better simulation says, by that step.
+    """
+    length2 = float(fit.step @ fit.step)
+    if length2 < _TELLING**2:
+        return fit
+    off = change - fit.slopes @ fit.step
+    return replace(fit, slopes=fit.slopes + np.outer(off, fit.step / length2))
 
-        What finer numerics change, `numerics` (N,), moves the parameters too: a share of that is
-        part of their uncertainty.
-        """
-        now = self._values
-        step = np.array(
-            [getattr(self.moved(i)[k], p.name) - now[i] for i, (k, p) in enumerate(self.free)]
-        )
-        columns = change * (self._size / step)
-        low = np.maximum((self._low - now) / self._size, -_TRUST)
-        high = np.minimum((self._high - now) / self._size, _TRUST)
-        every = np.ones_like(training)
-        residual = whitening.data - predicted
 
-        def solved(rows: BoolArray) -> tuple[Solution, FloatArray, FloatArray]:
-            reduced, left = (extrapolation.without(v, rows) for v in (columns, residual))
-            found = solve_pooled(
-                columns[rows], reduced[rows], left[rows], whitening.voice[rows], low, high
-            )
-            return found, reduced, left
+def _parameters(effects: Sequence[Effect]) -> list[tuple[int, Parameter]]:
+    """Returns the parameters of effects, each with its effect's number."""
+    return [(k, p) for k, e in enumerate(effects) for p in e.parameters()]
 
-        trained = solved(training)[0].x
-        best, reduced, left = solved(every)
-        self._told = predicted + columns @ best.x
-        self._change = columns @ (trained - best.x)
-        drawn = _robust_std(reduced, left - reduced @ best.x, whitening.block)
-        finer = extrapolation.without(numerics, every)
-        biased = NUMERICS_SHARE * misleading(columns, reduced, finer, whitening.voice)
-        self._std = self._size * np.hypot(np.maximum(drawn, best.std), biased)
-        values = now + best.x * self._size
-        for k, effect in enumerate(self.effects):
-            mine = {p.name: v for (j, p), v in zip(self.free, values, strict=True) if j == k}
-            self.effects[k] = bounded(type(effect), mine)
 
-    def fit(self) -> Fit:
-        """Returns what was found."""
-        std: dict[str, dict[str, float]] = {}
-        for (k, p), s in zip(self.free, self._std, strict=True):
-            std.setdefault(self.effects[k].NAME, {})[p.name] = float(s)
-        return Fit(tuple(self.effects), std, self._told, self._change)
+def _moved(effects: Sequence[Effect]) -> list[tuple[tuple[Effect, ...], float]]:
+    """Returns the effects with one parameter a little further, and by how much, for each."""
+    found = []
+    for k, p in _parameters(effects):
+        changed = list(effects)
+        changed[k] = shifted(effects[k], p.name, _DIFFERENCE * p.typical)
+        step = (getattr(changed[k], p.name) - getattr(effects[k], p.name)) / p.typical
+        found.append((tuple(changed), step))
+    return found
+
+
+def _stepped(
+    evidence: Evidence, effects: Sequence[Effect], told: FloatArray, slopes: FloatArray
+) -> Fit:
+    """Returns the fit one Gauss–Newton step on from effects with which (N,) is told.
+
+    What finer numerics change moves the parameters too: a share of that is part of their
+    uncertainty.
+    """
+    w, free = evidence.whitening, _parameters(effects)
+    now = np.array([getattr(effects[k], p.name) for k, p in free])
+    size = np.array([p.typical for _, p in free])
+    low = np.maximum((np.array([p.low for _, p in free]) - now) / size, -_TRUST)
+    high = np.minimum((np.array([p.high for _, p in free]) - now) / size, _TRUST)
+    residual = w.data - told
+
+    def solved(rows: BoolArray) -> tuple[Solution, FloatArray, FloatArray]:
+        reduced, left = (evidence.extrapolation.without(v, rows) for v in (slopes, residual))
+        found = solve_pooled(slopes[rows], reduced[rows], left[rows], w.voice[rows], low, high)
+        return found, reduced, left
+
+    every = np.ones(len(residual), dtype=np.bool_)
+    best, reduced, left = solved(every)
+    change = np.zeros_like(residual)
+    for rows in w.trained_on:
+        change[~rows] = slopes[~rows] @ (solved(rows)[0].x - best.x)
+    drawn = _robust_std(reduced, left - reduced @ best.x, w.block)
+    finer = evidence.extrapolation.without(evidence.numerics, every)
+    biased = NUMERICS_SHARE * misleading(slopes, reduced, finer, w.voice)
+    values = now + best.x * size
+    std: dict[str, dict[str, float]] = {}
+    for (k, p), s in zip(free, size * np.hypot(np.maximum(drawn, best.std), biased), strict=True):
+        std.setdefault(effects[k].NAME, {})[p.name] = float(s)
+    return Fit(
+        tuple(
+            bounded(type(e), {p.name: v for (j, p), v in zip(free, values, strict=True) if j == k})
+            for k, e in enumerate(effects)
+        ),
+        std,
+        told + slopes @ best.x,
+        change,
+        slopes,
+        best.x,
+    )
 
 
 def _robust_std(

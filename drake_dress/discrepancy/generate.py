@@ -18,12 +18,14 @@ import numpy.typing as npt
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.lab import Lab, Numerics
-from drake_dress.discrepancy.motions import MOTIONS, USUAL, Stage
+from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
+from drake_dress.models.cloth.elements import IntArray
 from drake_dress.models.effects.composition import seen_points
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.sampling import spread_out
+from drake_dress.models.human.body import ArmPose
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,6 +35,8 @@ _FINER, _SHORTER = 0.84, 0.5
 _FREE_DISTANCE, _ABOVE_SHOULDERS, _BEFORE_LIMB, _ABOVE_LIMB = 0.8, 0.05, 0.25, 0.24
 # Where along the arm it is drawn over, from shoulder (0) to hand (1).
 _ON_ARM = 0.55
+# Abduction of the arm that is held up: along a sleeve as it hangs, rad.
+_RAISED = np.deg2rad(135.0)
 
 
 @dataclass(frozen=True)
@@ -70,13 +74,41 @@ def stage(lab: Lab) -> Stage:
     along = (hand - shoulder) / np.linalg.norm(hand - shoulder)
     limb = shoulder + _ON_ARM * (hand - shoulder)
     middle = 0.5 * (joints[0] + joints[3])
+    raised = raised_arm(lab).person([]).posed
+    up = (raised[2] - raised[1]) / np.linalg.norm(raised[2] - raised[1])
+    grippers = 0.5 * (rest[grasp["left"]].mean(axis=0) + rest[grasp["right"]].mean(axis=0))
     return Stage(
         free=middle + np.array([-_FREE_DISTANCE, 0.0, _ABOVE_SHOULDERS]),
         before=limb + np.array([_BEFORE_LIMB, 0.0, _ABOVE_LIMB]),
         along=along,
         across=np.array([-1.0, 0.0, 0.0]),
         spread=rest[grasp["left"]].mean(axis=0) - rest[grasp["right"]].mean(axis=0),
+        hand=raised[2],
+        up=up,
+        # the garment comes from outside, so it is the other side's
+        cuff=rest[lab.garment.loops["right_cuff"]].mean(axis=0) - grippers,
     )
+
+
+def raised_arm(lab: Lab) -> Lab:
+    """Returns the lab whose person holds the left arm up sideways."""
+    return replace(lab, arms={**lab.arms, "left": ArmPose(abduction=_RAISED)})
+
+
+def unseen(lab: Lab, motion: str, path: FloatArray, time: FloatArray, nodes: IntArray) -> Recording:
+    """Returns a recording of a motion in which no marker was seen.
+
+    Args:
+        lab: with the garment and the person.
+        motion: of `MOTIONS`.
+        path: (T,2,3) of the grippers, m.
+        time: (T,) s.
+        nodes: that carry markers.
+    """
+    posed = (raised_arm(lab) if motion in ARM_UP else lab).person([]).posed
+    joints = seen_points(np.tile(posed, (len(time), 1, 1)), lab.effects)
+    blank = np.full((len(time), len(nodes), 3), np.nan)
+    return Recording(motion, time, path, blank, lab.garment.rest_position[nodes], None, joints)
 
 
 def record(
@@ -95,10 +127,7 @@ def record(
     path = MOTIONS[motion](stage(lab), duration, rng)
     rest = lab.garment.rest_position
     nodes = spread_out(rest, sensors.markers, int(rng.integers(len(rest))))
-    posed = lab.person([]).posed
-    joints = seen_points(np.tile(posed, (len(time), 1, 1)), lab.effects)
-    unseen = np.full((len(time), len(nodes), 3), np.nan)
-    blank = Recording(motion, time, path(time), unseen, rest[nodes], None, joints)
+    blank = unseen(lab, motion, path(time), time, nodes.astype(np.int32))
     told = Replayer(lab, blank).run(gain=0.0)
     return replace(
         blank,

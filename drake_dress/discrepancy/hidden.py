@@ -132,7 +132,7 @@ SIZES: Mapping[str, Draw] = {
     "friction": _one("added", 0.2, 0.29, both=True),
     "velocity_dependent_friction": _one("rate", 2.0, 4.0),
     "anisotropic_friction": _one("contrast", 0.6, 0.9, both=True),
-    "adhesion": _one("strength", 40.0, 80.0),
+    "adhesion": _one("strength", 60.0, 120.0),
     "limb_radius": _one("added", 0.01, 0.02, both=True),
     "limb_compliance": _one("compliance", 0.02, 0.04),
     "gripper_latency": _one("delay", 0.04, 0.08),

@@ -29,6 +29,8 @@ class Stage:
         along: (3,) unit, along that limb.
         across: (3,) unit, horizontal, from `before` to the limb.
         spread: (3,) from the right gripper to the left one, as the garment hangs without tension.
+        hand: (3,) of the arm held up; up: (3,) unit, along that forearm to the hand.
+        cuff: (3,) from the middle of the grippers to the cuff that the arm enters.
     """
 
     free: FloatArray
@@ -36,6 +38,9 @@ class Stage:
     along: FloatArray
     across: FloatArray
     spread: FloatArray
+    hand: FloatArray
+    up: FloatArray
+    cuff: FloatArray
 
 
 def ease(t: FloatArray, start: float, end: float) -> FloatArray:
@@ -128,6 +133,23 @@ def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
     return path
 
 
+def dress(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
+    """Returns a sleeve drawn over an arm held up, from its cuff, pulled taut and rubbed on it."""
+    depth, rub = rng.uniform(0.18, 0.21), rng.uniform(0.045, 0.055)
+    aside, taut = rng.uniform(-0.008, 0.008, 3), rng.uniform(0.03, 0.04)
+    above = np.array([0.0, 0.0, 1.0]) - stage.up[2] * stage.up
+    above /= np.linalg.norm(above)
+
+    def path(t: FloatArray) -> FloatArray:
+        along = 0.1 - (0.1 + depth) * ease(t, _STILL, 1.6)
+        along += rub * (ease(t, 2.1, 2.6) - 2.0 * ease(t, 2.7, 3.3))
+        pull = taut * ease(t, 1.5, 2.1) * (1.0 - ease(t, 3.4, 3.8))
+        cuff = stage.hand + aside + along[:, None] * stage.up + pull[:, None] * above
+        return _both(cuff - stage.cuff, stage.spread)
+
+    return path
+
+
 MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
     "sway": sway,
     "lift": lift,
@@ -135,9 +157,12 @@ MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
     "shift": shift,
     "pull": pull,
     "drop": drop,
+    "dress": dress,
 }
+# During these the left arm is held up sideways.
+ARM_UP = ("dress",)
 # What a lab records unless told otherwise.
-USUAL = ("sway", "lift", "drag", "shift", "pull")
+USUAL = ("sway", "lift", "drag", "pull", "dress")
 
 
 def _both(middle: FloatArray, spread: FloatArray) -> FloatArray:

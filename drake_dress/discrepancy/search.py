@@ -16,28 +16,31 @@ from drake_dress.discrepancy.attribution import (
     Comparison,
     Screened,
     block_loss,
-    held_out,
     probe,
     screen,
     shortlist,
 )
-from drake_dress.discrepancy.experiment import Experiment, Level, level_of
-from drake_dress.discrepancy.fitting import Fit, fit_all
+from drake_dress.discrepancy.experiment import Experiment
+from drake_dress.discrepancy.fitting import Evidence, Fit, bettered, fit_again, fit_all
 from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
 
-# Least share of the held-out loss that a cause takes away; what numerics can feign stays below.
-LEAST_GAIN = 0.03
+# Least share of the held-out loss that a cause takes away, and a further one of what is left then:
+# what numerics feign stays below; and the share of resamples of blocks in which it is a gain.
+LEAST_GAIN, _FURTHER, _SURELY = 0.012, 0.025, 0.9
 # Two causes are not told apart where the first is the better one in less than this share of the
 # resamples of blocks.
 _SURE = 0.9
 # A second candidate is refined too where it takes away this share of what the best does, unless the
 # best is the better one in this share of the resamples.
 _NEAR, _CERTAIN = 0.3, 0.99
-# Refinements of a fit at most; it is settled where a step is within its uncertainty, or this share.
-_POLISHED, _STEADY = 3, 0.04
+# Refinements of a fit at most; it is settled where a step is within these shares of its uncertainty
+# or of itself.
+_POLISHED, _WITHIN, _STEADY = 5, 0.35, 0.03
 _MOST_CAUSES = 3
+# Gauss–Newton steps of fits by coarse simulations: of a first effect, and of one beside others.
+_STEPS, _FURTHER_STEPS = 3, 2
 _RESAMPLES = 1000
 
 
@@ -48,7 +51,8 @@ class Model:
     Attributes:
         fit: of the effects; None without any.
         reference: (N,) whitened, what the refined simulation says with them.
-        predicted: (N,) that by the training blocks alone: parameters, and what is left of the step.
+        predicted: (N,) that with parameters, and what is left of the step, as found by the blocks
+            of which an entry is none.
         settled: whether another fit would leave them where they are.
     """
 
@@ -122,9 +126,10 @@ class Search:
         self._experiment, self._rng = experiment, rng
         self._stage, self._progress = stage, progress
         self._comparison, self._whitening = comparison, comparison.whitening
-        self._judged = held_out(self._whitening)
-        self._training = ~self._judged[self._whitening.block]
-        refined = self._whitening.vector(comparison.told["refined"])
+        refined, scenario = (
+            self._whitening.vector(comparison.told[level]) for level in ("refined", "scenario")
+        )
+        self._evidence = Evidence(self._whitening, comparison.extrapolation, refined - scenario)
         self._plain = self._model(None, refined)
 
     def run(self) -> Found:
@@ -137,7 +142,8 @@ class Search:
         while len(model.effects) < _MOST_CAUSES:
             there = {e.NAME for e in model.effects}
             chosen = [s for s in shortlist(screened) if s.candidate.name not in there]
-            if not chosen or chosen[0].gain < 0.5 * LEAST_GAIN:
+            least = LEAST_GAIN if model is self._plain else _FURTHER
+            if not chosen or chosen[0].gain < 0.5 * least:
                 break
             self._stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
             fits = self._fits(model, [(*model.effects, s.start) for s in chosen])
@@ -145,7 +151,7 @@ class Search:
                 fitted = {f.effects[-1].NAME: (f.effects[-1], self._gain(model, f)) for f in fits}
             best, rest, confidence = self._best(model, fits)
             gain = self._gain(model, best)
-            if gain < LEAST_GAIN:
+            if gain < least or self._confidence(model, [best]) < _SURELY:
                 break
             news = [Named(best.effects[-1].NAME, gain, confidence)]
             if rest is not None and confidence < _SURE:
@@ -170,19 +176,18 @@ class Search:
         return float(self._blocks(model).sum())
 
     def _blocks(self, model: Model) -> FloatArray:
-        """Returns the loss of each held-out block."""
-        return block_loss(self._whitening, model.predicted)[self._judged]
+        """Returns the loss of each block by what the others have taught."""
+        return block_loss(self._whitening, model.predicted)
 
     def _fits(self, about: Model, start: Sequence[Sequence[Effect]]) -> list[Model]:
         """Returns fits of sets of effects, told from a model by coarse simulations."""
         fits = fit_all(
             self._experiment,
-            self._whitening,
-            self._comparison.extrapolation,
+            self._evidence,
             about.reference,
             start,
-            self._training,
-            about=about.effects,
+            about.effects,
+            iterations=_STEPS if about is self._plain else _FURTHER_STEPS,
             progress=self._progress,
         )
         return [self._model(f, f.told, settled=False) for f in fits]
@@ -190,9 +195,11 @@ class Search:
     def _model(self, fit: Fit | None, reference: FloatArray, settled: bool = True) -> Model:
         """Returns the model whose refined simulation says `reference` (N,)."""
         told = reference if fit is None else reference + fit.change
-        data = self._whitening.data
-        left = self._comparison.extrapolation.without(data - told, self._training)
-        return Model(fit, reference, data - left, settled)
+        predicted = self._whitening.data.copy()
+        for rows in self._whitening.trained_on:
+            left = self._comparison.extrapolation.without(self._whitening.data - told, rows)
+            predicted[~rows] -= left[~rows]
+        return Model(fit, reference, predicted, settled)
 
     def _best(self, before: Model, fits: Sequence[Model]) -> tuple[Model, Model | None, float]:
         """Returns the best of fits, the one that comes near it if any, and how sure that is."""
@@ -234,10 +241,10 @@ class Search:
             return None
         self._stage(f"fitting {' with '.join(e.NAME for e in effects[len(before.effects) :])}")
         (both,) = self._fits(one, [effects])
-        if self._gain(one, both) < LEAST_GAIN:
+        if self._gain(one, both) < _FURTHER:
             return None
         both = self._settled(both)
-        return both if self._gain(one, both) >= LEAST_GAIN else None
+        return both if self._gain(one, both) >= _FURTHER else None
 
     def _lean(self, model: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
         """Returns the model without earlier effects that the later ones have made idle."""
@@ -247,10 +254,10 @@ class Search:
             self._stage(f"fitting {', '.join(e.NAME for e in rest)} alone")
             (leaner,) = self._fits(self._plain, [rest])
             # the refined simulation may better a fit, but not by so much
-            if self._gain(leaner, model) > 5.0 * LEAST_GAIN:
+            if self._gain(leaner, model) > 5.0 * _FURTHER:
                 continue
             leaner = self._settled(leaner)
-            if self._gain(leaner, model) < LEAST_GAIN:
+            if self._gain(leaner, model) < _FURTHER:
                 model, named = leaner, [n for n in named if n.name != name]
         if len(named) == 1:
             named = [replace(named[0], gain=self._gain(self._plain, model))]
@@ -268,32 +275,23 @@ class Search:
     def _polished(self, last: Model) -> Model:
         """Returns a fit about what the refined simulation says at the last one.
 
+        The slopes, told by coarser simulations, become those of the refined one on the way.
         Coarse contact feels friction more than fine contact does: by the slopes of the screening
         level alone a coefficient of friction came out at half of what it was.
         """
-        level: Level = "scenario" if level_of(*last.effects) == "screening" else "refined"
-        (better,) = fit_all(
-            self._experiment,
-            self._whitening,
-            self._comparison.extrapolation,
-            last.reference,
-            [last.effects],
-            self._training,
-            level=level,
-            about=last.effects,
-            iterations=1,
-            progress=self._progress,
-        )
+        assert last.fit is not None
+        better = fit_again(self._evidence, last.fit, last.reference)
         moved = [
             abs(getattr(new, p.name) - getattr(old, p.name))
-            <= max(better.std[new.NAME][p.name], _STEADY * abs(getattr(new, p.name)))
+            <= max(_WITHIN * better.std[new.NAME][p.name], _STEADY * abs(getattr(new, p.name)))
             for old, new in zip(last.effects, better.effects, strict=True)
             for p in new.parameters()
         ]
         if all(moved):
             # so short a step is linear
             return self._model(better, better.told)
-        return self._refined(self._model(better, better.told))
+        refined = self._refined(self._model(better, better.told))
+        return replace(refined, fit=bettered(better, refined.reference - last.reference))
 
     def _confidence(self, before: Model, after: Sequence[Model]) -> float:
         """Returns the share of resamples of blocks in which the first is best, and is a gain."""

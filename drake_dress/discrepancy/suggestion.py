@@ -11,6 +11,7 @@ from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.experiment import levels
 from drake_dress.discrepancy.explanation import Explanation
 from drake_dress.discrepancy.generate import stage as stage_of
+from drake_dress.discrepancy.generate import unseen
 from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.motions import MOTIONS
 from drake_dress.discrepancy.recording import Recording
@@ -24,6 +25,7 @@ _WORDS = {
     "drag": "press the garment against the held-out arm and draw it up and down",
     "shift": "press the garment against the held-out arm and draw it along the arm",
     "drop": "let the garment down fast and catch it, in the open",
+    "dress": "draw a sleeve over the arm held up sideways, from its cuff",
     "pull": "draw the garment taut between the grippers",
 }
 
@@ -76,7 +78,5 @@ def suggest(
 def _blank(lab: Lab, motion: str) -> Recording:
     time = np.arange(round(_DURATION * _RATE) + 1) / _RATE
     path = MOTIONS[motion](stage_of(lab), _DURATION, np.random.default_rng(0))
-    rest = lab.garment.rest_position
-    nodes = np.linspace(0, len(rest) - 1, _MARKERS).astype(int)
-    unseen = np.full((len(time), _MARKERS, 3), np.nan)
-    return Recording(motion, time, path(time), unseen, rest[nodes])
+    nodes = np.linspace(0, len(lab.garment.rest_position) - 1, _MARKERS).astype(np.int32)
+    return unseen(lab, motion, path(time), time, nodes)

@@ -27,12 +27,12 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 # Share of the difference between scenario and refined replay that the refined one may still be off.
-NUMERICS_SHARE = 0.6
+NUMERICS_SHARE = 0.45
 # Memory τ of errors of numerics, s; time over which their size is averaged, s.
 MEMORY, _AVERAGED = 0.4, 0.3
 # One pair of simulations says little about a marker's error: so much comes from it, the rest from
 # all markers that touch, or do not touch, the person.
-_OWN = 0.3
+_OWN = 0.6
 # Length of a block that is judged as one, s.
 BLOCK = 0.5
 
@@ -64,6 +64,12 @@ class Whitening:
     def voice(self) -> npt.NDArray[np.int64]:
         """(N,) number of the recording and the kind of signal that an entry is of."""
         return 2 * self.recording + self.is_force
+
+    @property
+    def trained_on(self) -> tuple[BoolArray, BoolArray]:
+        """Two sets of entries (N,): who trains on one is judged on the other."""
+        odd: BoolArray = self.block % 2 == 1
+        return odd, ~odd
 
     def vector(self, told: Sequence[Told]) -> FloatArray:
         """Returns (N,) what simulations say of the recordings, whitened."""

@@ -79,7 +79,7 @@ class AnisotropicFriction(FrictionEffect):
     """
 
     NAME = "anisotropic_friction"
-    contrast: float = parameter("1", -1.0, 1.0, 0.5)
+    contrast: float = parameter("1", -1.0, 1.0, 0.75)
 
     def apply(self, friction: float, sliding: Sliding) -> FloatArray:
         """Returns what is added to μ, (c,)."""
@@ -105,7 +105,7 @@ class Adhesion(AdhesionEffect):
     """
 
     NAME = "adhesion"
-    strength: float = parameter("Pa", 0.0, 500.0, 30.0)
+    strength: float = parameter("Pa", 0.0, 500.0, 90.0)
 
     def apply(self, sheet: Sheet) -> FloatArray:
         """Returns (n,) N."""

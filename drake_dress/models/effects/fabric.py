@@ -71,7 +71,7 @@ class InternalDamping(MaterialEffect):
     """
 
     NAME = "internal_damping"
-    added: float = parameter("s", -0.1, 0.5, 0.01)
+    added: float = parameter("s", -0.1, 0.5, 0.02)
 
     def apply(self, material: Material) -> Material:
         """Returns the fabric; its damping is never negative."""
@@ -113,7 +113,7 @@ class AnisotropicStiffness(FibreEffect):
     """
 
     NAME = "anisotropic_stiffness"
-    warp: float = parameter("N/m", 0.0, 2e4, 400.0)
+    warp: float = parameter("N/m", 0.0, 2e4, 1000.0)
 
     def apply(self, sheet: Sheet) -> FloatArray:
         """Returns (F,) N/m."""

@@ -41,7 +41,7 @@ class LimbCompliance(MountEffect):
     """
 
     NAME = "limb_compliance"
-    compliance: float = parameter("m/N", 0.0, 0.2, 0.008)
+    compliance: float = parameter("m/N", 0.0, 0.2, 0.025)
 
     def apply(self, force: FloatArray) -> FloatArray:
         """Returns where the limb rests, (…,3) m, under forces (…,3), N."""
