@@ -48,7 +48,9 @@ class Case:
         return f"{self.group}-{self.hide}-{self.seed}-{self.size:g}-{self.marker_noise:g}"
 
 
-def cases(groups: Sequence[str], draws: dict[str, int], seed: int, size: float, noise: float):
+def cases(
+    groups: Sequence[str], draws: dict[str, int], seed: int, size: float, noise: float
+) -> list[Case]:
     """Returns the cases of the groups asked for, `draws` of each."""
     found: list[Case] = []
     forces = 50.0 * noise
@@ -70,6 +72,32 @@ def cases(groups: Sequence[str], draws: dict[str, int], seed: int, size: float, 
         if "outside" in groups and k < draws["outside"]:
             for name in OUTSIDE:
                 add("outside", name, k)
+    return found
+
+
+def study(
+    groups: Sequence[str],
+    draws: dict[str, int],
+    seed: int,
+    sizes: Sequence[float],
+    noises: Sequence[float],
+    beside: int,
+) -> list[Case]:
+    """Returns the cases of a study: all groups at the first size and noise, effects at the others.
+
+    Args:
+        groups: of them.
+        draws: of each group.
+        seed: of the first draw.
+        sizes: of effects, times what matters.
+        noises: of markers, m.
+        beside: draws of each effect at a further size or noise.
+    """
+    found = cases(groups, draws, seed, sizes[0], noises[0])
+    if "effect" in groups:
+        settings = [(sizes[0], n) for n in noises[1:]] + [(s, noises[0]) for s in sizes[1:]]
+        for size, noise in settings:
+            found += cases(["effect"], {"effect": beside}, seed, size, noise)
     return found
 
 

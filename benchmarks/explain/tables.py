@@ -1,0 +1,180 @@
+"""What a study has shown: how often the verdict was right, by how much parameters were off."""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from benchmarks.cloth.table import Table
+from drake_dress.discrepancy.explanation import DISCRETISATION
+
+ASKED = {"effect": 90, "nothing": 95, "pair": 75, "coarse": 90, "outside": 100}
+_CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
+# Confidence below which a kin of what was hidden may be named.
+_LOW = 0.7
+
+
+def right(result: dict[str, Any]) -> bool:
+    """Returns whether the verdict is what was hidden, all of it and nothing else.
+
+    What the list of effects lacks must be called unexplained, or named with low confidence.
+    """
+    named = {c["effect"] for c in result["causes"]}
+    wanted = set(result["hidden"])
+    if result["case"]["group"] == "coarse":
+        return result["verdict"] == "named" and named == {DISCRETISATION}
+    if result["case"]["group"] == "outside":
+        sure = any(c["confidence"] >= _LOW for c in result["causes"])
+        return result["verdict"] == "unexplained" or (result["verdict"] != "nothing" and not sure)
+    if not wanted:
+        return bool(result["verdict"] == "nothing")
+    return bool(result["verdict"] == "named" and named == wanted)
+
+
+def parameter_error(result: dict[str, Any]) -> float | None:
+    """Returns how far the parameters of a cause that was named right are off, relative.
+
+    Of vectors the length of the difference over the length; a place on the garment does not count.
+    """
+    if len(result["hidden"]) != 1 or not right(result):
+        return None
+    (name, true), found = next(iter(result["hidden"].items())), result["causes"][0]["values"]
+    keys = ["mass"] if name == "local_mass" else ["rate"] if name == "gripper_slip" else list(true)
+    a, b = np.array([true[k] for k in keys]), np.array([found[k] for k in keys])
+    return float(np.linalg.norm(b - a) / np.linalg.norm(a))
+
+
+def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
+    """Returns the tables of a study; the first result's noise and size are its centre."""
+    if not results:
+        return []
+    centre = _setting(results[0])
+    central = [r for r in results if _setting(r) == centre]
+    effects = [r for r in central if r["case"]["group"] == "effect"]
+    header = ["right", "ambiguous", "parameter error, %", "gain", "loss before"]
+    names = dict.fromkeys(r["case"]["hide"] for r in effects)
+    each = [[name, *_summary([r for r in effects if r["case"]["hide"] == name])] for name in names]
+    settings = sorted({_setting(r) for r in results if r["case"]["group"] == "effect"})
+    beside = []
+    for noise, size in settings:
+        mine = [
+            r for r in results if r["case"]["group"] == "effect" and _setting(r) == (noise, size)
+        ]
+        beside.append([f"{1e3 * noise:g}", size, *_summary(mine)])
+    return [
+        Table("Each effect", ["hidden", "draws", *header], each),
+        Table("All", *_groups(central)),
+        Table("By noise and size", ["noise, mm", "size", "draws", *header], beside),
+        Table(
+            "Confidence",
+            ["said", "causes", "right, %"],
+            [
+                [f"{100 * low:.0f} to {100 * high:.0f} %", len(hits), 100.0 * float(np.mean(hits))]
+                for low, high, hits in reliability(results)
+                if hits
+            ],
+        ),
+    ]
+
+
+def _setting(result: dict[str, Any]) -> tuple[float, float]:
+    return result["case"]["marker_noise"], result["case"]["size"]
+
+
+def _summary(results: Sequence[dict[str, Any]]) -> list[Any]:
+    """Returns draws, how many are right and ambiguous, and medians of error, gain and loss."""
+    errors = [e for r in results if (e := parameter_error(r)) is not None]
+    return [
+        len(results),
+        sum(map(right, results)),
+        sum(map(unsure, results)),
+        100.0 * float(np.median(errors)) if errors else None,
+        float(np.median([r["gain"][0] for r in results])),
+        float(np.median([r["loss"]["refined"] for r in results])),
+    ]
+
+
+def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+    """Returns header and rows of what was asked and reached in each group."""
+    rows: list[list[Any]] = []
+    for group, asked in ASKED.items():
+        mine = [r for r in results if r["case"]["group"] == group]
+        if not mine:
+            continue
+        errors = [e for r in mine if (e := parameter_error(r)) is not None]
+        gains = [r["gain"][0] for r in mine if r["hidden"]]
+        # cases side by side have one process each, and say nothing about time
+        times = [r["seconds"] for r in mine if r["workers"] > 1]
+        rows.append(
+            [
+                group,
+                len(mine),
+                100.0 * float(np.mean([right(r) for r in mine])),
+                asked,
+                100.0 * float(np.mean([unsure(r) for r in mine])),
+                100.0 * float(np.median(errors)) if errors else None,
+                float(np.median(gains)) if gains else None,
+                float(np.median(times)) if times else None,
+            ]
+        )
+    header = ["group", "draws", "right, %", "asked, %", "ambiguous, %"]
+    return [*header, "parameter error, %", "gain", "time, s"], rows
+
+
+def unsure(result: dict[str, Any]) -> bool:
+    """Returns whether the verdict is ambiguous with the right cause among two."""
+    named = {c["effect"] for c in result["causes"]}
+    return result["verdict"] == "ambiguous" and bool(named & set(result["hidden"]))
+
+
+def reliability(results: Sequence[dict[str, Any]]) -> list[tuple[float, float, list[bool]]]:
+    """Returns for ranges of confidence whether each cause that was given it is right."""
+    found = []
+    for low, high in itertools.pairwise(_CONFIDENCES):
+        hits = [
+            _hidden_there(r, c["effect"])
+            for r in results
+            for c in r["causes"]
+            if low <= c["confidence"] < high or (high == 1.0 and c["confidence"] == 1.0)
+        ]
+        found.append((low, high, hits))
+    return found
+
+
+def _hidden_there(result: dict[str, Any], name: str) -> bool:
+    return name in result["hidden"] or (
+        name == DISCRETISATION and result["case"]["group"] == "coarse"
+    )
+
+
+def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
+    """Returns an SVG: how often causes of a given confidence are right."""
+    figure = Figure(figsize=(4.5, 4.0), layout="constrained")
+    FigureCanvasSVG(figure)
+    ax = figure.subplots()
+    ax.plot([0.0, 1.0], [0.0, 1.0], color="#66727f", ls=":")
+    for low, high, hits in reliability(results):
+        if not hits:
+            continue
+        share, count = float(np.mean(hits)), len(hits)
+        # Wilson's interval, 90 %
+        z = 1.645
+        middle = (share + z * z / (2 * count)) / (1 + z * z / count)
+        spread = z / (1 + z * z / count)
+        spread *= np.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        at = 0.5 * (low + high)
+        ax.plot([at, at], [middle - spread, middle + spread], color="#0b7a5e")
+        ax.plot(at, share, "o", color="#0b7a5e")
+        ax.annotate(str(count), (at, share), (5, -10), textcoords="offset points", fontsize=8)
+    ax.set_xlabel("confidence given")
+    ax.set_ylabel("share that is right")
+    ax.spines[["top", "right"]].set_visible(False)
+    with io.StringIO() as text:
+        figure.savefig(text, format="svg")
+        return text.getvalue()

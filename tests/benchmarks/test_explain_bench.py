@@ -1,0 +1,97 @@
+"""The study of `drake-dress explain`: its cases and its tables, from results made up here."""
+
+import pytest
+
+from benchmarks.explain.__main__ import BEGIN, END, main, write_between
+from benchmarks.explain.cases import study
+from benchmarks.explain.tables import parameter_error, reliability, right, tables
+from drake_dress.discrepancy.hidden import SIZES
+from drake_dress.errors import UserError
+
+
+def result(group="effect", hide="friction", named=("friction",), verdict="named", **changes):
+    hidden = {} if hide == "nothing" else {n: {"added": 0.2} for n in hide.split("+")}
+    confidence = changes.pop("confidence", 0.95)
+    case = {"group": group, "hide": hide, "seed": 1, "size": 1.0, "marker_noise": 1e-3}
+    case.update({k: changes.pop(k) for k in ("size", "marker_noise") if k in changes})
+    return {
+        "case": case,
+        "hidden": hidden,
+        "verdict": verdict,
+        "causes": [
+            {"effect": n, "values": {"added": 0.21}, "confidence": confidence} for n in named
+        ],
+        "gain": [0.9, 0.8, 1.0],
+        "loss": {"refined": 1.5},
+        "seconds": 100.0,
+        "workers": 2,
+        **changes,
+    }
+
+
+def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it():
+    draws = {"effect": 2, "nothing": 3, "pair": 1, "coarse": 1, "outside": 1}
+    found = study(list(draws), draws, 7, [1.0, 2.0], [1e-3, 3e-3], 1)
+    assert len({c.name for c in found}) == len(found)
+    assert sum(c.hide == "nothing" and c.group == "nothing" for c in found) == 3
+    beside = [c for c in found if (c.size, c.marker_noise) != (1.0, 1e-3)]
+    assert len(beside) == 2 * len(SIZES)
+    assert {(c.size, c.marker_noise) for c in beside} == {(2.0, 1e-3), (1.0, 3e-3)}
+    assert all(c.force_noise == pytest.approx(50.0 * c.marker_noise) for c in found)
+
+
+def test_only_the_whole_truth_and_nothing_else_is_right():
+    assert right(result())
+    assert not right(result(named=("friction", "wind")))
+    assert not right(result(named=("adhesion",)))
+    assert not right(result(verdict="ambiguous", named=("friction", "adhesion")))
+    assert right(result(group="pair", hide="friction+wind", named=("wind", "friction")))
+    assert not right(result(group="pair", hide="friction+wind"))
+    assert right(result(group="nothing", hide="nothing", named=(), verdict="nothing"))
+    assert right(result(group="coarse", hide="nothing", named=("discretisation",)))
+
+
+def test_what_no_list_has_is_right_where_it_is_not_believed():
+    kin = {"group": "outside", "hide": "snag", "named": ("local_mass",)}
+    assert right(result(**kin, verdict="unexplained", confidence=1.0))
+    assert right(result(**kin, confidence=0.5))
+    assert not right(result(**kin, confidence=0.9))
+    assert not right(result(group="outside", hide="snag", named=(), verdict="nothing"))
+
+
+def test_tables_tell_centre_and_what_is_beside_it_apart():
+    found = [result(), result(named=("adhesion",)), result(marker_noise=3e-3, named=())]
+    by_title = {t.title: t for t in tables(found)}
+    assert by_title["Each effect"].rows[0][:3] == ["friction", 2, 1]
+    assert by_title["All"].rows[0][:3] == ["effect", 2, 50.0]
+    beside = by_title["By noise and size"].rows
+    assert [row[:4] for row in beside] == [["1", 1.0, 2, 1], ["3", 1.0, 1, 0]]
+    assert parameter_error(found[0]) == pytest.approx(0.05)
+    assert tables([]) == []
+
+
+def test_reliability_counts_causes_by_their_confidence():
+    found = [result(), result(named=("adhesion",)), result(confidence=0.2)]
+    by_range = {(low, high): hits for low, high, hits in reliability(found)}
+    assert by_range[0.95, 1.0] == [True, False]
+    assert by_range[0.0, 0.5] == [True]
+
+
+def test_tables_go_between_the_marks_of_a_file(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    write_between(path, "new")
+    write_between(path, "newer")
+    assert path.read_text() == f"before\n{BEGIN}\n\nnewer\n\n{END}\nafter\n"
+    path.write_text("no marks")
+    with pytest.raises(UserError, match="expected one"):
+        write_between(path, "new")
+    assert path.read_text() == "no marks"
+
+
+@pytest.mark.parametrize("words", [["--noise", "x"], ["--size", "0"], ["--only", "all"]])
+def test_bad_options_are_refused(words, capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(words)
+    assert exit_.value.code == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
