@@ -11,13 +11,15 @@ A file holds one recording, or several as groups `recording_0`, `recording_1`, â
 
 An HDF5 dataset's attribute `noise_std` is its noise; without it the noise is estimated. A CSV has
 columns such as `gripper/left/position/x` and `garment/marker_position/12/z`, empty where a marker
-was not seen, and a file `NAME.markers.csv` beside it with the columns marker, x, y, z.
+was not seen, and a file `NAME.markers.csv` beside it with the columns marker, x, y, z. A group's
+attribute `motion`, one word, is what its recording is called.
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +53,7 @@ def read_recordings(paths: Sequence[str | Path], mesh: GarmentMesh) -> list[Reco
     Raises:
         UserError: a file cannot be used; says where and why.
     """
-    recordings = []
+    recordings: list[Recording] = []
     for path in paths:
         path = Path(path)
         if not path.is_file():
@@ -65,8 +67,11 @@ def read_recordings(paths: Sequence[str | Path], mesh: GarmentMesh) -> list[Reco
             found = _read_csv(path)
         else:
             raise UserError(str(path), "", f"is of unknown kind {kind!r}, expected {_FORMATS}")
-        for name, arrays, noise in found:
-            recordings.append(_recording(str(path), name, arrays, noise, mesh))
+        for name, title, arrays, noise in found:
+            r = _recording(str(path), name, arrays, noise, mesh)
+            alike = sum(other.name.split(" ")[0] == title for other in recordings)
+            more = f" {alike + 1}" if alike else ""
+            recordings.append(replace(r, name=title + more) if title else r)
     counts = {len(r.marker_rest_position) for r in recordings}
     if not counts:
         raise UserError(str(paths[0]), "", "holds no recording")
@@ -74,6 +79,8 @@ def read_recordings(paths: Sequence[str | Path], mesh: GarmentMesh) -> list[Reco
 
 
 Arrays = Mapping[str, npt.NDArray[Any]]
+# Group and what was done in it, both may be empty; datasets, and the noise of some.
+_Found = tuple[str, str, Arrays, dict[str, float]]
 _NAMES = (
     "time",
     *(f"gripper/{side}/{q}" for side in SIDES for q in ("position", "force")),
@@ -93,7 +100,7 @@ def _groups(names: Sequence[str]) -> list[str]:
     return [f"{g}/" for g in sorted(found, key=lambda g: (len(g), g))]
 
 
-def _read_hdf5(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
+def _read_hdf5(path: Path) -> list[_Found]:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
@@ -101,7 +108,7 @@ def _read_hdf5(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
     with file:
         names: list[str] = []
         file.visit(names.append)
-        found: list[tuple[str, Arrays, dict[str, float]]] = []
+        found: list[_Found] = []
         for group in _groups(names):
             arrays: dict[str, npt.NDArray[Any]] = {}
             noise = {}
@@ -113,17 +120,19 @@ def _read_hdf5(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
                 arrays[name] = np.asarray(data)
                 if "noise_std" in data.attrs:
                     noise[name] = float(np.max(data.attrs["noise_std"]))
-            found.append((group.rstrip("/"), arrays, noise))
+            motion = file[group or "/"].attrs.get("motion", "")
+            title = motion if isinstance(motion, str) and " " not in motion else ""
+            found.append((group.rstrip("/"), title, arrays, noise))
         return found
 
 
-def _read_npz(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
+def _read_npz(path: Path) -> list[_Found]:
     try:
         with np.load(path, allow_pickle=False) as file:
             content = {name: file[name] for name in file.files}
     except (OSError, ValueError) as error:
         raise UserError(str(path), "", f"is not a readable NPZ file: {error}") from error
-    found: list[tuple[str, Arrays, dict[str, float]]] = []
+    found: list[_Found] = []
     for group in _groups(list(content)):
         arrays: Arrays = {
             name: content[f"{group}{name}"] if f"{group}{name}" in content else content[name]
@@ -136,11 +145,11 @@ def _read_npz(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
             for prefix in ("", group)
             if f"{prefix}{name}/noise_std" in content
         }
-        found.append((group.rstrip("/"), arrays, noise))
+        found.append((group.rstrip("/"), "", arrays, noise))
     return found
 
 
-def _read_csv(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
+def _read_csv(path: Path) -> list[_Found]:
     header, table = _table(path)
     arrays: dict[str, npt.NDArray[Any]] = {}
     if "time" in header:
@@ -172,7 +181,7 @@ def _read_csv(path: Path) -> list[tuple[str, Arrays, dict[str, float]]]:
         order = rows[:, _column(beside, names, "marker")].argsort()
         axes = [_column(beside, names, axis) for axis in "xyz"]
         arrays["garment/marker_rest_position"] = rows[order][:, axes]
-    return [("", arrays, {})]
+    return [("", "", arrays, {})]
 
 
 def _numbered(column: str) -> bool:

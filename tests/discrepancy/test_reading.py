@@ -35,6 +35,14 @@ def test_what_was_written_is_read(made, log):
         np.testing.assert_array_equal(r.gripper_force, s.gripper_force)
         np.testing.assert_array_equal(r.joint_position, s.joint_position)
         assert (r.marker_noise, r.force_noise) == (s.marker_noise, s.force_noise)
+        assert r.name == s.name
+
+
+def test_recordings_of_the_same_motion_are_told_apart(made, tmp_path):
+    path = tmp_path / "twice.h5"
+    write_recordings(path, [made[0], made[1], made[0]], "scenario: text")
+    names = [r.name for r in read_recordings([path], MESH)]
+    assert names == ["sway", "lift", "sway 2"]
 
 
 def test_a_file_may_hold_one_recording_at_its_root_and_lack_what_is_not_required(made, tmp_path):
