@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from benchmarks.cloth.table import Table
 from drake_dress.discrepancy.explanation import DISCRETISATION
+from drake_dress.report.page import chart, svg
 
 ASKED = {"effect": 90, "nothing": 95, "pair": 75, "coarse": 90, "outside": 100}
 _CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
@@ -155,9 +153,7 @@ def _hidden_there(result: dict[str, Any], name: str) -> bool:
 
 def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
     """Returns an SVG: how often causes of a given confidence are right."""
-    figure = Figure(figsize=(4.5, 4.0), layout="constrained")
-    FigureCanvasSVG(figure)
-    ax = figure.subplots()
+    figure, (ax,) = chart(4.5, 4.0)
     ax.plot([0.0, 1.0], [0.0, 1.0], color="#66727f", ls=":")
     for low, high, hits in reliability(results):
         if not hits:
@@ -174,7 +170,4 @@ def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
         ax.annotate(str(count), (at, share), (5, -10), textcoords="offset points", fontsize=8)
     ax.set_xlabel("confidence given")
     ax.set_ylabel("share that is right")
-    ax.spines[["top", "right"]].set_visible(False)
-    with io.StringIO() as text:
-        figure.savefig(text, format="svg")
-        return text.getvalue()
+    return svg(figure).decode("utf-8")

@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from drake_dress import __version__
 from drake_dress.discrepancy.experiment import Experiment
@@ -17,7 +15,7 @@ from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.sentences import headline, plain, values
 from drake_dress.discrepancy.where import Spot
 from drake_dress.discrepancy.windows import Windows
-from drake_dress.report.page import embedded, html_page
+from drake_dress.report.page import chart, embedded, html_page
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -333,11 +331,6 @@ def _chart(
     height: float | None = None,
 ) -> str:
     height = height or (1.5 * rows + 0.5 if columns == 1 else 3.2)
-    figure = Figure(figsize=(9.0, height), layout="constrained")
-    FigureCanvasSVG(figure)
-    axes = list(np.ravel(figure.subplots(rows, columns, sharex=columns == 1)))
+    figure, axes = chart(9.0, height, rows, columns)
     draw(axes)
-    for ax in axes:
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=9)
     return embedded(figure, title, note)

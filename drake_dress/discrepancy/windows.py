@@ -17,6 +17,7 @@ import numpy.typing as npt
 from drake_dress.discrepancy.experiment import Experiment, FreeRun, Level
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -64,8 +65,11 @@ def windows(
     """
     finer = any(c.name == DISCRETISATION for c in explanation.causes)
     level: Level = "refined" if finer else "scenario"
-    jobs = [("scenario", (), True), (level, explanation.effects, False)]
-    before, after = experiment.tell_free(jobs, progress)  # type: ignore[arg-type]
+    jobs: list[tuple[Level, Sequence[Effect], bool]] = [
+        ("scenario", (), True),
+        (level, explanation.effects, False),
+    ]
+    before, after = experiment.tell_free(jobs, progress)
     recordings = experiment.recordings
     length = before[0].length
     since: FloatArray = _BIN * (np.arange(round(length / _BIN), dtype=np.float64) + 0.5)

@@ -14,14 +14,12 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib import image as matplotlib_image
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.measures import Measures, measure
-from drake_dress.report.page import embedded, html_page
+from drake_dress.report.page import chart, embedded, html_page
 from drake_dress.report.stills import CameraPose, render_still
 from drake_dress.report.summary import SuccessRules
 
@@ -320,13 +318,8 @@ def _with_stages(log: RunLog, draw: Callable[[list[Axes]], None]) -> Callable[[l
 
 def _chart(title: str, note: str, draw: Callable[[list[Axes]], None]) -> str:
     rows = 2 if title in ("Progress and distance by stage", "Strain and penetration") else 1
-    figure = Figure(figsize=(9.0, 2.5 * rows + 0.3), layout="constrained")
-    FigureCanvasSVG(figure)
-    axes = list(np.ravel(figure.subplots(rows, 1, sharex=True)))
+    figure, axes = chart(9.0, 2.5 * rows + 0.3, rows)
     draw(axes)
-    for ax in axes:
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=9)
     axes[-1].set_xlabel("time, s")
     return embedded(figure, title, note)
 
