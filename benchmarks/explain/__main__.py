@@ -1,7 +1,8 @@
 """`python -m benchmarks.explain`: hides effects, explains the data, and counts what was right.
 
-Each case's result is kept as JSON and is not run again, so that a long study may be interrupted and
-resumed; remove the files to run it with other code.
+What was found is kept, case by case, and not run again, so that a long study may be interrupted
+and resumed: in the cache beside what was simulated, and in the file of `--json`, which can be
+passed on without it. Remove both to run the study with other code.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -43,23 +44,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
     draws = {g: options.draws or _DRAWS[g] for g in GROUPS}
     chosen = study(options.only, draws, options.seed, options.size, options.noise, options.beside)
     workers = max(1, (os.cpu_count() or 1) // options.jobs)
-    results: list[dict[str, Any]] = []
-    print(f"seed {options.seed}, {len(chosen)} cases, results in {options.cache}", flush=True)
+    kept = {} if options.json is None else read_results(options.json)
+    new = [case for case in chosen if case.name not in kept]
+    print(f"seed {options.seed}, {len(chosen)} cases, {len(new)} of them not run yet", flush=True)
     with caught_interrupt() as stop:
-        for number, result in enumerate(
-            _all(chosen, options.cache, options.jobs, workers, stop), 1
-        ):
-            results.append(result)
-            print(f"{number}/{len(chosen)} {_line(result)}", flush=True)
+        for number, result in enumerate(_all(new, options.cache, options.jobs, workers, stop), 1):
+            kept[Case(**result["case"]).name] = result
+            if options.json is not None:
+                write_results(options.json, kept.values())
+            print(f"{number}/{len(new)} {_line(result)}", flush=True)
+    results = [kept[case.name] for case in chosen if case.name in kept]
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
     print(f"\n{shown}", flush=True)
     if options.into:
         write_between(options.into, shown)
-    if options.json:
-        options.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if options.plot:
-        options.plot.write_text(reliability_plot(results), encoding="utf-8")
+        write_text(options.plot, reliability_plot(results))
     return INTERRUPTED if stop.is_set() else 0
+
+
+def read_results(path: Path) -> dict[str, dict[str, Any]]:
+    """Returns the results that a file holds by their case's name; none if there is no file.
+
+    Raises:
+        UserError: it cannot be read, or holds something else.
+    """
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {Case(**result["case"]).name: result for result in found}
+    except OSError as error:
+        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError, KeyError):
+        raise UserError(str(path), "", "expected results of drake-dress bench explain") from None
+
+
+def write_results(path: Path, results: Iterable[dict[str, Any]]) -> None:
+    """Writes results, a line each, in the order of their cases' names."""
+    lines = (json.dumps(r) for r in sorted(results, key=lambda r: Case(**r["case"]).name))
+    write_text(path, "[\n" + ",\n".join(lines) + "\n]\n")
 
 
 def _all(
@@ -161,7 +185,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--cache", type=Path, default=Path("out/bench-explain"), metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases side by side")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="reliability, SVG")
-    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="results; what is there already is not run again"
+    )
     return parser
 
 

@@ -54,17 +54,15 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         return []
     centre = _setting(results[0])
     central = [r for r in results if _setting(r) == centre]
-    effects = [r for r in central if r["case"]["group"] == "effect"]
+    every = [r for r in results if r["case"]["group"] == "effect"]
+    effects = [r for r in every if _setting(r) == centre]
     header = ["right", "ambiguous", "parameter error, %", "gain", "loss before"]
     names = dict.fromkeys(r["case"]["hide"] for r in effects)
     each = [[name, *_summary([r for r in effects if r["case"]["hide"] == name])] for name in names]
-    settings = sorted({_setting(r) for r in results if r["case"]["group"] == "effect"})
-    beside = []
-    for noise, size in settings:
-        mine = [
-            r for r in results if r["case"]["group"] == "effect" and _setting(r) == (noise, size)
-        ]
-        beside.append([f"{1e3 * noise:g}", size, *_summary(mine)])
+    beside = [
+        [f"{1e3 * noise:g}", size, *_summary([r for r in every if _setting(r) == (noise, size)])]
+        for noise, size in sorted({_setting(r) for r in every})
+    ]
     return [
         Table("Each effect", ["hidden", "draws", *header], each),
         Table("All", *_groups(central)),
@@ -87,15 +85,23 @@ def _setting(result: dict[str, Any]) -> tuple[float, float]:
 
 def _summary(results: Sequence[dict[str, Any]]) -> list[Any]:
     """Returns draws, how many are right and ambiguous, and medians of error, gain and loss."""
-    errors = [e for r in results if (e := parameter_error(r)) is not None]
     return [
         len(results),
         sum(map(right, results)),
         sum(map(unsure, results)),
-        100.0 * float(np.median(errors)) if errors else None,
+        _median_error(results),
         float(np.median([r["gain"][0] for r in results])),
         float(np.median([r["loss"]["refined"] for r in results])),
     ]
+
+
+def _median_error(results: Sequence[dict[str, Any]]) -> float | None:
+    """Returns the median error of parameters, %."""
+    return _median([100.0 * e for r in results if (e := parameter_error(r)) is not None])
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any]]]:
@@ -105,7 +111,6 @@ def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any
         mine = [r for r in results if r["case"]["group"] == group]
         if not mine:
             continue
-        errors = [e for r in mine if (e := parameter_error(r)) is not None]
         gains = [r["gain"][0] for r in mine if r["hidden"]]
         # cases side by side have one process each, and say nothing about time
         times = [r["seconds"] for r in mine if r["workers"] > 1]
@@ -116,9 +121,9 @@ def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any
                 100.0 * float(np.mean([right(r) for r in mine])),
                 asked,
                 100.0 * float(np.mean([unsure(r) for r in mine])),
-                100.0 * float(np.median(errors)) if errors else None,
-                float(np.median(gains)) if gains else None,
-                float(np.median(times)) if times else None,
+                _median_error(mine),
+                _median(gains),
+                _median(times),
             ]
         )
     header = ["group", "draws", "right, %", "asked, %", "ambiguous, %"]

@@ -19,7 +19,6 @@ from drake_dress.discrepancy.whitening import Whitening, whiten
 from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
-Report = Callable[[str, int], None]
 
 # Fits that are tried after screening, and the least share of the best one's gain they must promise.
 _SHORTLIST, _PROMISING = 4, 0.3
@@ -47,11 +46,13 @@ class Comparison:
     Attributes:
         whitening: of the data.
         told: what each level says of each recording.
+        vector: (N,) of it, whitened.
         extrapolation: of the refined one.
     """
 
     whitening: Whitening
     told: dict[Level, list[Told]]
+    vector: dict[Level, FloatArray]
     extrapolation: Extrapolation
 
 
@@ -102,9 +103,8 @@ def probe(
         (level_of(p.effect), (p.effect,)) for c in found for p in c.probes
     ]
     w = comparison.whitening
-    zero = {level: w.vector(told) for level, told in comparison.told.items()}
     columns = iter(
-        w.vector(told) - zero[level]
+        w.vector(told) - comparison.vector[level]
         for (level, _), told in zip(jobs, experiment.tell(jobs, progress), strict=True)
     )
     return [(c, np.stack([next(columns) for _ in c.probes], 1)) for c in found]
@@ -117,8 +117,9 @@ def compare(experiment: Experiment, progress: Callable[[], None] | None = None) 
         zip(order, experiment.tell([(level, ()) for level in order], progress), strict=True)
     )
     w = whiten(experiment.recordings, experiment.samples, told["scenario"], told["refined"])
-    halving = w.vector(told["refined"]) - w.vector(told["doubled"])
-    return Comparison(w, told, Extrapolation(halving, w.voice))
+    vector = {level: w.vector(t) for level, t in told.items()}
+    halving = vector["refined"] - vector["doubled"]
+    return Comparison(w, told, vector, Extrapolation(halving, w.voice))
 
 
 def best_of_each(screened: Sequence[Screened]) -> list[Screened]:

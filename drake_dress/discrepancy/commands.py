@@ -58,13 +58,13 @@ def explain_files(
         stage("settling")
         with Experiment(scenario, base, recordings, workers=workers) as experiment:
             found = explain(experiment, scenario.seed, stage, tick)
-            told = found.comparison.told["refined"]
+            comparison = found.comparison
             off = spots(
-                found.comparison.whitening,
-                found.comparison.whitening.vector(told),
+                comparison.whitening,
+                comparison.vector["refined"],
                 experiment.recordings,
                 mesh,
-                [t.contact for t in told],
+                [t.contact for t in comparison.told["refined"]],
                 experiment.samples,
             )
             stage("running on its own")

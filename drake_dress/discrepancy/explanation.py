@@ -128,17 +128,15 @@ def explain(
     comparison = compare(experiment, progress)
     found = Search(experiment, comparison, rng, stage, progress).run()
     w = comparison.whitening
-    scenario, refined = (w.vector(comparison.told[k]) for k in ("scenario", "refined"))
-    numerics = _rms(w.size(scenario - refined), ~w.is_force)
-    coarse = _coarse(comparison, scenario, refined, numerics)
-    return _concluded(comparison, found, coarse, scenario, numerics, rng)
+    off = comparison.vector["scenario"] - comparison.vector["refined"]
+    numerics = _rms(w.size(off), ~w.is_force)
+    return _concluded(comparison, found, _coarse(comparison, numerics), numerics, rng)
 
 
-def _coarse(
-    comparison: Comparison, scenario: FloatArray, refined: FloatArray, numerics: float
-) -> list[Cause]:
+def _coarse(comparison: Comparison, numerics: float) -> list[Cause]:
     """Returns discretisation as a cause where it is one."""
     w = comparison.whitening
+    scenario, refined = comparison.vector["scenario"], comparison.vector["refined"]
     markers = ~w.is_force
     noise = _rms(w.sensor, markers)
     before = max(_rms(w.size(w.data - scenario), markers) ** 2 - noise**2, 1e-12)
@@ -151,8 +149,8 @@ def _coarse(
 
 def _causes(found: Found) -> list[Cause]:
     pairs = [(n, found.model) for n in found.named]
-    if found.rival is not None and found.rival_named is not None:
-        pairs.append((found.rival_named, found.rival))
+    if found.rival is not None:
+        pairs.append(found.rival)
     return [_cause(named, model) for named, model in pairs]
 
 
@@ -175,19 +173,24 @@ def _concluded(
     comparison: Comparison,
     found: Found,
     coarse: list[Cause],
-    scenario: FloatArray,
     numerics: float,
     rng: np.random.Generator,
 ) -> Explanation:
     w = comparison.whitening
     physical = _causes(found)
     predicted = found.model.predicted
+    scenario, refined = comparison.vector["scenario"], found.plain.predicted
     size = np.bincount(w.block)
+    loss = {
+        "scenario": block_loss(w, scenario),
+        "refined": block_loss(w, refined),
+        "extended": block_loss(w, predicted),
+    }
+    mean = {k: float(v.sum() / size.sum()) for k, v in loss.items()}
+    left = mean["extended"]
     # with discretisation among the causes, the scenario is what is mended
-    start = scenario if coarse else found.plain.predicted
-    first, last = block_loss(w, start), block_loss(w, predicted)
-    gain = _interval(first - size, last - size, rng)
-    left = float(last.sum() / size.sum())
+    start, first = (scenario, loss["scenario"]) if coarse else (refined, loss["refined"])
+    gain = _interval(first - size, loss["extended"] - size, rng)
     trust = 1.0 if left < _AT_NOISE else float(np.clip(gain[0] / _WHOLE, 0.0, 1.0))
     causes = coarse + [replace(c, confidence=trust * c.confidence) for c in physical]
     if not causes:
@@ -206,11 +209,7 @@ def _concluded(
         verdict,
         causes,
         _scores(found),
-        {
-            "scenario": float(block_loss(w, scenario).sum() / size.sum()),
-            "refined": float(block_loss(w, found.plain.predicted).sum() / size.sum()),
-            "extended": left,
-        },
+        mean,
         gain,
         sizes(w.size(w.data - start)),
         sizes(w.size(w.data - predicted)),

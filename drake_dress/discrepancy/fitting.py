@@ -24,8 +24,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 # Step of derivatives and largest step of an iteration, in sizes that matter.
 _DIFFERENCE, _TRUST = 0.25, 4.0
-
-
 # A step shorter than this, in sizes that matter, says nothing about slopes.
 _TELLING = 0.03
 
@@ -37,12 +35,20 @@ class Evidence:
     Attributes:
         whitening: with the data.
         extrapolation: of the refined simulation.
-        numerics: (N,) what refining the scenario's simulation has changed.
+        numerics: (N,) what refining the scenario's simulation has changed, less what is free in it.
     """
 
     whitening: Whitening
     extrapolation: Extrapolation
     numerics: FloatArray
+
+    @classmethod
+    def of(
+        cls, whitening: Whitening, extrapolation: Extrapolation, numerics: FloatArray
+    ) -> Evidence:
+        """Takes all of what refining has changed (N,)."""
+        every = np.ones(len(numerics), dtype=np.bool_)
+        return cls(whitening, extrapolation, extrapolation.without(numerics, every))
 
 
 @dataclass(frozen=True)
@@ -179,18 +185,12 @@ def _stepped(
     for rows in w.trained_on:
         change[~rows] = slopes[~rows] @ (solved(rows)[0].x - best.x)
     drawn = _robust_std(reduced, left - reduced @ best.x, w.block)
-    finer = evidence.extrapolation.without(evidence.numerics, every)
-    biased = NUMERICS_SHARE * misleading(slopes, reduced, finer, w.voice)
-    values = now + best.x * size
-    std: dict[str, dict[str, float]] = {}
-    for (k, p), s in zip(free, size * np.hypot(np.maximum(drawn, best.std), biased), strict=True):
-        std.setdefault(effects[k].NAME, {})[p.name] = float(s)
+    biased = NUMERICS_SHARE * misleading(slopes, reduced, evidence.numerics, w.voice)
+    values = iter(now + best.x * size)
+    spread = iter(size * np.hypot(np.maximum(drawn, best.std), biased))
     return Fit(
-        tuple(
-            bounded(type(e), {p.name: v for (j, p), v in zip(free, values, strict=True) if j == k})
-            for k, e in enumerate(effects)
-        ),
-        std,
+        tuple(bounded(type(e), {p.name: next(values) for p in e.parameters()}) for e in effects),
+        {e.NAME: {p.name: float(next(spread)) for p in e.parameters()} for e in effects},
         told + slopes @ best.x,
         change,
         slopes,

@@ -70,23 +70,23 @@ def stage(lab: Lab) -> Stage:
     """Returns where a lab's motions take place."""
     joints = lab.person([]).posed
     shoulder, hand = joints[0], joints[2]
-    rest, grasp = lab.garment.rest_position, lab.garment.grasp
+    rest = lab.garment.rest_position
+    left, right = (rest[lab.garment.grasp[side]].mean(axis=0) for side in ("left", "right"))
     along = (hand - shoulder) / np.linalg.norm(hand - shoulder)
     limb = shoulder + _ON_ARM * (hand - shoulder)
     middle = 0.5 * (joints[0] + joints[3])
     raised = raised_arm(lab).person([]).posed
     up = (raised[2] - raised[1]) / np.linalg.norm(raised[2] - raised[1])
-    grippers = 0.5 * (rest[grasp["left"]].mean(axis=0) + rest[grasp["right"]].mean(axis=0))
     return Stage(
         free=middle + np.array([-_FREE_DISTANCE, 0.0, _ABOVE_SHOULDERS]),
         before=limb + np.array([_BEFORE_LIMB, 0.0, _ABOVE_LIMB]),
         along=along,
         across=np.array([-1.0, 0.0, 0.0]),
-        spread=rest[grasp["left"]].mean(axis=0) - rest[grasp["right"]].mean(axis=0),
+        spread=left - right,
         hand=raised[2],
         up=up,
         # the garment comes from outside, so it is the other side's
-        cuff=rest[lab.garment.loops["right_cuff"]].mean(axis=0) - grippers,
+        cuff=rest[lab.garment.loops["right_cuff"]].mean(axis=0) - 0.5 * (left + right),
     )
 
 

@@ -195,13 +195,13 @@ class _Residuals:
     def __init__(self, x: Explanation, experiment: Experiment) -> None:
         w = x.comparison.whitening
         discrete = any(c.name == DISCRETISATION for c in x.causes)
-        first = x.comparison.told["scenario" if discrete else "refined"]
+        first = x.comparison.vector["scenario" if discrete else "refined"]
         self._w, self._experiment = w, experiment
         # name, colour, whitened residual, residual in m and N
         self._pairs = tuple(
             (name, color, w.data - predicted, w.size(w.data - predicted))
             for name, color, predicted in (
-                ("before", _BEFORE, w.vector(first)),
+                ("before", _BEFORE, first),
                 ("after", _AFTER, x.predicted),
             )
         )

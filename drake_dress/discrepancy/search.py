@@ -28,7 +28,7 @@ FloatArray = npt.NDArray[np.float64]
 
 # Least share of the held-out loss that a cause takes away, and a further one of what is left then:
 # what numerics feign stays below; and the share of resamples of blocks in which it is a gain.
-LEAST_GAIN, _FURTHER, _SURELY = 0.012, 0.025, 0.9
+_LEAST_GAIN, _FURTHER, _SURELY = 0.012, 0.025, 0.9
 # Two causes are not told apart where the first is the better one in less than this share of the
 # resamples of blocks.
 _SURE = 0.9
@@ -89,8 +89,8 @@ class Found:
     Attributes:
         plain: without effects; model: with all that was found.
         named: in the order found.
-        rival: a model that explains nearly as much with another effect in the last one's place.
-        rival_named: that effect.
+        rival: another effect in the last one's place and the model with it, if that explains nearly
+            as much.
         screened: all candidates at the start.
         fitted: effect and gain of the candidates that were fitted in the first round, by name.
     """
@@ -98,8 +98,7 @@ class Found:
     plain: Model
     model: Model
     named: tuple[Named, ...]
-    rival: Model | None
-    rival_named: Named | None
+    rival: tuple[Named, Model] | None
     screened: list[Screened]
     fitted: dict[str, tuple[Effect, float]]
 
@@ -126,11 +125,12 @@ class Search:
         self._experiment, self._rng = experiment, rng
         self._stage, self._progress = stage, progress
         self._comparison, self._whitening = comparison, comparison.whitening
-        refined, scenario = (
-            self._whitening.vector(comparison.told[level]) for level in ("refined", "scenario")
+        self._evidence = Evidence.of(
+            self._whitening,
+            comparison.extrapolation,
+            comparison.vector["refined"] - comparison.vector["scenario"],
         )
-        self._evidence = Evidence(self._whitening, comparison.extrapolation, refined - scenario)
-        self._plain = self._model(None, refined)
+        self._plain = self._model(None, comparison.vector["refined"])
 
     def run(self) -> Found:
         """Returns what was found."""
@@ -142,7 +142,7 @@ class Search:
         while len(model.effects) < _MOST_CAUSES:
             there = {e.NAME for e in model.effects}
             chosen = [s for s in shortlist(screened) if s.candidate.name not in there]
-            least = LEAST_GAIN if model is self._plain else _FURTHER
+            least = _LEAST_GAIN if model is self._plain else _FURTHER
             if not chosen or chosen[0].gain < 0.5 * least:
                 break
             self._stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
@@ -158,7 +158,7 @@ class Search:
                 other = Named(rest.effects[-1].NAME, self._gain(model, rest), 1.0 - confidence)
                 both = self._both(model, best, rest)
                 if both is None:
-                    return Found(self._plain, best, (*named, *news), rest, other, first, fitted)
+                    return Found(self._plain, best, (*named, *news), (other, rest), first, fitted)
                 news = [
                     replace(news[0], confidence=self._confidence(rest, [both])),
                     replace(other, confidence=self._confidence(best, [both])),
@@ -166,7 +166,7 @@ class Search:
                 best = both
             model, named = self._lean(best, named + news)
             screened = screen(self._comparison, columns, model.reference)
-        return Found(self._plain, model, tuple(named), None, None, first, fitted)
+        return Found(self._plain, model, tuple(named), None, first, fitted)
 
     def _gain(self, before: Model, after: Model) -> float:
         """Returns the share of the held-out loss of one model that another takes away."""
@@ -205,7 +205,7 @@ class Search:
         """Returns the best of fits, the one that comes near it if any, and how sure that is."""
         ranked = sorted(fits, key=self._loss)[:2]
         gains = [self._gain(before, f) for f in ranked]
-        if gains[0] < LEAST_GAIN:
+        if gains[0] < _LEAST_GAIN:
             return ranked[0], None, 0.0
         confidence = self._confidence(before, ranked)
         if confidence >= _CERTAIN or gains[-1] < _NEAR * gains[0]:
@@ -214,13 +214,10 @@ class Search:
         ranked = [self._refined(f) for f in ranked]
         for _ in range(_POLISHED):
             # who falls behind is not refined further
-            behind = confidence >= _CERTAIN
-            if all(f.settled or (k > 0 and behind) for k, f in enumerate(ranked)):
+            due = 1 if confidence >= _CERTAIN else len(ranked)
+            if all(f.settled for f in ranked[:due]):
                 break
-            ranked = [
-                f if f.settled or (k > 0 and behind) else self._polished(f)
-                for k, f in enumerate(ranked)
-            ]
+            ranked[:due] = [self._polished(f) for f in ranked[:due]]
             ranked.sort(key=self._loss)
             confidence = self._confidence(before, ranked)
         return ranked[0], ranked[1] if len(ranked) > 1 else None, confidence
@@ -229,8 +226,6 @@ class Search:
         """Returns a fit refined until it is settled."""
         model = self._refined(model)
         for _ in range(_POLISHED):
-            if model.settled:
-                break
             model = self._polished(model)
         return model
 
@@ -265,21 +260,23 @@ class Search:
 
     def _refined(self, model: Model) -> Model:
         """Returns a fit with what the refined simulation says in place of the coarse one."""
-        fit = model.fit
-        assert fit is not None
-        told = self._whitening.vector(
-            self._experiment.tell([("refined", fit.effects)], self._progress)[0]
-        )
-        return self._model(fit, told, settled=False)
+        return self._model(model.fit, self._told(model.effects), settled=False)
+
+    def _told(self, effects: Sequence[Effect]) -> FloatArray:
+        """Returns (N,) whitened, what the refined simulation says with effects."""
+        (told,) = self._experiment.tell([("refined", effects)], self._progress)
+        return self._whitening.vector(told)
 
     def _polished(self, last: Model) -> Model:
         """Returns a fit about what the refined simulation says at the last one.
 
-        The slopes, told by coarser simulations, become those of the refined one on the way.
-        Coarse contact feels friction more than fine contact does: by the slopes of the screening
-        level alone a coefficient of friction came out at half of what it was.
+        One that is settled stays. The slopes, told by coarser simulations, become those of the
+        refined one on the way. Coarse contact feels friction more than fine contact does: by the
+        slopes of the screening level alone a coefficient of friction came out at half of what it
+        was.
         """
-        assert last.fit is not None
+        if last.fit is None or last.settled:
+            return last
         better = fit_again(self._evidence, last.fit, last.reference)
         moved = [
             abs(getattr(new, p.name) - getattr(old, p.name))
@@ -290,8 +287,8 @@ class Search:
         if all(moved):
             # so short a step is linear
             return self._model(better, better.told)
-        refined = self._refined(self._model(better, better.told))
-        return replace(refined, fit=bettered(better, refined.reference - last.reference))
+        told = self._told(better.effects)
+        return self._model(bettered(better, told - last.reference), told, settled=False)
 
     def _confidence(self, before: Model, after: Sequence[Model]) -> float:
         """Returns the share of resamples of blocks in which the first is best, and is a gain."""

@@ -1,8 +1,17 @@
 """The study of `drake-dress explain`: its cases and its tables, from results made up here."""
 
+import dataclasses
+
 import pytest
 
-from benchmarks.explain.__main__ import BEGIN, END, main, write_between
+from benchmarks.explain.__main__ import (
+    BEGIN,
+    END,
+    main,
+    read_results,
+    write_between,
+    write_results,
+)
 from benchmarks.explain.cases import study
 from benchmarks.explain.tables import parameter_error, reliability, right, tables
 from drake_dress.discrepancy.hidden import SIZES
@@ -87,6 +96,30 @@ def test_tables_go_between_the_marks_of_a_file(tmp_path):
     with pytest.raises(UserError, match="expected one"):
         write_between(path, "new")
     assert path.read_text() == "no marks"
+
+
+def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):
+    path = tmp_path / "results.json"
+    cases = study(["nothing"], {"nothing": 2}, 5, [1.0], [1e-3], 1)
+    made_up = [result(group="nothing", hide="nothing", named=(), verdict="nothing") for _ in cases]
+    for one, case in zip(made_up, cases, strict=True):
+        one["case"] = dataclasses.asdict(case)
+    write_results(path, made_up)
+    assert list(read_results(path)) == [case.name for case in cases]
+    words = ["--only", "nothing", "--draws", "2", "--seed", "5", "--json", str(path)]
+    assert main([*words, "--cache", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "2 cases, 0 of them not run yet" in said
+    assert "nothing" in said and "100" in said
+
+
+@pytest.mark.parametrize("content", ["{", "[1]", '[{"case": {"group": "effect"}}]', "[{}]"])
+def test_a_file_of_something_else_is_refused(content, tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(content)
+    with pytest.raises(UserError, match="expected results"):
+        read_results(path)
+    assert path.read_text() == content
 
 
 @pytest.mark.parametrize("words", [["--noise", "x"], ["--size", "0"], ["--only", "all"]])

@@ -48,6 +48,7 @@ from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
 from drake_dress.models.cloth.projective.projected_system import ProjectedSystem
 from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory, dot
 from drake_dress.models.cloth.projective.stopping_rule import StoppingRule
+from drake_dress.models.cloth.vectors import largest_length
 
 _WINDOW = 5
 # Decrease that a line search asks for, as a share of what the slope promises.
@@ -224,7 +225,7 @@ class ProjectiveDynamicsCloth:
                 if changes:
                     stop.restart()
                 else:
-                    stop.add(_largest(x - before))
+                    stop.add(largest_length(x - before))
                 if stop.reached() or iterations >= self._max_iterations:
                     break
             if history is not None:
@@ -395,12 +396,3 @@ def _add_inertia(x, inertial, mass, h2, force):  # type: ignore[no-untyped-def]
     for i in range(x.shape[0]):
         for c in range(3):
             force[i, c] = mass[i] * (x[i, c] - inertial[i, c]) - h2 * force[i, c]
-
-
-@nb.njit(cache=True, nogil=True)
-def _largest(x):  # type: ignore[no-untyped-def]
-    """Returns the largest length of a row (n,3)."""
-    largest = 0.0
-    for i in range(x.shape[0]):
-        largest = max(largest, x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2)
-    return np.sqrt(largest)

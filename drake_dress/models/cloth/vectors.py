@@ -1,8 +1,12 @@
-"""Sums of arrays of vectors on whole vector registers; the order of summation is the compiler's."""
+"""Sums and lengths of arrays of vectors.
+
+Sums run on whole vector registers; their order is the compiler's.
+"""
 
 from __future__ import annotations
 
 import numba as nb
+import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
 
@@ -33,3 +37,12 @@ def turn(direction: FloatArray, beta: float, ahead: FloatArray) -> None:
     p, q = direction.reshape(-1), ahead.reshape(-1)
     for i in range(p.shape[0]):
         p[i] = q[i] + beta * p[i]
+
+
+@nb.njit(cache=True, nogil=True)
+def largest_length(v: FloatArray) -> float:
+    """Returns the largest length of a row of `v` (n,3)."""
+    largest = 0.0
+    for i in range(v.shape[0]):
+        largest = max(largest, v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2)
+    return np.sqrt(largest)

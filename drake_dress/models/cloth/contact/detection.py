@@ -22,6 +22,7 @@ from drake_dress.models.cloth.contact.distance import (
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.vectors import largest_length
 
 # A node so near to a surface, m, lies there while others are judged (those that slide on something
 # round are left with up to 0.2 mm), and so few others are taken as they seem without contact.
@@ -80,7 +81,11 @@ def cannot_land(
         obstacles: with velocities.
         time_step: s.
     """
-    speed = fastest(obstacles) + max(_largest(v), _largest(held_velocity)) + _FALL * time_step
+    speed = (
+        fastest(obstacles)
+        + max(largest_length(v), largest_length(held_velocity))
+        + _FALL * time_step
+    )
     return out_of_reach(x, obstacles, _REACH + _HASTE * time_step * speed)
 
 
@@ -98,11 +103,19 @@ def nothing_near(count: int) -> Proximity:
 def find_proximity(
     x: FloatArray,
     obstacles: Obstacles,
-    margin: float,
+    margin: float | FloatArray,
     edge: IntArray | None = None,
     triangle: IntArray | None = None,
 ) -> Proximity:
-    """Returns the gap of each node of `x` (n,3), with edges (E,2) and faces (F,3) where given."""
+    """Returns the gap of each node, with edges and faces where they are given.
+
+    Args:
+        x: (n,3) m.
+        obstacles: bodies.
+        margin: distance to keep, of all or of each (n,), m.
+        edge: (E,2).
+        triangle: (F,3).
+    """
     n = len(x)
     shapes = obstacles.packed
     gap = np.empty(n)
@@ -286,15 +299,6 @@ def _surface(
 def fastest(obstacles: Obstacles) -> float:
     """Returns a bound on the speed of surfaces near the garment, m/s."""
     return float(_fastest(*obstacles.twists()))
-
-
-@nb.njit(cache=True, nogil=True)
-def _largest(v):  # type: ignore[no-untyped-def]
-    """Returns the largest length of a row (n,3)."""
-    largest = 0.0
-    for i in range(v.shape[0]):
-        largest = max(largest, v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2)
-    return np.sqrt(largest)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -26,6 +26,7 @@ from drake_dress.models.cloth.layers.passes import (
 )
 from drake_dress.models.cloth.layers.topology import make_topology
 from drake_dress.models.cloth.layers.zones import Union, Zone, make_zone
+from drake_dress.models.cloth.vectors import largest_length
 
 # Relative motion in one part of a step, by the mean edge length.
 _LONGEST_PART = 1.0
@@ -290,7 +291,7 @@ class LayerSeparation:
             before = dx.copy()
             state = self._impulses(x, dx, w, barred, pairs, counts, _PASSES)
             # Pairs that were not looked at are still apart after corrections this small.
-            complete = 2.0 * _largest(dx - before) <= self._slack + _UNSEEN * self.thickness
+            complete = 2.0 * largest_length(dx - before) <= self._slack + _UNSEEN * self.thickness
             if complete:
                 break
         counts.thin = int(np.count_nonzero(state == THIN))
@@ -449,7 +450,3 @@ def _seen_by_a_turning_observer(x: FloatArray, dx: FloatArray) -> tuple[FloatArr
     u[:, 2] *= np.linalg.det(u @ vt)
     rotation = u @ vt
     return rotation, end @ rotation - start
-
-
-def _largest(change: FloatArray) -> float:
-    return float(np.sqrt(np.einsum("ij,ij->i", change, change).max()))

@@ -163,15 +163,14 @@ class IteratedContact:
         going = np.arange(len(far))
         for _ in range(_LEGS):
             point = x[far[going]] + way[going, None] * ahead[going]
-            near = find_proximity(point, self._after, 0.0)
-            ahead_of_it = near.gap - self._margin[far[going]]
-            hit = (ahead_of_it <= 0.0) & (np.einsum("ij,ij->i", near.normal, ahead[going]) < 0.0)
+            near = find_proximity(point, self._after, self._margin[far[going]])
+            hit = (near.gap <= 0.0) & (np.einsum("ij,ij->i", near.normal, ahead[going]) < 0.0)
             if hit.any():
                 rows = going[hit]
                 motion[far[rows]] = way[rows, None] * ahead[rows]
                 self._stopped[far[rows]] = True
             # a cubic spline of distances may rise by more than 1 m a metre: half of the gap is safe
-            going, gap = going[~hit], ahead_of_it[~hit]
+            going, gap = going[~hit], near.gap[~hit]
             way[going] += np.maximum(0.5 * gap, length[going] / _LEGS)
             going = going[way[going] < length[going]]
             if not len(going):
@@ -182,9 +181,9 @@ class IteratedContact:
         due = np.flatnonzero(active_set.due(x, self._checked, self._gap, self.mode))
         if not len(due):
             return
-        near = find_proximity(x[due], self._after, 0.0)
+        near = find_proximity(x[due], self._after, self._margin[due])
         self._checked[due] = x[due]
-        self._gap[due] = near.gap - self._margin[due]
+        self._gap[due] = near.gap
         self.normal[due] = near.normal
         self._slope[due] = near.slope
         self.owner[due] = near.owner
@@ -266,13 +265,13 @@ class IteratedContact:
         v, omega = obstacles.twists()
         if not v.any() and not omega.any():
             return x.copy()
-        near = find_proximity(x, obstacles, 0.0)
+        near = find_proximity(x, obstacles, self._margin)
         reach = np.zeros(len(x))
         for i in range(obstacles.count):
             arm = np.linalg.norm(x - self._before[i], axis=1)
             np.maximum(reach, np.linalg.norm(v[i]) + np.linalg.norm(omega[i]) * arm, out=reach)
         carried = x.copy()
-        rows = near.gap - self._margin < self._h * reach
+        rows = near.gap < self._h * reach
         who = near.owner[rows]
         arm = x[rows] - self._before[who]
         carried[rows] = self._after.origins()[who] + np.einsum(
