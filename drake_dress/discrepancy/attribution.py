@@ -1,7 +1,10 @@
 """Screens which effects may be what a simulation lacks.
 
 Every other block of time trains, the others judge, and the other way round. A candidate's gain is
-the share of the squared whitened residual that it takes away where it was judged.
+the share of the squared whitened residual that it takes away where it was judged. Coarse cloth may
+fold another way than what was measured as soon as an effect acts on it, in some recordings: what a
+candidate makes worse as a whole is not held against it here, and its coefficients are also sought
+such that all recordings and signals count alike.
 """
 
 from __future__ import annotations
@@ -14,11 +17,12 @@ import numpy.typing as npt
 
 from drake_dress.discrepancy.candidates import Candidate, candidates
 from drake_dress.discrepancy.experiment import Experiment, Level, Told, level_of
-from drake_dress.discrepancy.regression import Extrapolation, solve_bounded
+from drake_dress.discrepancy.regression import Extrapolation, solve_bounded, solve_pooled
 from drake_dress.discrepancy.whitening import Whitening, whiten
 from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 # Fits that are tried after screening, and the least share of the best one's gain they must promise.
 _SHORTLIST, _PROMISING = 4, 0.3
@@ -31,7 +35,7 @@ class Screened:
     Attributes:
         candidate: which.
         start: the effect with the coefficients found.
-        gain: share of the held-out loss taken away.
+        gain: share of the held-out loss taken away, in the recordings that it betters.
     """
 
     candidate: Candidate
@@ -73,21 +77,33 @@ def screen(
     residual = w.data - predicted
     folds = w.trained_on
     left = [free.without(residual, train) for train in folds]
-    before = sum(float(r[~train] @ r[~train]) for r, train in zip(left, folds, strict=True))
+    recordings = int(w.recording.max()) + 1
+
+    def lost(residual: FloatArray, rows: BoolArray) -> FloatArray:
+        each: FloatArray = np.bincount(w.recording[rows], residual**2, recordings).astype(float)
+        return each
+
+    before = np.add(*(lost(r[~train], ~train) for r, train in zip(left, folds, strict=True)))
     found = []
     for candidate, matrix in columns:
         if not matrix.any():
             continue
         low = np.array([p.low for p in candidate.probes])
         high = np.full(len(low), np.inf)
-        after, x = 0.0, np.zeros(len(low))
-        for r, train in zip(left, folds, strict=True):
-            reduced = free.without(matrix, train)
-            half = solve_bounded(matrix[train], reduced[train], r[train], low, high)
-            x += 0.5 * half
-            r = r[~train] - reduced[~train] @ half
-            after += float(r @ r)
-        found.append(Screened(candidate, candidate.effect(x), 1.0 - after / before))
+        reduced = [free.without(matrix, train) for train in folds]
+        for pooled in (False, True):
+            after, x = np.zeros(recordings), np.zeros(len(low))
+            for r, own, train in zip(left, reduced, folds, strict=True):
+                known = (matrix[train], own[train], r[train])
+                half = (
+                    solve_pooled(*known, w.voice[train], low, high).x
+                    if pooled
+                    else solve_bounded(*known, low, high)
+                )
+                x += 0.5 * half
+                after += lost(r[~train] - own[~train] @ half, ~train)
+            gain = float(np.maximum(before - after, 0.0).sum() / before.sum())
+            found.append(Screened(candidate, candidate.effect(x), gain))
     return sorted(found, key=lambda s: -s.gain)
 
 

@@ -187,7 +187,7 @@ class Experiment:
 
     def tell(
         self,
-        jobs: Sequence[tuple[Level, Sequence[Effect]]],
+        jobs: Sequence[tuple[Level | Sequence[Level], Sequence[Effect]]],
         progress: Callable[[], None] | None = None,
     ) -> list[list[Told]]:
         """Returns what simulations say of each recording; what was told once is remembered.
@@ -196,11 +196,17 @@ class Experiment:
         the same level, to have none.
 
         Args:
-            jobs: level and effects of each simulation.
+            jobs: level, of all recordings or of each, and effects of each simulation.
             progress: called after each replay of one recording.
         """
         count = len(self.recordings)
-        keys = [[self._key(level, i, effects) for i in range(count)] for level, effects in jobs]
+        keys = [
+            [
+                self._key(level if isinstance(level, str) else level[i], i, effects)
+                for i in range(count)
+            ]
+            for level, effects in jobs
+        ]
         new = [k for k in dict.fromkeys(k for row in keys for k in row) if k not in self._told]
         work = [(level, i, effects, self.samples[i]) for level, i, effects in new]
         for key, told in zip(new, self._map(_replay, work, progress), strict=True):

@@ -166,7 +166,7 @@ def _scores(found: Found) -> list[Score]:
     for s in best_of_each(found.screened):
         effect, gain = found.fitted.get(s.candidate.name, (s.start, None))
         scores.append(Score(s.candidate.name, s.gain, gain, effect))
-    return sorted(scores, key=lambda s: -(s.fitted or s.screened))
+    return sorted(scores, key=lambda s: -(s.screened if s.fitted is None else s.fitted))
 
 
 def _concluded(

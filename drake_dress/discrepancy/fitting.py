@@ -21,9 +21,14 @@ from drake_dress.models.effects.effect import Effect, Parameter
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+# Levels of the recordings, effects.
+_Job = tuple[tuple[Level, ...], Sequence[Effect]]
 
 # Step of derivatives and largest step of an iteration, in sizes that matter.
 _DIFFERENCE, _TRUST = 0.25, 4.0
+# How much a fit may raise what a recording has lost, before its simulation is taken to have gone
+# astray: coarse cloth may fold another way.
+_ASTRAY = 1.2
 # A step shorter than this, in sizes that matter, says nothing about slopes.
 _TELLING = 0.03
 
@@ -84,7 +89,9 @@ def fit_all(
 ) -> list[Fit]:
     """Returns a fit for each set of effects in `start`; all run side by side.
 
-    Simulations are run at the coarsest level that tells the effects.
+    Simulations are run at the coarsest level that tells the effects. Cloth that coarse may fold
+    another way than what was measured: where a fit makes a recording much worse, that recording is
+    simulated at the scenario's level from then on.
 
     Args:
         experiment: with its recordings.
@@ -95,25 +102,34 @@ def fit_all(
         iterations: of Gauss–Newton.
         progress: called after each replay.
     """
-    w = evidence.whitening
+    recordings = len(experiment.recordings)
     sets = [tuple(effects) for effects in start]
-    levels = [level_of(*effects) for effects in sets]
-    told = experiment.tell([(level, tuple(about)) for level in levels], progress)
-    base = [w.vector(t) for t in told]
+    levels: list[tuple[Level, ...]] = [(level_of(*effects),) * recordings for effects in sets]
+
+    def changes(jobs: Sequence[_Job]) -> list[FloatArray]:
+        told = experiment.tell([*jobs, *((level, tuple(about)) for level, _ in jobs)], progress)
+        vectors = [evidence.whitening.vector(t) for t in told]
+        return [v - zero for v, zero in zip(vectors, vectors[len(jobs) :], strict=False)]
+
     fits: list[Fit] = []
     for _ in range(iterations):
-        jobs: list[tuple[Level, Sequence[Effect]]] = []
-        for level, effects in zip(levels, sets, strict=True):
-            jobs.append((level, effects))
-            jobs += [(level, moved) for moved, _ in _moved(effects)]
-        vectors = iter([w.vector(t) for t in experiment.tell(jobs, progress)])
+        here = changes(list(zip(levels, sets, strict=True)))
+        levels = [
+            _raised(level, _astray(evidence, reference, reference + change))
+            for level, change in zip(levels, here, strict=True)
+        ]
+        # what was told already is remembered
+        here = changes(list(zip(levels, sets, strict=True)))
+        jobs = [
+            (level, moved)
+            for level, effects in zip(levels, sets, strict=True)
+            for moved, _ in _moved(effects)
+        ]
+        moved_on = iter(changes(jobs))
         fits = []
-        for effects, zero in zip(sets, base, strict=True):
-            here = next(vectors)
-            slopes = [(next(vectors) - here) / step for _, step in _moved(effects)]
-            fits.append(
-                _stepped(evidence, effects, reference + here - zero, np.stack(slopes, axis=1))
-            )
+        for effects, change in zip(sets, here, strict=True):
+            slopes = [(next(moved_on) - change) / step for _, step in _moved(effects)]
+            fits.append(_stepped(evidence, effects, reference + change, np.stack(slopes, axis=1)))
         sets = [f.effects for f in fits]
     return fits
 
@@ -141,6 +157,22 @@ def bettered(fit: Fit, change: FloatArray) -> Fit:
         return fit
     off = change - fit.slopes @ fit.step
     return replace(fit, slopes=fit.slopes + np.outer(off, fit.step / length2))
+
+
+def _astray(evidence: Evidence, before: FloatArray, after: FloatArray) -> list[bool]:
+    """Returns for each recording whether `after` (N,) is much worse than `before`."""
+    w = evidence.whitening
+    every = np.ones(len(w.data), dtype=np.bool_)
+    first, last = (
+        np.bincount(w.recording, evidence.extrapolation.without(w.data - told, every) ** 2)
+        for told in (before, after)
+    )
+    return list(last > _ASTRAY * first)
+
+
+def _raised(levels: Sequence[Level], astray: Sequence[bool]) -> tuple[Level, ...]:
+    """Returns the levels of recordings, the scenario's at least where one went astray."""
+    return tuple("scenario" if far else level for level, far in zip(levels, astray, strict=True))
 
 
 def _parameters(effects: Sequence[Effect]) -> list[tuple[int, Parameter]]:
