@@ -79,17 +79,21 @@ class SystemMatrix:
         z: FloatArray,
         tolerance: float,
         max_iterations: int,
+        resistance: FloatArray | None = None,
     ) -> tuple[int, float]:
         """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
 
         `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
         stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
         that `factor` leaves out and that are free here are preconditioned by the diagonal.
+        `resistance` (n,), kg, is added to the diagonal of A where nodes are free.
 
         Returns:
             Iterations done, and the last relative residual.
         """
         f = factor
+        if resistance is None:
+            resistance = np.zeros(0)
         return _filtered_cg(
             self._operator(block),
             (f.blocks, f.pattern.permutation),
@@ -101,6 +105,7 @@ class SystemMatrix:
             z,
             tolerance,
             max_iterations,
+            resistance,
         )
 
     def solve_pair(
@@ -181,14 +186,29 @@ def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
 
 @nb.njit(cache=True, nogil=True)
 def _filtered_cg(  # type: ignore[no-untyped-def]
-    operator, factor, masked, masked_scale, mode, normal, rhs, z, tolerance, max_iterations
+    operator,
+    factor,
+    masked,
+    masked_scale,
+    mode,
+    normal,
+    rhs,
+    z,
+    tolerance,
+    max_iterations,
+    resistance,
 ):
     n = rhs.shape[0]
     work = np.empty((n, 4))
     direction = np.empty((n, 3))
     product = np.empty((n, 3))
     preconditioned = np.empty((n, 3))
-    preconditioner = (factor, masked, masked_scale, mode, normal, work)
+    # what resists is stiff by itself: D M⁻¹ D, D² = P_ii / (P_ii + c_i), takes care of it
+    damped = np.empty(resistance.shape[0])
+    for i in range(damped.shape[0]):
+        damped[i] = 1.0 / np.sqrt(1.0 + resistance[i] * masked_scale[i])
+    scaled = np.empty((resistance.shape[0], 3))
+    preconditioner = (factor, masked, masked_scale, mode, normal, work, damped, scaled)
 
     residual = rhs.copy()
     project(residual, mode, normal)
@@ -196,6 +216,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     floor = max(dot(residual, preconditioned), 1e-300)
 
     _apply(operator, z, residual)
+    _resist(resistance, z, residual)
     for i in range(n):
         for c in range(3):
             residual[i, c] = rhs[i, c] - residual[i, c]
@@ -206,6 +227,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     iterations = 0
     while iterations < max_iterations and rho > tolerance * tolerance * floor:
         _apply(operator, direction, product)
+        _resist(resistance, direction, product)
         project(product, mode, normal)
         curvature = dot(direction, product)
         if curvature <= 0.0:
@@ -282,13 +304,34 @@ def _release(z, masked):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
+def _resist(resistance, z, out):  # type: ignore[no-untyped-def]
+    """Adds c z to `out` (n,3); `resistance` c is (n,) or empty."""
+    for i in range(resistance.shape[0]):
+        if resistance[i] > 0.0:
+            for c in range(3):
+                out[i, c] += resistance[i] * z[i, c]
+
+
+@nb.njit(cache=True, nogil=True)
 def _precondition(preconditioner, residual, out):  # type: ignore[no-untyped-def]
-    factor, masked, masked_scale, mode, normal, work = preconditioner
+    factor, masked, masked_scale, mode, normal, work, damped, scaled = preconditioner
     blocks, permutation = factor
-    solve_into(blocks, permutation, residual, out, work)
+    if damped.shape[0] > 0:
+        for i in range(residual.shape[0]):
+            for c in range(3):
+                scaled[i, c] = damped[i] * residual[i, c]
+        solve_into(blocks, permutation, scaled, out, work)
+        for i in range(residual.shape[0]):
+            for c in range(3):
+                out[i, c] *= damped[i]
+    else:
+        solve_into(blocks, permutation, residual, out, work)
     for i in range(residual.shape[0]):
         if masked[i]:
             out[i, 0] = masked_scale[i] * residual[i, 0]
             out[i, 1] = masked_scale[i] * residual[i, 1]
             out[i, 2] = masked_scale[i] * residual[i, 2]
+            if damped.shape[0] > 0:
+                for c in range(3):
+                    out[i, c] *= damped[i] ** 2
     project(out, mode, normal)

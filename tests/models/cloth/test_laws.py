@@ -167,22 +167,16 @@ def _capstan(scheme: str, mu: float, h: float, speed: float) -> float:
     return float(np.mean(tight[late]) / np.mean(slack[late]))
 
 
+@pytest.mark.parametrize("scheme", ["one_step", "implicit"])
 @pytest.mark.parametrize("mu", [0.2, 0.5])
-def test_tension_around_a_drum_grows_as_the_capstan_says(mu: float) -> None:
+def test_tension_around_a_drum_grows_as_the_capstan_says(scheme: str, mu: float) -> None:
     """T₂ / T₁ = exp(μ φ), φ = π."""
-    assert _capstan("one_step", mu, 0.004, 0.002) == pytest.approx(np.exp(mu * np.pi), rel=0.05)
+    assert _capstan(scheme, mu, 0.004, 0.002) == pytest.approx(np.exp(mu * np.pi), rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "low", "high"), [("one_step", 0.95, 1.05), ("implicit", 0.8, 1.05)]
-)
-def test_tight_tube_is_pulled_over_a_limb_at_its_belt_friction(
-    scheme: str, low: float, high: float
-) -> None:
-    """A tube stretched by ε around a limb presses with k ε / r: F = 2π μ k ε L.
-
-    The plant's active set lets some nodes slip against their friction: 7 to 15 % too little.
-    """
+@pytest.mark.parametrize("scheme", ["one_step", "implicit"])
+def test_tight_tube_is_pulled_over_a_limb_at_its_belt_friction(scheme: str) -> None:
+    """A tube stretched by ε around a limb presses with k ε / r: F = 2π μ k ε L."""
     around, rows, length, limb, mu = 24, 16, 0.15, 0.05, 0.3
     strain = 0.06
     m = Material(0.2, 400.0, 1e-6, 0.02, mu, 1e-3)
@@ -212,7 +206,7 @@ def test_tight_tube_is_pulled_over_a_limb_at_its_belt_friction(
     # The plant keeps faces clear of the limb, too, so that the nodes lie a little outside.
     girth = np.linalg.norm(run.x[: held[0], :2], axis=1).mean() / rest - 1.0
     expected = 2.0 * np.pi * mu * m.stretch_stiffness * girth * touching
-    assert low * expected < np.mean(pull[-60:]) < high * expected
+    assert np.mean(pull[-60:]) == pytest.approx(expected, rel=0.05)
 
 
 def _incline(angle: float) -> Obstacles:
