@@ -132,7 +132,33 @@ def compare(experiment: Experiment, progress: Callable[[], None] | None = None) 
     told = dict(
         zip(order, experiment.tell([(level, ()) for level in order], progress), strict=True)
     )
-    w = whiten(experiment.recordings, experiment.samples, told["scenario"], told["refined"])
+    return _compared(experiment, told, told["scenario"], told["refined"])
+
+
+def compare_with(
+    experiment: Experiment,
+    comparison: Comparison,
+    scenario: Sequence[Told],
+    refined: Sequence[Told],
+) -> Comparison:
+    """Returns the same simulations against data that are whitened by the numerics of others.
+
+    Args:
+        experiment: with its recordings.
+        comparison: of all levels.
+        scenario: what the scenario's simulation says with some effects.
+        refined: what the refined one says with the same.
+    """
+    return _compared(experiment, comparison.told, scenario, refined)
+
+
+def _compared(
+    experiment: Experiment,
+    told: dict[Level, list[Told]],
+    scenario: Sequence[Told],
+    refined: Sequence[Told],
+) -> Comparison:
+    w = whiten(experiment.recordings, experiment.samples, scenario, refined)
     vector = {level: w.vector(t) for level, t in told.items()}
     halving = vector["refined"] - vector["doubled"]
     return Comparison(w, told, vector, Extrapolation(halving, w.voice))

@@ -125,12 +125,12 @@ def explain(
     """
     rng = np.random.default_rng(seed)
     stage("comparing")
-    comparison = compare(experiment, progress)
-    found = Search(experiment, comparison, rng, stage, progress).run()
+    found = Search(experiment, compare(experiment, progress), rng, stage, progress).run()
+    comparison = found.comparison
     w = comparison.whitening
     off = comparison.vector["scenario"] - comparison.vector["refined"]
     numerics = _rms(w.size(off), ~w.is_force)
-    return _concluded(comparison, found, _coarse(comparison, numerics), numerics, rng)
+    return _concluded(found, _coarse(comparison, numerics), numerics, rng)
 
 
 def _coarse(comparison: Comparison, numerics: float) -> list[Cause]:
@@ -170,13 +170,9 @@ def _scores(found: Found) -> list[Score]:
 
 
 def _concluded(
-    comparison: Comparison,
-    found: Found,
-    coarse: list[Cause],
-    numerics: float,
-    rng: np.random.Generator,
+    found: Found, coarse: list[Cause], numerics: float, rng: np.random.Generator
 ) -> Explanation:
-    w = comparison.whitening
+    comparison, w = found.comparison, found.comparison.whitening
     physical = _causes(found)
     predicted = found.model.predicted
     scenario, refined = comparison.vector["scenario"], found.plain.predicted

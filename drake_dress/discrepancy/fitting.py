@@ -29,6 +29,9 @@ _DIFFERENCE, _TRUST = 0.25, 4.0
 # How much a fit may raise what a recording has lost, before its simulation is taken to have gone
 # astray: coarse cloth may fold another way.
 _ASTRAY = 1.2
+# A block of a voice in which this much of the noise's variance is left counts less, as much less as
+# more is left: cloth that snaps a moment early says nothing about parameters. So often again.
+_PLAUSIBLE, _REWEIGHTED = 2.0, 3
 # A step shorter than this, in sizes that matter, says nothing about slopes.
 _TELLING = 0.03
 
@@ -134,6 +137,38 @@ def fit_all(
     return fits
 
 
+def with_slopes(
+    experiment: Experiment,
+    whitening: Whitening,
+    fit: Fit,
+    told: FloatArray,
+    progress: Callable[[], None] | None = None,
+) -> Fit:
+    """Returns a fit that starts from its effects anew, with the refined simulation's own slopes.
+
+    Args:
+        experiment: with its recordings.
+        whitening: of them.
+        fit: whose effects are taken.
+        told: (N,) whitened, what the refined simulation says with them.
+        progress: called after each replay.
+    """
+    # central ones: what snaps between two of three points does so on both sides of the middle
+    both = (_moved(fit.effects), _moved(fit.effects, -_DIFFERENCE))
+    jobs: list[tuple[Level, Sequence[Effect]]] = [
+        ("refined", effects) for side in both for effects, _ in side
+    ]
+    vectors = [whitening.vector(t) for t in experiment.tell(jobs, progress)]
+    count = len(both[0])
+    slopes = []
+    for k, ((_, ahead), (_, behind)) in enumerate(zip(*both, strict=True)):
+        # at a bound both are on one side
+        low, at = (told, 0.0) if ahead == behind else (vectors[count + k], behind)
+        slopes.append((vectors[k] - low) / (ahead - at))
+    nothing = np.zeros_like(told)
+    return Fit(fit.effects, fit.std, told, nothing, np.stack(slopes, axis=1), np.zeros(count))
+
+
 def fit_again(evidence: Evidence, fit: Fit, told: FloatArray) -> Fit:
     """Returns a fit one step on, from what a better simulation says, with the slopes known so far.
 
@@ -180,12 +215,14 @@ def _parameters(effects: Sequence[Effect]) -> list[tuple[int, Parameter]]:
     return [(k, p) for k, e in enumerate(effects) for p in e.parameters()]
 
 
-def _moved(effects: Sequence[Effect]) -> list[tuple[tuple[Effect, ...], float]]:
+def _moved(
+    effects: Sequence[Effect], by: float = _DIFFERENCE
+) -> list[tuple[tuple[Effect, ...], float]]:
     """Returns the effects with one parameter a little further, and by how much, for each."""
     found = []
     for k, p in _parameters(effects):
         changed = list(effects)
-        changed[k] = shifted(effects[k], p.name, _DIFFERENCE * p.typical)
+        changed[k] = shifted(effects[k], p.name, by * p.typical)
         step = (getattr(changed[k], p.name) - getattr(effects[k], p.name)) / p.typical
         found.append((tuple(changed), step))
     return found
@@ -197,7 +234,7 @@ def _stepped(
     """Returns the fit one Gauss–Newton step on from effects with which (N,) is told.
 
     What finer numerics change moves the parameters too: a share of that is part of their
-    uncertainty.
+    uncertainty. Blocks that stay far off are weighed down (iteratively reweighted least squares).
     """
     w, free = evidence.whitening, _parameters(effects)
     now = np.array([getattr(effects[k], p.name) for k, p in free])
@@ -206,18 +243,31 @@ def _stepped(
     high = np.minimum((np.array([p.high for _, p in free]) - now) / size, _TRUST)
     residual = w.data - told
 
-    def solved(rows: BoolArray) -> tuple[Solution, FloatArray, FloatArray]:
+    def solved(rows: BoolArray) -> tuple[Solution, FloatArray, FloatArray, FloatArray]:
         reduced, left = (evidence.extrapolation.without(v, rows) for v in (slopes, residual))
-        found = solve_pooled(slopes[rows], reduced[rows], left[rows], w.voice[rows], low, high)
-        return found, reduced, left
+        after, trust = left, np.ones_like(left)
+        for _ in range(_REWEIGHTED):
+            trust = _trust(w, after, rows)
+            found = solve_pooled(
+                trust[rows, None] * slopes[rows],
+                trust[rows, None] * reduced[rows],
+                trust[rows] * left[rows],
+                w.voice[rows],
+                low,
+                high,
+            )
+            after = left - reduced @ found.x
+        return found, trust[:, None] * reduced, trust * after, trust
 
     every = np.ones(len(residual), dtype=np.bool_)
-    best, reduced, left = solved(every)
+    best, reduced, after, trust = solved(every)
     change = np.zeros_like(residual)
     for rows in w.trained_on:
         change[~rows] = slopes[~rows] @ (solved(rows)[0].x - best.x)
-    drawn = _robust_std(reduced, left - reduced @ best.x, w.block)
-    biased = NUMERICS_SHARE * misleading(slopes, reduced, evidence.numerics, w.voice)
+    drawn = _robust_std(reduced, after, w.block)
+    biased = NUMERICS_SHARE * misleading(
+        trust[:, None] * slopes, reduced, trust * evidence.numerics, w.voice
+    )
     values = iter(now + best.x * size)
     spread = iter(size * np.hypot(np.maximum(drawn, best.std), biased))
     return Fit(
@@ -228,6 +278,15 @@ def _stepped(
         slopes,
         best.x,
     )
+
+
+def _trust(w: Whitening, residual: FloatArray, rows: BoolArray) -> FloatArray:
+    """Returns (N,) the root of the weight of each entry's block and kind of signal."""
+    part = 2 * w.block + w.is_force
+    count = np.maximum(np.bincount(part[rows], minlength=part.max() + 1), 1)
+    size = np.bincount(part[rows], residual[rows] ** 2, part.max() + 1) / count
+    root: FloatArray = np.sqrt(np.minimum(1.0, _PLAUSIBLE / np.maximum(size, _PLAUSIBLE)))[part]
+    return root
 
 
 def _robust_std(

@@ -16,12 +16,14 @@ from drake_dress.discrepancy.attribution import (
     Comparison,
     Screened,
     block_loss,
+    compare_with,
     probe,
     screen,
     shortlist,
 )
+from drake_dress.discrepancy.candidates import Candidate
 from drake_dress.discrepancy.experiment import Experiment
-from drake_dress.discrepancy.fitting import Evidence, Fit, bettered, fit_again, fit_all
+from drake_dress.discrepancy.fitting import Evidence, Fit, bettered, fit_again, fit_all, with_slopes
 from drake_dress.models.effects.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
@@ -87,6 +89,7 @@ class Found:
     """Where the search ended.
 
     Attributes:
+        comparison: of the levels without effects, whitened as the models are.
         plain: without effects; model: with all that was found.
         named: in the order found.
         rival: another effect in the last one's place and the model with it, if that explains nearly
@@ -95,6 +98,7 @@ class Found:
         fitted: effect and gain of the candidates that were fitted in the first round, by name.
     """
 
+    comparison: Comparison
     plain: Model
     model: Model
     named: tuple[Named, ...]
@@ -124,30 +128,32 @@ class Search:
     ) -> None:
         self._experiment, self._rng = experiment, rng
         self._stage, self._progress = stage, progress
+        self._columns: list[tuple[Candidate, FloatArray]] = []
+        self._take(comparison, comparison.vector["refined"] - comparison.vector["scenario"])
+
+    def _take(self, comparison: Comparison, numerics: FloatArray) -> None:
+        """Goes on with a comparison; refining the scenario's simulation has changed `numerics`."""
         self._comparison, self._whitening = comparison, comparison.whitening
-        self._evidence = Evidence.of(
-            self._whitening,
-            comparison.extrapolation,
-            comparison.vector["refined"] - comparison.vector["scenario"],
-        )
+        self._evidence = Evidence.of(self._whitening, comparison.extrapolation, numerics)
         self._plain = self._model(None, comparison.vector["refined"])
 
     def run(self) -> Found:
         """Returns what was found."""
         self._stage("screening effects")
-        columns = probe(self._experiment, self._comparison, self._progress)
-        first = screened = screen(self._comparison, columns, self._plain.reference)
+        self._columns = probe(self._experiment, self._comparison, self._progress)
+        first = screened = screen(self._comparison, self._columns, self._plain.reference)
         model, named = self._plain, list[Named]()
         fitted: dict[str, tuple[Effect, float]] = {}
         while len(model.effects) < _MOST_CAUSES:
+            begun = model is self._plain
             there = {e.NAME for e in model.effects}
             chosen = [s for s in shortlist(screened) if s.candidate.name not in there]
-            least = _LEAST_GAIN if model is self._plain else _FURTHER
+            least = _LEAST_GAIN if begun else _FURTHER
             if not chosen or chosen[0].gain < 0.5 * least:
                 break
             self._stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
             fits = self._fits(model, [(*model.effects, s.start) for s in chosen])
-            if model is self._plain:
+            if begun:
                 fitted = {f.effects[-1].NAME: (f.effects[-1], self._gain(model, f)) for f in fits}
             best, rest, confidence = self._best(model, fits)
             gain = self._gain(model, best)
@@ -158,15 +164,64 @@ class Search:
                 other = Named(rest.effects[-1].NAME, self._gain(model, rest), 1.0 - confidence)
                 both = self._both(model, best, rest)
                 if both is None:
-                    return Found(self._plain, best, (*named, *news), (other, rest), first, fitted)
+                    named = [*named, *news]
+                    return self._found(best, named, (other, rest), first, fitted)
                 news = [
                     replace(news[0], confidence=self._confidence(rest, [both])),
                     replace(other, confidence=self._confidence(best, [both])),
                 ]
                 best = both
+            best = self._with_its_numerics(best)
+            if begun and not self._is_gain(best):
+                return self._found(self._plain, [], None, first, fitted)
             model, named = self._lean(best, named + news)
-            screened = screen(self._comparison, columns, model.reference)
-        return Found(self._plain, model, tuple(named), None, first, fitted)
+            screened = screen(self._comparison, self._columns, model.reference)
+        return self._found(model, named, None, first, fitted)
+
+    def _found(
+        self,
+        model: Model,
+        named: Sequence[Named],
+        rival: tuple[Named, Model] | None,
+        screened: list[Screened],
+        fitted: dict[str, tuple[Effect, float]],
+    ) -> Found:
+        return Found(self._comparison, self._plain, model, tuple(named), rival, screened, fitted)
+
+    def _is_gain(self, model: Model) -> bool:
+        """Returns whether a model is surely better than none."""
+        return (
+            self._gain(self._plain, model) >= _LEAST_GAIN
+            and self._confidence(self._plain, [model]) >= _SURELY
+        )
+
+    def _with_its_numerics(self, model: Model) -> Model:
+        """Returns a model refined until it is settled, judged by the numerics that it has itself.
+
+        What refining changes depends on the effects: cloth that snaps from a limb does so a little
+        earlier or later on another mesh, with the friction that is there and not with the one
+        that the scenario has. From here on all is whitened by that. Coarse simulations have led
+        here; the last steps are led by the refined one's own slopes: where cloth snaps, the others'
+        may point the wrong way.
+        """
+        if model.fit is None:
+            return model
+        self._stage(f"weighing the numerics with {', '.join(e.NAME for e in model.effects)}")
+        scenario, refined = self._experiment.tell(
+            [("scenario", model.effects), ("refined", model.effects)], self._progress
+        )
+        last = self._whitening
+        comparison = compare_with(self._experiment, self._comparison, scenario, refined)
+        w = comparison.whitening
+
+        self._columns = [
+            (candidate, np.stack([w.of_size(last.size(c)) for c in columns.T], axis=1))
+            for candidate, columns in self._columns
+        ]
+        told = w.vector(refined)
+        self._take(comparison, told - w.vector(scenario))
+        fit = with_slopes(self._experiment, w, model.fit, told, self._progress)
+        return self._settled(self._model(fit, told, settled=False))
 
     def _gain(self, before: Model, after: Model) -> float:
         """Returns the share of the held-out loss of one model that another takes away."""
@@ -213,18 +268,15 @@ class Search:
         self._stage(f"refining {', '.join(f.effects[-1].NAME for f in ranked)}")
         ranked = [self._refined(f) for f in ranked]
         for _ in range(_POLISHED):
-            # who falls behind is not refined further
-            due = 1 if confidence >= _CERTAIN else len(ranked)
-            if all(f.settled for f in ranked[:due]):
+            if confidence >= _CERTAIN or all(f.settled for f in ranked):
                 break
-            ranked[:due] = [self._polished(f) for f in ranked[:due]]
+            ranked = [self._polished(f) for f in ranked]
             ranked.sort(key=self._loss)
             confidence = self._confidence(before, ranked)
         return ranked[0], ranked[1] if len(ranked) > 1 else None, confidence
 
     def _settled(self, model: Model) -> Model:
-        """Returns a fit refined until it is settled."""
-        model = self._refined(model)
+        """Returns a refined fit refined further until it is settled."""
         for _ in range(_POLISHED):
             model = self._polished(model)
         return model
@@ -238,7 +290,7 @@ class Search:
         (both,) = self._fits(one, [effects])
         if self._gain(one, both) < _FURTHER:
             return None
-        both = self._settled(both)
+        both = self._settled(self._refined(both))
         return both if self._gain(one, both) >= _FURTHER else None
 
     def _lean(self, model: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
@@ -251,7 +303,7 @@ class Search:
             # the refined simulation may better a fit, but not by so much
             if self._gain(leaner, model) > 5.0 * _FURTHER:
                 continue
-            leaner = self._settled(leaner)
+            leaner = self._settled(self._refined(leaner))
             if self._gain(leaner, model) < _FURTHER:
                 model, named = leaner, [n for n in named if n.name != name]
         if len(named) == 1:

@@ -79,11 +79,17 @@ class Whitening:
 
     def size(self, residual: FloatArray) -> FloatArray:
         """Returns a whitened residual (N,) in m and N."""
-        begin, parts = 0, []
-        for f in self.filters:
-            parts.append(f.unwhitened(residual[begin : begin + f.count]))
-            begin += f.count
-        return np.concatenate(parts)
+        parts = zip(self.filters, self._split(residual), strict=True)
+        return np.concatenate([f.unwhitened(part) for f, part in parts])
+
+    def of_size(self, values: FloatArray) -> FloatArray:
+        """Returns (N,) whitened what is given in m and N, (N,): the inverse of `size`."""
+        parts = zip(self.filters, self._split(values), strict=True)
+        return np.concatenate([f.innovations(part) for f, part in parts])
+
+    def _split(self, values: FloatArray) -> list[FloatArray]:
+        """Returns the entries of each recording."""
+        return np.split(values, np.cumsum([f.count for f in self.filters])[:-1])
 
 
 class NoiseFilter:
@@ -109,7 +115,12 @@ class NoiseFilter:
 
     def whitened(self, values: FloatArray) -> FloatArray:
         """Returns (count,) the innovations of `values` (S,C), in standard deviations."""
-        out = np.where(self._kept, values, 0.0)
+        return self.innovations(values[self._kept])
+
+    def innovations(self, values: FloatArray) -> FloatArray:
+        """Returns (count,) the innovations of values (count,), in standard deviations."""
+        out = np.zeros(self._kept.shape)
+        out[self._kept] = values
         _whiten(out, self._numerics, self._kept, self._decay, self._gain, self._scale)
         kept: FloatArray = out[self._kept]
         return kept

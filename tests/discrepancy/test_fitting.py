@@ -1,12 +1,14 @@
 """Fits to simulations that are made up here: linear, but for cloth that folds otherwise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from drake_dress.discrepancy.attribution import Comparison, screen
 from drake_dress.discrepancy.candidates import Candidate, Probe
 from drake_dress.discrepancy.experiment import LEVELS, Told
-from drake_dress.discrepancy.fitting import Evidence, fit_all
+from drake_dress.discrepancy.fitting import Evidence, fit_again, fit_all, with_slopes
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.regression import Extrapolation
 from drake_dress.discrepancy.whitening import whiten
@@ -41,6 +43,9 @@ class MadeUp:
                 )
             )
         self.samples = [np.arange(SAMPLES)] * COUNT
+
+    def slope(self, i):
+        return self._slope[i]
 
     def tell(self, jobs, progress=None):
         answer = []
@@ -120,3 +125,40 @@ def test_screening_does_not_hold_one_such_recording_against_a_candidate(made_up)
     share = np.sum(residual[others] ** 2) / np.sum(residual**2)
     assert best.gain > 0.8 * share
     assert best.start.added == pytest.approx(TRUTH, rel=0.3)
+
+
+def test_whitening_can_be_undone(made_up):
+    w = comparison(made_up).whitening
+    values = np.random.default_rng(0).standard_normal(len(w.data))
+    np.testing.assert_allclose(w.of_size(w.size(values)), values, atol=1e-12)
+
+
+def test_half_a_second_in_which_cloth_snaps_does_not_move_a_parameter():
+    lab = MadeUp(np.random.default_rng(0), folds_from=np.inf)
+    rows = slice(50, 75)
+    # a marker or two may do anything; the whole garment, off by 10 to 30 mm, is what a snap does
+    seen = lab.recordings[0].marker_position.copy()
+    seen[rows] += 0.2 * lab.slope(0)[rows] + 0.005
+    lab.recordings[0] = replace(lab.recordings[0], marker_position=seen)
+    found = comparison(lab)
+    (fit,) = fit_all(lab, evidence(found), found.vector["refined"], [[SurfaceDensity(added=0.03)]])
+    assert fit.effects[0].added == pytest.approx(TRUTH, abs=1e-3)
+
+
+def test_refined_slopes_lead_to_the_truth_from_where_coarse_ones_have_led(made_up):
+    found = comparison(made_up)
+    (fit,) = fit_all(
+        made_up, evidence(found), found.vector["refined"], [[SurfaceDensity(added=0.03)]]
+    )
+    off = replace(fit, effects=(SurfaceDensity(added=0.03),))
+    (told,) = made_up.tell([("refined", off.effects)])
+    told = found.whitening.vector(told)
+    begun = with_slopes(made_up, found.whitening, off, told)
+    again = fit_again(evidence(found), begun, told)
+    assert abs(again.effects[0].added - TRUTH) < 4.0 * again.std["surface_density"]["added"]
+    # a bound on one side leaves a difference to the other
+    lowest = next(p.low for p in SurfaceDensity.parameters())
+    at_bound = with_slopes(
+        made_up, found.whitening, replace(off, effects=(SurfaceDensity(added=lowest),)), told
+    )
+    assert np.isfinite(at_bound.slopes).all()
