@@ -43,8 +43,6 @@ _WINDOW, _LEAST_SAMPLES = 1.0, 5
 _REMEMBERED = 48
 # What a simulation says at most, m and N: one that swings up says nothing, and must not overflow.
 _FAR, _HARD = 10.0, 1e3
-# A mount gives way to the force of the step before: with the screening level's step that swings up.
-_NEED_SHORT_STEPS = frozenset({"gripper_compliance"})
 
 
 @dataclass(frozen=True)
@@ -98,8 +96,7 @@ def level_of(*effects: Effect) -> Level:
     Coarse cloth bridges what is round: of what friction changes at the refined level, the screening
     level told a quarter (correlation 0.28), the scenario's most (0.85).
     """
-    needy = NEED_CONTACT | _NEED_SHORT_STEPS
-    return "scenario" if any(e.NAME in needy for e in effects) else "screening"
+    return "scenario" if any(e.NAME in NEED_CONTACT for e in effects) else "screening"
 
 
 def levels(numerics: Numerics) -> dict[Level, Numerics]:

@@ -164,13 +164,17 @@ class Replayer:
         held = self._held_at(clock, effects)
         seen, rate, known = self._targets(clock, effects)
         joints, joint_rate = self._joints(clock, effects, person.posed)
-        mounts, mount = Mounts(effects), MountState.at_rest(person.LIMBS)
         if start is None:
             x = self._settle(effects, self.settled(), _AGAIN)
             v = np.zeros_like(x)
         else:
             x, v = start
         state = replace(ClothState.at_rest(x), v=v)
+        mounts = Mounts(effects)
+        away = x[self._held] - held[0]
+        given = np.stack([away[self._side == i].mean(axis=0) for i in (0, 1)])
+        mount = mounts.loaded(given, person.LIMBS)
+        moved = mounts.moved_mass(cloth, self._side)
 
         markers = np.empty((steps + 1, *seen.shape[1:]))
         force, touching = np.zeros((steps + 1, 2, 3)), np.zeros(steps + 1)
@@ -186,7 +190,7 @@ class Replayer:
                 bodies = person.obstacles(joints[k], joint_rate[k])
             if not mounts.rigid:
                 limbs = person.limb_forces(state.owner, state.reaction)
-                mount = mounts.step(mount, self._forces(state), limbs, h)
+                mount = mounts.step(mount, self._forces(state), limbs, h, moved)
                 bodies = person.displaced(bodies, mount.limb, mount.limb_rate)
             target = held[k + 1] + mount.held[self._side]
             pull = Influences()
@@ -299,6 +303,7 @@ class Replayer:
             bodies = Obstacles.none()
         held = self._held_at(clock, effects)[0]
         mounts, mount = Mounts(effects), MountState.at_rest(person.LIMBS)
+        moved = mounts.moved_mass(cloth, self._side)
         state = ClothState.at_rest(x)
         steps = round(how.duration / h)
         for k in range(steps):
@@ -308,7 +313,7 @@ class Replayer:
                 around = replace(bodies, radius=grown * bodies.radius)
             if not mounts.rigid and how.person == 1.0:
                 limbs = person.limb_forces(state.owner, state.reaction)
-                mount = mounts.step(mount, self._forces(state), limbs, h)
+                mount = mounts.step(mount, self._forces(state), limbs, h, moved)
                 around = person.displaced(bodies, mount.limb, mount.limb_rate)
             target = held + mount.gripper[self._side]
             pull = self._pull(cloth, state, seen, np.zeros_like(seen), known, how.gain)

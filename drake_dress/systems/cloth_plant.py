@@ -85,6 +85,7 @@ class ClothPlant(LeafSystem):
         self._radius = np.array([c.radius for c in capsules])
 
         self._mounts = mounts or Mounts([])
+        self._moved_mass = self._mounts.moved_mass(cloth, self._side)
         limbs = [name for name in self._names if name.endswith("arm")]
         self._limb_of = np.array(
             [limbs.index(c.body) if c.body in limbs else -1 for c in self._capsules]
@@ -177,7 +178,8 @@ class ClothPlant(LeafSystem):
         pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
         mount = MountState.of(context.get_discrete_state(self._mount).value())
         force = limb_forces(self._limb_of, len(mount.limb), state.owner, state.reaction)
-        return self._mounts.step(mount, np.stack(pulled), force, self.cloth.time_step)
+        h = self.cloth.time_step
+        return self._mounts.step(mount, np.stack(pulled), force, h, self._moved_mass)
 
     def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""

@@ -25,7 +25,7 @@ from drake_dress.models.effects.fabric import (
 )
 from drake_dress.models.effects.grip import GripperCompliance, GripperLatency, GripperSlip
 from drake_dress.models.effects.mass import GravityTilt, LocalMass, SurfaceDensity
-from drake_dress.models.effects.mounts import Mounts, MountState
+from drake_dress.models.effects.mounts import GRIPPER_TIME, Mounts, MountState
 from drake_dress.models.effects.person import LimbCompliance, LimbRadius
 from drake_dress.models.effects.sensing import CameraRotation, CameraTranslation, TimeOffset
 from drake_dress.models.human.body import BodyMeasures
@@ -302,6 +302,41 @@ def test_a_compliant_mount_comes_to_rest_at_compliance_times_force(kind, name):
     # critically damped: it never swings past
     assert passed <= 0.03 + 1e-6
     assert not np.any(MountState.of(state.flat()).flat() - state.flat())
+
+
+@pytest.mark.parametrize("h", [0.001, 0.004, 0.01])
+@pytest.mark.parametrize("share", [1.0, 2.0])
+def test_a_compliant_gripper_that_is_lighter_than_its_load_comes_to_rest(h, share):
+    """With the load's force a step late; what it moves is known, or taken for too much."""
+    load, compliance, weight = 0.3, 0.02, np.array([0.0, 0.0, -9.81])
+    assert load > 5.0 * GRIPPER_TIME**2 / compliance
+    mounts = Mounts([GripperCompliance(compliance=compliance)])
+    state, path = MountState.at_rest(4), []
+    for _ in range(round(4.0 / h)):
+        force = load * (weight - state.gripper_change / h)
+        moved = np.full(2, share * load)
+        state = mounts.step(state, force, np.zeros((4, 3)), h, moved)
+        path.append(state.gripper[0, 2])
+    rest = compliance * load * weight[2]
+    assert path[-1] == pytest.approx(rest, rel=0.01)
+    # mount and load together swing with damping: (τ² + c m) u'' + 2 τ u' + u = c m g
+    inertia = GRIPPER_TIME**2 + compliance * load
+    decay = GRIPPER_TIME / inertia
+    most = rest * (1.0 + np.exp(-np.pi * decay / np.sqrt(1.0 / inertia - decay**2)))
+    assert min(path) == pytest.approx(most, rel=0.1)
+
+
+def test_a_gripper_moves_more_of_a_garment_in_a_longer_step_and_never_more_than_all():
+    x, _ = sheet_mesh()
+    top = np.flatnonzero(x[:, 2] == 0.0)
+    mounts, moved = Mounts([GripperCompliance(compliance=0.01)]), []
+    for h in (0.001, 0.01, 0.1, 1.0):
+        garment = cloth([], top, step=h)
+        moved.append(mounts.moved_mass(garment, np.zeros(len(top), dtype=np.int32))[0])
+    assert garment.mass[top].sum() < moved[0] < moved[1] < moved[2] < moved[3]
+    assert moved[3] == pytest.approx(garment.mass.sum(), rel=0.01)
+    assert moved[3] <= garment.mass.sum()
+    assert not Mounts([]).moved_mass(garment, np.zeros(len(top), dtype=np.int32)).any()
 
 
 def test_cloth_creeps_out_of_a_gripper_along_the_pull_beyond_the_threshold():
