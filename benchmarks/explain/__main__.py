@@ -46,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     workers = max(1, (os.cpu_count() or 1) // options.jobs)
     kept = {} if options.json is None else read_results(options.json)
     new = [case for case in chosen if case.name not in kept]
+    if options.kept:
+        chosen, new = [case for case in chosen if case.name in kept], []
     print(f"seed {options.seed}, {len(chosen)} cases, {len(new)} of them not run yet", flush=True)
     with caught_interrupt() as stop:
         for number, result in enumerate(_all(new, options.cache, options.jobs, workers, stop), 1):
@@ -185,6 +187,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--cache", type=Path, default=Path("out/bench-explain"), metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases side by side")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="reliability, SVG")
+    parser.add_argument(
+        "--kept", action="store_true", help="run nothing; tables of what the file of --json holds"
+    )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="results; what is there already is not run again"
     )

@@ -111,6 +111,8 @@ def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "2 cases, 0 of them not run yet" in said
     assert "nothing" in said and "100" in said
+    assert main([*words, "--only", "nothing,coarse", "--kept"]) == 0
+    assert "2 cases, 0 of them not run yet" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("content", ["{", "[1]", '[{"case": {"group": "effect"}}]', "[{}]"])
