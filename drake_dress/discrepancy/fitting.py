@@ -110,19 +110,22 @@ def fit_all(
     levels: list[tuple[Level, ...]] = [(level_of(*effects),) * recordings for effects in sets]
 
     def changes(jobs: Sequence[_Job]) -> list[FloatArray]:
-        told = experiment.tell([*jobs, *((level, tuple(about)) for level, _ in jobs)], progress)
+        bases = list(dict.fromkeys(level for level, _ in jobs))
+        told = experiment.tell([*jobs, *((level, tuple(about)) for level in bases)], progress)
         vectors = [evidence.whitening.vector(t) for t in told]
-        return [v - zero for v, zero in zip(vectors, vectors[len(jobs) :], strict=False)]
+        zero = dict(zip(bases, vectors[len(jobs) :], strict=True))
+        return [v - zero[level] for v, (level, _) in zip(vectors, jobs, strict=False)]
 
     fits: list[Fit] = []
     for _ in range(iterations):
         here = changes(list(zip(levels, sets, strict=True)))
-        levels = [
+        raised = [
             _raised(level, _astray(evidence, reference, reference + change))
             for level, change in zip(levels, here, strict=True)
         ]
-        # what was told already is remembered
-        here = changes(list(zip(levels, sets, strict=True)))
+        if raised != levels:
+            levels = raised
+            here = changes(list(zip(levels, sets, strict=True)))
         jobs = [
             (level, moved)
             for level, effects in zip(levels, sets, strict=True)

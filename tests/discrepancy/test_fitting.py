@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drake_dress.discrepancy.attribution import Comparison, screen
+from drake_dress.discrepancy.attribution import compare, screen
 from drake_dress.discrepancy.candidates import Candidate, Probe
-from drake_dress.discrepancy.experiment import LEVELS, Told
+from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.fitting import Evidence, fit_again, fit_all, with_slopes
 from drake_dress.discrepancy.recording import Recording
-from drake_dress.discrepancy.regression import Extrapolation
-from drake_dress.discrepancy.whitening import whiten
 from drake_dress.models.effects.mass import SurfaceDensity
 
 COUNT, SAMPLES, MARKERS, NOISE = 4, 200, 6, 1e-3
@@ -77,22 +75,13 @@ def made_up(request):
     return MadeUp(np.random.default_rng(request.param))
 
 
-def comparison(lab):
-    told = dict(zip(LEVELS, lab.tell([(level, ()) for level in LEVELS]), strict=True))
-    w = whiten(lab.recordings, lab.samples, told["scenario"], told["refined"])
-    vector = {level: w.vector(t) for level, t in told.items()}
-    return Comparison(
-        w, told, vector, Extrapolation(vector["refined"] - vector["doubled"], w.voice)
-    )
-
-
 def evidence(found):
     off = found.vector["refined"] - found.vector["scenario"]
     return Evidence.of(found.whitening, found.extrapolation, off)
 
 
 def test_a_recording_that_coarse_cloth_folds_otherwise_is_told_by_finer_cloth(made_up):
-    found = comparison(made_up)
+    found = compare(made_up)
     start = [[SurfaceDensity(added=0.03)]]
     made_up.told_at.clear()
     (fit,) = fit_all(made_up, evidence(found), found.vector["refined"], start)
@@ -106,7 +95,7 @@ def test_a_recording_that_coarse_cloth_folds_otherwise_is_told_by_finer_cloth(ma
 
 def test_where_nothing_folds_otherwise_all_is_told_by_the_coarsest():
     lab = MadeUp(np.random.default_rng(0), folds_from=np.inf)
-    found = comparison(lab)
+    found = compare(lab)
     lab.told_at.clear()
     (fit,) = fit_all(lab, evidence(found), found.vector["refined"], [[SurfaceDensity(added=0.03)]])
     assert abs(fit.effects[0].added - TRUTH) < 4.0 * fit.std["surface_density"]["added"]
@@ -114,7 +103,7 @@ def test_where_nothing_folds_otherwise_all_is_told_by_the_coarsest():
 
 
 def test_screening_does_not_hold_one_such_recording_against_a_candidate(made_up):
-    found = comparison(made_up)
+    found = compare(made_up)
     typical = SurfaceDensity(added=0.03)
     candidate = Candidate("surface_density", (Probe(typical, "added", -np.inf),))
     (told,) = made_up.tell([("screening", [typical])])
@@ -128,7 +117,7 @@ def test_screening_does_not_hold_one_such_recording_against_a_candidate(made_up)
 
 
 def test_whitening_can_be_undone(made_up):
-    w = comparison(made_up).whitening
+    w = compare(made_up).whitening
     values = np.random.default_rng(0).standard_normal(len(w.data))
     np.testing.assert_allclose(w.of_size(w.size(values)), values, atol=1e-12)
 
@@ -140,13 +129,13 @@ def test_half_a_second_in_which_cloth_snaps_does_not_move_a_parameter():
     seen = lab.recordings[0].marker_position.copy()
     seen[rows] += 0.2 * lab.slope(0)[rows] + 0.005
     lab.recordings[0] = replace(lab.recordings[0], marker_position=seen)
-    found = comparison(lab)
+    found = compare(lab)
     (fit,) = fit_all(lab, evidence(found), found.vector["refined"], [[SurfaceDensity(added=0.03)]])
     assert fit.effects[0].added == pytest.approx(TRUTH, abs=1e-3)
 
 
 def test_refined_slopes_lead_to_the_truth_from_where_coarse_ones_have_led(made_up):
-    found = comparison(made_up)
+    found = compare(made_up)
     (fit,) = fit_all(
         made_up, evidence(found), found.vector["refined"], [[SurfaceDensity(added=0.03)]]
     )

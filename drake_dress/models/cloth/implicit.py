@@ -216,7 +216,7 @@ class ImplicitCloth:
                 velocity,
                 tolerance,
                 self._max_iterations,
-                contact.resistance,
+                contact.resistance if contact.resistance.any() else None,
             )
             total += iterations
             impulse = self._system.product(velocity, self._block)
