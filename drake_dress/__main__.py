@@ -15,7 +15,7 @@ from drake_dress import __version__
 from drake_dress.errors import UserError
 
 UNUSABLE, INTERRUPTED = 2, 130
-BENCHMARKS = ("cloth", "explain")
+BENCHMARKS = ("cloth", "explain", "local")
 
 _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml
@@ -183,7 +183,7 @@ def _bench(words: list[str]) -> int:
     if arguments and not arguments[0].startswith("-"):
         name = arguments.pop(0)
     if name not in BENCHMARKS:
-        raise UserError("bench", name, f"is no benchmark, expected {' or '.join(BENCHMARKS)}")
+        raise UserError("bench", name, f"is no benchmark, expected one of {', '.join(BENCHMARKS)}")
     root = Path(drake_dress.__file__).parents[1]
     if not (root / "benchmarks" / name).is_dir():
         raise UserError("bench", name, f"{root} has no benchmarks/, expected a checkout")

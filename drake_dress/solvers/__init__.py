@@ -1,0 +1,1 @@
+"""Solvers that come with Drake, behind the interfaces of `models/`."""

@@ -1,0 +1,75 @@
+"""The local problem as a second-order cone programme, solved by Clarabel through Drake."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
+
+from drake_dress.models.control.local_problem import LocalProblem, LocalSolution, NormBounds
+
+
+def solve_cone_programme(
+    problem: LocalProblem, tolerance: float = 1e-8
+) -> tuple[LocalSolution, float]:
+    """Returns the optimum of a local problem, without multipliers, and Clarabel's own time, s.
+
+    Args:
+        problem: feasible.
+        tolerance: of Clarabel's gap and feasibility.
+    """
+    p = problem
+    steps, m = p.input_weight.shape
+    n = len(p.start)
+    program = MathematicalProgram()
+    v = program.NewContinuousVariables(steps, m, "v")
+    x = program.NewContinuousVariables(steps, n, "x")
+    b = p.input_matrix
+    dynamics = np.hstack([np.eye(n), -np.eye(n), -b])
+    for j in range(steps):
+        if j == 0:
+            program.AddLinearEqualityConstraint(
+                np.hstack([np.eye(n), -b]), p.start, np.concatenate([x[0], v[0]])
+            )
+        else:
+            program.AddLinearEqualityConstraint(
+                dynamics, np.zeros(n), np.concatenate([x[j], x[j - 1], v[j]])
+            )
+        _add_cost(program, p.state_weight[j + 1], p.state_target[j + 1], x[j])
+        _add_cost(program, p.input_weight[j], p.input_target[j], v[j])
+        _add_bounds(program, p.state_bounds, j + 1, x[j])
+        _add_bounds(program, p.input_bounds, j, v[j])
+    options = SolverOptions()
+    for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+        options.SetOption(ClarabelSolver.id(), name, tolerance)
+    result = ClarabelSolver().Solve(program, None, options)
+    inputs = result.GetSolution(v)
+    details = result.get_solver_details()
+    solution = LocalSolution(
+        v=inputs,
+        x=p.states(inputs),
+        state_multiplier=np.zeros(p.state_bounds.radius.shape),
+        input_multiplier=np.zeros(p.input_bounds.radius.shape),
+        cost=p.cost(inputs),
+        violation=p.violation(inputs),
+        sweeps=0,
+        interior_steps=int(details.iterations),
+        converged=result.is_success(),
+    )
+    return solution, float(details.solve_time)
+
+
+def _add_cost(program, weight, target, z) -> None:  # type: ignore[no-untyped-def]
+    if np.any(weight > 0.0):
+        program.AddQuadraticCost(
+            np.diag(2.0 * weight), -2.0 * weight * target, float(weight @ target**2), z, True
+        )
+
+
+def _add_bounds(program, bounds: NormBounds, t: int, z) -> None:  # type: ignore[no-untyped-def]
+    for matrix, offset, radius in zip(
+        bounds.matrix[t], bounds.offset[t], bounds.radius[t], strict=True
+    ):
+        if np.isfinite(radius):
+            used = np.any(matrix != 0.0, axis=0)
+            a = np.vstack([np.zeros((1, int(used.sum()))), matrix[:, used]])
+            program.AddLorentzConeConstraint(a, np.concatenate([[radius], offset]), z[used])
