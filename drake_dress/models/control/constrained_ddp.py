@@ -106,13 +106,16 @@ def solve_constrained_ddp(
             np.concatenate([a[1:], c], axis=1) for a, c in zip(on_states, on_inputs, strict=True)
         )
         n_x, n_v = len(lx[0]), len(lv[0])
-        multiplier = np.empty((steps, n_x + n_v))
+        multiplier, excess = np.empty((steps, n_x + n_v)), np.empty((steps, n_x + n_v))
         interior, near = start_inside(
-            *costs, *together, n_x, v, u, multiplier,
+            *costs, *together, n_x, v, u, multiplier, excess,
             settings.max_interior_steps, settings.tolerance,
         )  # fmt: skip
         lx[1:], lv[:] = multiplier[:, :n_x], multiplier[:, n_x:]
         if near:
+            # bounds that nothing keeps are widened by as little as can be
+            on_states[2][1:] += excess[:, :n_x]
+            on_inputs[2][:] += excess[:, n_x:]
             inside = v.copy(), lx.copy(), lv.copy()
             more, converged = solve(
                 integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
@@ -128,7 +131,7 @@ def solve_constrained_ddp(
 
 
 def _contiguous(*arrays: FloatArray) -> list[FloatArray]:
-    return [np.ascontiguousarray(a) for a in arrays]
+    return [np.array(a, dtype=np.float64, order="C") for a in arrays]
 
 
 def feedback_gains(problem: LocalProblem, solution: LocalSolution) -> FloatArray:

@@ -1,9 +1,11 @@
 """A primal-dual interior point method for the local problem: where the active set is not known.
 
-The bounds are written c = (φ² − ‖y‖²) / 2φ ≥ 0 with slacks s; predictor and corrector follow
-Mehrotra ("On the implementation of a primal-dual interior point method", 1992). Each Newton step is
-a backward and a forward pass without bounds: they are barriers in the cost. The end is close to the
-optimum and tells active bounds by multiplier > slack; constrained DDP goes the rest of the way.
+The bounds are written c + t = s with c = (φ² − ‖y‖²) / 2φ, slack s ≥ 0 and excess t ≥ 0 at a price
+that no bound which can be kept is worth: there always is an optimum, and bounds that nothing keeps
+are exceeded by the least sum. Predictor and corrector follow Mehrotra ("On the implementation of a
+primal-dual interior point method", 1992). Each Newton step is a backward and a forward pass without
+bounds: they are barriers in the cost. The end is close to the optimum and tells active bounds by
+multiplier > slack; constrained DDP goes the rest of the way.
 """
 
 from __future__ import annotations
@@ -13,10 +15,10 @@ import numpy as np
 
 # Share of the way to the border of the positive numbers that a step may go.
 _BORDER_SHARE = 0.995
-# Slacks at first: at least this share of the bound, and this, m or m/s.
-_FIRST_SHARE, _LEAST_SLACK = 0.1, 1e-4
-# Growth of the products of slack and multiplier at which nothing obeys the bounds.
-_DIVERGED = 1e12
+# Excess at first as a share of the bound.
+_FIRST_EXCESS = 0.3
+# Price of excess, relative to the steepness of the cost.
+_PRICE = 100.0
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -32,6 +34,7 @@ def interior_point(  # type: ignore[no-untyped-def]
     v,
     x,
     multiplier,
+    excess,
     max_iterations,
     tolerance,
 ):
@@ -52,25 +55,27 @@ def interior_point(  # type: ignore[no-untyped-def]
         v: (N,m) inputs to start from, and on return.
         x: (N+1,m) on return.
         multiplier: (N,K+L) on return, of the norms; zero where not active.
+        excess: (N,K+L) on return, of bounds that nothing keeps; zero elsewhere.
         max_iterations: at most.
         tolerance: of bounds, and of products of slack and multiplier relative to the first.
 
     Returns:
-        The iterations, and whether they sufficed. If not, the inputs are those that exceeded the
-        bounds least, and the multipliers are zero.
+        The iterations, and whether they sufficed.
     """
     steps, m = v.shape
     each = radius.shape[1]
     bounded = radius < np.inf
     count = max(bounded.sum(), 1)
     slope, value = np.zeros((steps, each, m)), np.zeros((steps, each))
-    slack = np.ones((steps, each))
+    slack, spare = np.ones((steps, each)), np.ones((steps, each))
     multiplier[:] = 0.0
-    complement = np.zeros((steps, each))
-    d_slack, d_multiplier = np.zeros((steps, each)), np.zeros((steps, each))
+    excess[:] = 0.0
+    # products that the predictor leaves behind: of slack and multiplier, of excess and its own
+    left, left_spare = np.zeros((steps, each)), np.zeros((steps, each))
+    d_slack, d_excess = np.zeros((steps, each)), np.zeros((steps, each))
+    d_multiplier = np.zeros((steps, each))
     factor, gain = np.empty((steps, m, m)), np.empty((steps, m, m))
     dx, dv = np.zeros((steps + 1, m)), np.zeros((steps, m))
-    best, least = v.copy(), np.inf
 
     _roll(v, x)
     _values(matrix, offset, radius, n_x, v, x, slope, value)
@@ -81,72 +86,74 @@ def interior_point(  # type: ignore[no-untyped-def]
             for e in range(m):
                 s += w[t + 1, a, e] * x[t + 1, e]
             steepness += abs(s)
-    # products alike, and of the cost's order
-    first = 0.1 * (steepness + 1e-6) / count
+    price = _PRICE * (steepness + 1e-6)
+    mu = 0.0
     for t in range(steps):
         for k in range(each):
             if bounded[t, k]:
-                slack[t, k] = max(value[t, k], _FIRST_SHARE * radius[t, k], _LEAST_SLACK)
-                multiplier[t, k] = first / slack[t, k]
-    mu, done, iteration = first, False, 0
-    while iteration < max_iterations:
+                excess[t, k] = _FIRST_EXCESS * radius[t, k] + max(0.0, -value[t, k])
+                slack[t, k] = value[t, k] + excess[t, k]
+                # products alike for a bound of the usual size
+                multiplier[t, k] = min(0.5 * price, steepness / count)
+                spare[t, k] = price - multiplier[t, k]
+                mu += slack[t, k] * multiplier[t, k] + excess[t, k] * spare[t, k]
+    mu /= 2.0 * count
+    enough = tolerance * max(steepness, 1e-9) / count
+    done, iteration = False, 0
+    while iteration < max_iterations and not done:
         iteration += 1
-        _factor(w, r, matrix, radius, n_x, slope, slack, multiplier, factor, gain)
-        complement[:] = 0.0
+        _factor(w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain)
+        left[:] = 0.0
+        left_spare[:] = 0.0
         target = 0.0
         for phase in range(2):
             _newton(
-                w, w_x, r, r_v, n_x, v, x, slope, value, slack, multiplier, bounded, complement,
-                target, factor, gain, dx, dv,
+                w, w_x, r, r_v, n_x, v, x, slope, value, slack, excess, multiplier, spare, bounded,
+                left, left_spare, target, factor, gain, dx, dv,
             )  # fmt: skip
             primal, dual = _step_lengths(
-                n_x, slope, value, slack, multiplier, bounded, complement, target, dx, dv,
-                d_slack, d_multiplier,
+                n_x, slope, value, slack, excess, multiplier, spare, bounded, left, left_spare,
+                target, dx, dv, d_slack, d_excess, d_multiplier,
             )  # fmt: skip
             if phase == 0:
                 after = 0.0
                 for t in range(steps):
                     for k in range(each):
                         if bounded[t, k]:
+                            change = dual * d_multiplier[t, k]
                             after += (slack[t, k] + primal * d_slack[t, k]) * (
-                                multiplier[t, k] + dual * d_multiplier[t, k]
-                            )
-                            complement[t, k] = d_slack[t, k] * d_multiplier[t, k]
-                target = mu * min(1.0, (after / (count * mu)) ** 3)
+                                multiplier[t, k] + change
+                            ) + (excess[t, k] + primal * d_excess[t, k]) * (spare[t, k] - change)
+                            left[t, k] = d_slack[t, k] * d_multiplier[t, k]
+                            left_spare[t, k] = -d_excess[t, k] * d_multiplier[t, k]
+                target = mu * min(1.0, (after / (2.0 * count * mu)) ** 3)
         for t in range(steps):
             for c in range(m):
                 v[t, c] += primal * dv[t, c]
             for k in range(each):
                 if bounded[t, k]:
                     slack[t, k] += primal * d_slack[t, k]
+                    excess[t, k] += primal * d_excess[t, k]
                     multiplier[t, k] += dual * d_multiplier[t, k]
+                    spare[t, k] -= dual * d_multiplier[t, k]
         _roll(v, x)
         _values(matrix, offset, radius, n_x, v, x, slope, value)
-        mu, mismatch, violation = 0.0, 0.0, 0.0
+        mu, mismatch = 0.0, 0.0
         for t in range(steps):
             for k in range(each):
                 if bounded[t, k]:
-                    mu += slack[t, k] * multiplier[t, k] / count
-                    mismatch += abs(value[t, k] - slack[t, k])
-                    violation = max(violation, -value[t, k])
-        if not (mu < _DIVERGED * first and np.isfinite(mismatch)):
-            break
-        if violation <= max(least, tolerance):
-            best[:], least = v, violation
-        if mu <= tolerance * first and mismatch <= tolerance * count:
-            done = True
-            break
-    if not done:
-        v[:] = best
-        _roll(v, x)
-        multiplier[:] = 0.0
-        return iteration, False
+                    mu += slack[t, k] * multiplier[t, k] + excess[t, k] * spare[t, k]
+                    mismatch += abs(value[t, k] + excess[t, k] - slack[t, k])
+        mu /= 2.0 * count
+        done = mu <= enough and mismatch <= tolerance * count
     # the slope of c is that of the norm where the bound is met
     for t in range(steps):
         for k in range(each):
             if multiplier[t, k] <= slack[t, k]:
                 multiplier[t, k] = 0.0
-    return iteration, True
+            if excess[t, k] <= spare[t, k]:
+                excess[t, k] = 0.0
+    return iteration, done
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -181,7 +188,9 @@ def _values(matrix, offset, radius, n_x, v, x, slope, value):  # type: ignore[no
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _factor(w, r, matrix, radius, n_x, slope, slack, multiplier, factor, gain):  # type: ignore[no-untyped-def]
+def _factor(  # type: ignore[no-untyped-def]
+    w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain
+):
     """Backward pass of the Hessians: with q_vv = L Lᵀ, fills L and gain = L⁻¹p."""
     steps, each = radius.shape
     m = r.shape[1]
@@ -197,7 +206,7 @@ def _factor(w, r, matrix, radius, n_x, slope, slack, multiplier, factor, gain): 
                 continue
             hessian = p if k < n_x else of_input
             curved = multiplier[t, k] / radius[t, k]
-            barrier = multiplier[t, k] / slack[t, k]
+            barrier = 1.0 / (slack[t, k] / multiplier[t, k] + excess[t, k] / spare[t, k])
             c0, c1, c2 = matrix[t, k, 0], matrix[t, k, 1], matrix[t, k, 2]
             for a in range(m):
                 for e in range(a + 1):
@@ -239,9 +248,12 @@ def _newton(  # type: ignore[no-untyped-def]
     slope,
     value,
     slack,
+    excess,
     multiplier,
+    spare,
     bounded,
-    complement,
+    left,
+    left_spare,
     target,
     factor,
     gain,
@@ -262,9 +274,11 @@ def _newton(  # type: ignore[no-untyped-def]
             work[a] = r_v[t, a] + r[t, a] * v[t, a]
         for k in range(each):
             if bounded[t, k]:
-                push = (
-                    target - complement[t, k] - multiplier[t, k] * (value[t, k] - slack[t, k])
-                ) / slack[t, k]
+                push = multiplier[t, k] + (
+                    (target - left[t, k]) / multiplier[t, k]
+                    - (target - left_spare[t, k]) / spare[t, k]
+                    - value[t, k]
+                ) / (slack[t, k] / multiplier[t, k] + excess[t, k] / spare[t, k])
                 into = p if k < n_x else work
                 for a in range(m):
                     into[a] += push * slope[t, k, a]
@@ -301,16 +315,20 @@ def _step_lengths(  # type: ignore[no-untyped-def]
     slope,
     value,
     slack,
+    excess,
     multiplier,
+    spare,
     bounded,
-    complement,
+    left,
+    left_spare,
     target,
     dx,
     dv,
     d_slack,
+    d_excess,
     d_multiplier,
 ):
-    """Fills the steps of slacks and multipliers; returns how far both may go."""
+    """Fills the steps of slacks, excesses and multipliers; returns how far they may go."""
     steps, each = bounded.shape
     primal, dual = 1.0, 1.0
     for t in range(steps):
@@ -318,13 +336,23 @@ def _step_lengths(  # type: ignore[no-untyped-def]
             if not bounded[t, k]:
                 continue
             dz = dx[t + 1] if k < n_x else dv[t]
-            s = value[t, k] - slack[t, k]
+            along = 0.0
             for a in range(len(dz)):
-                s -= slope[t, k, a] * dz[a]
-            change = (target - complement[t, k] - multiplier[t, k] * s) / slack[t, k]
-            d_slack[t, k], d_multiplier[t, k] = s, change - multiplier[t, k]
-            if s < 0.0:
-                primal = min(primal, -_BORDER_SHARE * slack[t, k] / s)
-            if d_multiplier[t, k] < 0.0:
-                dual = min(dual, -_BORDER_SHARE * multiplier[t, k] / d_multiplier[t, k])
+                along += slope[t, k, a] * dz[a]
+            of_slack = (target - left[t, k]) / multiplier[t, k]
+            of_excess = (target - left_spare[t, k]) / spare[t, k]
+            ratio = slack[t, k] / multiplier[t, k]
+            ratio_spare = excess[t, k] / spare[t, k]
+            change = (along - value[t, k] - of_excess + of_slack) / (ratio + ratio_spare)
+            d_multiplier[t, k] = change
+            d_slack[t, k] = of_slack - slack[t, k] - ratio * change
+            d_excess[t, k] = of_excess - excess[t, k] + ratio_spare * change
+            if d_slack[t, k] < 0.0:
+                primal = min(primal, -_BORDER_SHARE * slack[t, k] / d_slack[t, k])
+            if d_excess[t, k] < 0.0:
+                primal = min(primal, -_BORDER_SHARE * excess[t, k] / d_excess[t, k])
+            if change < 0.0:
+                dual = min(dual, -_BORDER_SHARE * multiplier[t, k] / change)
+            elif change > 0.0:
+                dual = min(dual, _BORDER_SHARE * spare[t, k] / change)
     return primal, dual

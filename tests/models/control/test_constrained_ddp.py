@@ -158,20 +158,25 @@ def test_bounds_that_say_the_same_twice_do_no_harm() -> None:
     assert same.cost == pytest.approx(s.cost, rel=1e-6)
 
 
-def test_bounds_that_nothing_obeys_are_told() -> None:
+def test_bounds_that_nothing_obeys_are_exceeded_by_the_least_sum() -> None:
     p = drawn(7)
-    offset = p.state_bounds.offset.copy()
-    # one sleeve would have to be in two places
-    radius = p.state_bounds.radius.copy()
-    radius[5, 3:], offset[5, 3:] = 1e-3, 0.0
-    matrix = p.state_bounds.matrix.copy()
-    matrix[5, 3:] = 0.0
+    bounds = p.state_bounds
+    matrix, offset, radius = bounds.matrix.copy(), bounds.offset.copy(), bounds.radius.copy()
+    # one sleeve would have to be in two places, 2 m apart
+    matrix[5, 3:], radius[5, 3:] = 0.0, 1e-3
     matrix[5, 3:, :, :3] = np.eye(3)
     offset[5, 3], offset[5, 4] = [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]
-    s = solve_constrained_ddp(replace(p, state_bounds=NormBounds(matrix, offset, radius)))
-    assert not s.converged
-    assert np.all(np.isfinite(s.v))
-    assert s.violation > 0.1
+    q = replace(p, state_bounds=NormBounds(matrix, offset, radius))
+    s = solve_constrained_ddp(q)
+    assert s.converged
+    excess = np.maximum(q.state_bounds.excess(s.x), 0.0)
+    excess[0] = 0.0
+    assert s.violation == pytest.approx(excess.max())
+    assert excess[5, 3:].sum() == pytest.approx(2.0 - 2e-3, abs=1e-5)
+    # all others are kept
+    excess[5, 3:] = 0.0
+    assert excess.max() < 1e-6
+    assert q.input_bounds.excess(s.v).max() < 1e-6
 
 
 def test_the_null_space_hands_a_bound_to_the_step_before() -> None:
