@@ -17,6 +17,8 @@ import numpy as np
 _BORDER_SHARE = 0.995
 # Excess at first as a share of the bound.
 _FIRST_EXCESS = 0.3
+# Way from the optimum, m, that a start is taken to have at least.
+_FLATTEST = 1e-3
 # Price of excess, relative to the steepness of the cost.
 _PRICE = 100.0
 
@@ -85,7 +87,7 @@ def interior_point(  # type: ignore[no-untyped-def]
             s = w_x[t + 1, a]
             for e in range(m):
                 s += w[t + 1, a, e] * x[t + 1, e]
-            steepness += abs(s)
+            steepness += abs(s) + _FLATTEST * w[t + 1, a, a]
     price = _PRICE * (steepness + 1e-6)
     mu = 0.0
     for t in range(steps):

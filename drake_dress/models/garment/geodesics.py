@@ -29,11 +29,13 @@ class Reach:
         to_far_gripper: of the centre of the left armhole from what the right gripper holds, and of
             the right one from what the left gripper holds (φ_f; one number in the paper).
         to_near_gripper: likewise from the gripper of its own side.
+        between_grippers: of what both grippers hold.
     """
 
     between_sleeves: float
     to_far_gripper: tuple[float, float]
     to_near_gripper: tuple[float, float]
+    between_grippers: float
 
 
 def reach(mesh: GarmentMesh) -> Reach:
@@ -51,8 +53,12 @@ def reach(mesh: GarmentMesh) -> Reach:
     split = len(grasp[0])
     parts = [(d[:, :split], d[:, split:]) for d in gripped]
     to = [[mean_distance(parts[i][k], weights[i], held[k]) for k in (0, 1)] for i in (0, 1)]
+    held_apart = mean_distance(_distances(exact, *grasp), *held)
     return Reach(
-        mean_distance(far, weights[0], weights[1]), (to[0][1], to[1][0]), (to[0][0], to[1][1])
+        between_sleeves=mean_distance(far, weights[0], weights[1]),
+        to_far_gripper=(to[0][1], to[1][0]),
+        to_near_gripper=(to[0][0], to[1][1]),
+        between_grippers=held_apart,
     )
 
 

@@ -1,0 +1,180 @@
+"""The local model: how sleeves follow grippers, and what bounds both (Eqs. loc-func1, loc-func2).
+
+State are the compensations of sleeve centres and grippers, x = (Δp_cl, Δp_cr, Δp_rl, Δp_rr), input
+those of the grippers' velocities. While the sleeves are near each other each one follows its own
+gripper. Further apart the garment between them is taut and a sleeve follows both, the far one the
+more the further away it is, up to one half.
+
+Two things differ from the print. k grows with the distance to the far gripper from a share of φ_f
+on, not from φ_c: on a coat that is held at its shoulders the sleeves are further from each other
+than from the far gripper (0.59 m against 0.54 m), and the print's quotient has the wrong sign. And
+the distance of the grippers has a bound like the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.control.local_problem import LocalProblem, NormBounds
+from drake_dress.models.garment.geodesics import Reach
+
+_EYE, _NONE = np.eye(3), np.zeros((3, 3))
+# What a bound on distances is of, as blocks of (p_cl, p_cr, p_rl, p_rr).
+_PAIRS = (
+    np.hstack([_EYE, _NONE, _NONE, -_EYE]),
+    np.hstack([_NONE, _EYE, -_EYE, _NONE]),
+    np.hstack([_EYE, -_EYE, _NONE, _NONE]),
+    np.hstack([_NONE, _NONE, _EYE, -_EYE]),
+)
+
+
+@dataclass(frozen=True)
+class LocalParameters:
+    """Settings of the local problem.
+
+    Attributes:
+        time_step: s. horizon: N.
+        position: W, 1/m². speed: R on the gripper displacement of a step, 1/m².
+        max_speed: of a gripper, m/s.
+        beside: how far the armhole of a dressed sleeve may be beside its target, m (φ_x).
+        beside_speed: how fast it may move beside the arm, m/s (φ_v).
+        taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
+        coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
+            they are no longer.
+    """
+
+    time_step: float = 0.05
+    horizon: int = 20
+    position: float = 1.0
+    speed: float = 0.5
+    max_speed: float = 0.12
+    beside: float = 0.04
+    beside_speed: float = 0.05
+    taut_share: float = 0.8
+    coupled_share: float = 0.85
+    released_share: float = 0.8
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What the global plan leads to.
+
+    Attributes:
+        sleeve: (N+1,2,3) armhole centres, m. gripper: (N+1,2,3) m. velocity: (N,2,3) of the
+            grippers, m/s. Left, then right.
+    """
+
+    sleeve: FloatArray
+    gripper: FloatArray
+    velocity: FloatArray
+
+
+@dataclass(frozen=True)
+class SleeveGoal:
+    """What is asked of one sleeve at the N+1 times.
+
+    Attributes:
+        target: (N+1,3) m. weight: factor on W; 0 leaves the sleeve alone.
+        on_arm: whether contact with the arm bounds it.
+        axis: (N+1,3) unit direction of the arm at the target.
+    """
+
+    target: FloatArray
+    weight: float
+    on_arm: bool
+    axis: FloatArray
+
+
+def is_coupled(was: bool, distance: float, reach: Reach, parameters: LocalParameters) -> bool:
+    """Returns whether armholes at a `distance`, m, are coupled: ‖p_cl − p_cr‖ ≥ φ_c.
+
+    With hysteresis: the distance goes up and down as grippers work, and the dynamics shall not.
+    """
+    share = parameters.released_share if was else parameters.coupled_share
+    return distance >= share * reach.between_sleeves
+
+
+def influence(distance: float, reach: float, taut_share: float) -> float:
+    """Returns k, from 0 to ½: how much a sleeve follows the far gripper.
+
+    Args:
+        distance: of sleeve and far gripper, m.
+        reach: the largest one, φ_f, m.
+        taut_share: of it, from which on k is positive.
+    """
+    slack = taut_share * reach
+    return float(np.clip(0.5 * (distance - slack) / (reach - slack), 0.0, 0.5))
+
+
+def input_matrix(
+    nominal: Nominal, coupled: bool, reach: Reach, parameters: LocalParameters
+) -> FloatArray:
+    """Returns (12,6) B of x_{j+1} = x_j + B v_j."""
+    share = np.eye(2)
+    if coupled:
+        for i in (0, 1):
+            far = float(np.linalg.norm(nominal.sleeve[0, i] - nominal.gripper[0, 1 - i]))
+            k = influence(far, reach.to_far_gripper[i], parameters.taut_share)
+            share[i, i], share[i, 1 - i] = 1.0 - k, k
+    b: FloatArray = parameters.time_step * np.vstack([np.kron(share, _EYE), np.eye(6)])
+    return b
+
+
+def local_problem(
+    nominal: Nominal,
+    goals: tuple[SleeveGoal, SleeveGoal],
+    coupled: bool,
+    reach: Reach,
+    parameters: LocalParameters,
+) -> LocalProblem:
+    """Returns the problem whose optimum compensates the global plan (Eq. loc_mpc).
+
+    Args:
+        nominal: what the plan leads to.
+        goals: of left and right sleeve.
+        coupled: see `is_coupled`.
+        reach: of the controller's garment.
+        parameters: settings.
+    """
+    p = parameters
+    n, h = p.horizon, p.time_step
+    b = input_matrix(nominal, coupled, reach, p)
+    where = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(n + 1, 12)
+    velocity = nominal.velocity.reshape(n, 6)
+    weight, target = np.zeros((n + 1, 12)), np.zeros((n + 1, 12))
+    matrix, offset = np.zeros((n + 1, 6, 3, 12)), np.zeros((n + 1, 6, 3))
+    radius = np.full((n + 1, 6), np.inf)
+    matrix[:, :4] = _PAIRS
+    offset[:, :4] = np.einsum("kab,tb->tka", matrix[0, :4], where)
+    radius[:, :4] = [*reach.to_far_gripper, reach.between_sleeves, reach.between_grippers]
+    moving, moved = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
+    limit = np.full((n, 4), np.inf)
+    for i, goal in enumerate(goals):
+        rows = slice(3 * i, 3 * i + 3)
+        weight[:, rows] = p.position * goal.weight
+        target[:, rows] = goal.target - nominal.sleeve[:, i]
+        moving[:, 2 + i, :, rows], moved[:, 2 + i] = _EYE, velocity[:, rows]
+        limit[:, 2 + i] = p.max_speed
+        if not goal.on_arm:
+            continue
+        across = _EYE - goal.axis[:, :, None] * goal.axis[:, None, :]
+        away = nominal.sleeve[:, i] - goal.target
+        matrix[:, 4 + i, :, rows] = across
+        offset[:, 4 + i] = np.einsum("tab,tb->ta", across, away)
+        radius[:, 4 + i] = p.beside
+        moving[:, i] = across[:-1] @ b[rows]
+        moved[:, i] = np.einsum("tab,tb->ta", across[:-1], np.diff(away, axis=0))
+        limit[:, i] = p.beside_speed * h
+    return LocalProblem(
+        start=np.zeros(12),
+        input_matrix=b,
+        state_weight=weight,
+        state_target=target,
+        input_weight=np.full((n, 6), p.speed * h * h),
+        input_target=-velocity,
+        state_bounds=NormBounds(matrix, offset, radius),
+        input_bounds=NormBounds(moving, moved, limit),
+    )
