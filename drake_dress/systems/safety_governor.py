@@ -78,6 +78,9 @@ class SafetyGovernor(LeafSystem):
             "verdict", 2, self._calc_verdict, {self.discrete_state_ticket(self._verdict)}
         )
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        # compiled now and not when something is first cut, which must not wait half a second
+        too_fast = Request(np.full((2, 3), limits.max_speed), 0.0)
+        step(GovernorState(start), too_fast, Measurement(start, 0.0 * start), limits, 0.0, period)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         def of_both(name: str) -> np.ndarray:

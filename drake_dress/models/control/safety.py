@@ -41,7 +41,8 @@ filter hides it, and n·v falls to 0 by max_braking dt a step.
 
 A latched stop ends by itself once the force on both grippers is under the soft limit; until then
 the gripper that is pulled gives way, so that it ends and nobody is left held fast. It needs no
-reset by hand: nothing is wrong but the force, which is measured to be gone.
+reset by hand: nothing is wrong but the force, which is measured to be gone. Giving way under the
+hard limit comes last in the order above: it leaves no workspace.
 
 Both stop where one must: they hold one garment on one person.
 """
@@ -263,13 +264,17 @@ def step(
         wanted = np.zeros(3) if fault or must_stop else request.velocity[i]
         reach = _time_to_rest(state.velocity[i], limits, dt)
         spaces: list[tuple[Verdict, Ball | HalfSpace | None]] = []
-        if seen[i]:
-            spaces.append((Verdict.FORCE, _force_limit(force[i], wanted, limits, stopped)))
+        pull = _force_limit(force[i], wanted, limits, stopped) if seen[i] else None
+        relaxing = stopped and size[i] < limits.hard_force
+        if not relaxing:
+            spaces.append((Verdict.FORCE, pull))
         spaces += _distance_limits(state.position, i, reach, limits, dt)
         spaces += _workspace_limits(state.position[i], limits, dt)
         if seen[i]:
             lead = state.position[i] - np.clip(measured.position[i], -1e6, 1e6)
             spaces.append((Verdict.LEAD, _kept_within(limits.max_lead, lead, reach, limits)))
+        if relaxing:
+            spaces.append((Verdict.FORCE, pull))
         velocity[i], cut = _governed(
             wanted,
             state.velocity[i],

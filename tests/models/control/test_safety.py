@@ -180,6 +180,17 @@ def test_lasting_force_stops_both_until_it_is_under_the_soft_limit() -> None:
     assert arms.verdicts == (Verdict.NONE, Verdict.NONE)
 
 
+def test_gripper_that_gives_way_while_stopped_does_not_leave_the_workspace() -> None:
+    # a weight over the soft limit would draw it down for ever
+    box = START.mean(axis=0) + np.array([[-0.1, -0.5, -0.1], [0.1, 0.5, 0.1]])
+    arms = Arms(replace(LIMITS, workspace=box))
+    arms.ask(NOTHING, [0.0, 0.0, -22.0], duration=1.5 * LIMITS.stop_time)
+    arms.ask(NOTHING, [0.0, 0.0, -15.0], duration=10.0)
+    assert Verdict.STOPPED in arms.verdicts[0]
+    np.testing.assert_allclose(arms.state.position[:, 2], box[0, 2], atol=1e-4)
+    assert np.array(arms.path)[:, :, 2].min() >= box[0, 2] - 1e-12
+
+
 def test_force_that_chatters_about_the_limit_stops_in_the_end() -> None:
     arms = Arms()
     for k in range(300):
