@@ -22,8 +22,17 @@ def test_no_failure_of_controller_or_sensors_gets_past_the_limits() -> None:
 
 
 def test_broken_limits_are_told() -> None:
-    bound = 30.0
-    worst = safety.Worst("x", 1, 0.26, 5.1, 0.01, 0.021, 31.0, bound)
+    limits, bound, over = safety.LIMITS, 30.0, 1.001
+    worst = safety.Worst(
+        "x",
+        1,
+        over * limits.max_speed,
+        over * limits.max_braking,
+        1e-3,
+        over * limits.max_lead,
+        over * bound,
+        bound,
+    )
     assert worst.broken() == ["speed", "acceleration", "pull", "lead", "force"]
 
 
