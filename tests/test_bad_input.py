@@ -40,6 +40,33 @@ BAD_YAML = {
         "controller: {global_mpc: {period: 0.5, delay: 0.6}}",
         ["controller.global_mpc.delay", "period"],
     ),
+    "force limit too high": ("safety: {force_limit: 1000}", ["safety.force_limit", "200"]),
+    "force limit under its old name, too": (
+        "{safety: {force_limit: 20}, controller: {global_mpc: {force_limit: 21}}}",
+        ["controller.global_mpc.force_limit", "safety.force_limit"],
+    ),
+    "soft limit over the hard one": (
+        "safety: {soft_force_limit: 30}",
+        ["safety.soft_force_limit", "21"],
+    ),
+    "braking slower than accelerating": (
+        "safety: {max_acceleration: 8}",
+        ["safety.max_braking", "8"],
+    ),
+    "stale at once": ("safety: {stale_time: 0.006}", ["safety.stale_time", "0.01"]),
+    "distances that exclude each other": (
+        "safety: {least_distance: 0.5, largest_distance: 0.4}",
+        ["safety.largest_distance", "0.5"],
+    ),
+    "flat workspace": ("safety: {workspace: {low: [0, 0]}}", ["safety.workspace.low", "x, y, z"]),
+    "workspace upside down": (
+        "safety: {workspace: {low: [0, 0, 2], high: [1, 1, 1]}}",
+        ["safety.workspace.high", "each axis"],
+    ),
+    "garment outside the workspace": (
+        "safety: {workspace: {low: [5, 5, 5], high: [6, 6, 6]}}",
+        ["safety", "outside the workspace"],
+    ),
     "broken syntax": ("plant: {spacing: 0.02", ["line"]),
     "tab": ("plant:\n\tspacing: 1", ["line 2"]),
     "empty file": ("", ["empty"]),

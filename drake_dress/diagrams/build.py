@@ -12,6 +12,7 @@ from drake_dress.diagrams.station import Station, StationParameters, make_simula
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.policy import DressingPolicy, PersonModel, PolicyParameters
+from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
@@ -22,28 +23,30 @@ from drake_dress.models.sides import SIDES
 
 def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat | None) -> Station:
     """Returns the simulated station with the scenario's person and garment."""
+    return make_simulated_station(station_parameters(scenario, mesh), meshcat)
+
+
+def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationParameters:
+    """Returns what the simulated station is made of."""
     person, start = scenario.person, scenario.station.start
-    return make_simulated_station(
-        StationParameters(
-            mesh=mesh,
-            material=material(scenario.plant.material),
-            time_step=scenario.plant.time_step,
-            integrator=scenario.plant.integrator,
-            iterations=scenario.plant.iterations,
-            tolerance=scenario.plant.tolerance,
-            self_collision=scenario.plant.self_collision,
-            effects=effects(scenario),
-            measures=measures(person),
-            posture=posture(person),
-            arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},
-            joints=JointParameters(**vars(person.joints)),
-            gripper_max_speed=scenario.station.gripper.max_speed,
-            gripper_max_acceleration=scenario.station.gripper.max_acceleration,
-            distance_behind=start.distance_behind,
-            height_offset=start.height_offset,
-            lateral_offset=start.lateral_offset,
-        ),
-        meshcat,
+    return StationParameters(
+        mesh=mesh,
+        material=material(scenario.plant.material),
+        time_step=scenario.plant.time_step,
+        integrator=scenario.plant.integrator,
+        iterations=scenario.plant.iterations,
+        tolerance=scenario.plant.tolerance,
+        self_collision=scenario.plant.self_collision,
+        effects=effects(scenario),
+        measures=measures(person),
+        posture=posture(person),
+        arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},
+        joints=JointParameters(**vars(person.joints)),
+        gripper_max_speed=scenario.station.gripper.max_speed,
+        gripper_max_acceleration=scenario.station.gripper.max_acceleration,
+        distance_behind=start.distance_behind,
+        height_offset=start.height_offset,
+        lateral_offset=start.lateral_offset,
     )
 
 
@@ -92,7 +95,29 @@ def rates(scenario: schema.Scenario) -> Rates:
         global_delay=c.global_mpc.delay,
         command_period=1.0 / c.command_rate,
         log_period=1.0 / scenario.log.rate,
-        force_limit=c.global_mpc.force_limit,
+    )
+
+
+def safety_limits(scenario: schema.Scenario) -> SafetyLimits:
+    """Returns the limits that stand between controllers and grippers."""
+    s = scenario.safety
+    soft, largest, box = s.soft_force_limit, s.largest_distance, s.workspace
+    return SafetyLimits(
+        max_speed=s.max_speed,
+        max_acceleration=s.max_acceleration,
+        max_braking=s.max_braking,
+        soft_force=0.5 * s.force_limit if soft is None else soft,
+        hard_force=s.force_limit,
+        filter_time=s.force_filter_time,
+        yield_rate=s.yield_rate,
+        yield_speed=s.yield_speed,
+        relax_speed=s.relax_speed,
+        stop_time=s.stop_time,
+        max_lead=s.max_lead,
+        stale_time=s.stale_time,
+        least_distance=s.least_distance,
+        largest_distance=np.inf if largest is None else largest,
+        workspace=None if box is None else np.array([box.low, box.high]),
     )
 
 

@@ -13,6 +13,7 @@ from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.station import Station
 from drake_dress.models.control.policy import DressingPolicy
+from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.effects.composition import true_times
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.sensing import TimeOffset
@@ -27,17 +28,17 @@ from drake_dress.systems.human_predictor import HumanPredictor
 from drake_dress.systems.joint_oracle import JointOracle
 from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
+from drake_dress.systems.safety_governor import SafetyGovernor
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Periods and delays of the controllers; s, and N for the force limit."""
+    """Periods and delays of the controllers, s."""
 
     global_period: float = 0.5
     global_delay: float = 0.2
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
-    force_limit: float = 30.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ def make_dressing(
     policy: DressingPolicy,
     transfer: sp.csr_array,
     rates: Rates,
+    limits: SafetyLimits,
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
     effects: Sequence[Effect] = (),
@@ -67,6 +69,7 @@ def make_dressing(
         policy: of the global controller, with the controller's garment.
         transfer: (m,n) from the plant's nodes to the controller's.
         rates: of controllers and log.
+        limits: that stand between controllers and grippers.
         writer: open log, if one is kept.
         meshcat: where the run is shown, if it is.
         effects: those on cameras and their clock, which lie between truth and controllers. A clock
@@ -82,9 +85,9 @@ def make_dressing(
     mpc = builder.AddNamedSystem(
         "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
     )
-    follower = builder.AddNamedSystem(
-        "plan_follower",
-        PlanFollower(station.start_grippers, rates.command_period, rates.force_limit),
+    follower = builder.AddNamedSystem("plan_follower", PlanFollower())
+    governor = builder.AddNamedSystem(
+        "safety_governor", SafetyGovernor(station.start_grippers, rates.command_period, limits)
     )
 
     def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]
@@ -104,18 +107,27 @@ def make_dressing(
         builder.Connect(port, mpc.GetInputPort(f"garment_{quantity}"))
     connect(predictor, "predicted_joint_position", mpc, "predicted_joint_position")
     connect(mpc, "plan", follower, "plan")
+    connect(follower, "request_time", governor, "request_time")
     for side in SIDES:
         for quantity in ("position", "force"):
             connect(
-                lab, f"{side}_gripper.{quantity}_measured", follower, f"{side}_gripper_{quantity}"
+                lab, f"{side}_gripper.{quantity}_measured", governor, f"{side}_gripper_{quantity}"
             )
-        connect(follower, f"{side}_position_command", lab, f"{side}_gripper.position_command")
+        connect(follower, f"{side}_velocity_request", governor, f"{side}_velocity_request")
+        connect(governor, f"{side}_position_command", lab, f"{side}_gripper.position_command")
 
     if writer is not None:
         capsules = [(int(station.person.body_indices[c.body]), c) for c in station.person.capsules]
         recorder = builder.AddNamedSystem(
             "run_recorder",
-            RunRecorder(writer, mesh, len(policy.mesh.rest_position), capsules, rates.log_period),
+            RunRecorder(
+                writer,
+                mesh,
+                len(policy.mesh.rest_position),
+                capsules,
+                rates.log_period,
+                rates.command_period,
+            ),
         )
         connect(lab, "cheat_garment_position", recorder, "garment_position")
         connect(lab, "cheat_contact", recorder, "contact")
@@ -126,6 +138,7 @@ def make_dressing(
         connect(garment, "estimated_position", recorder, "estimated_position")
         connect(mpc, "stage", recorder, "stage")
         connect(mpc, "solve_time", recorder, "solve_time")
+        connect(governor, "verdict", recorder, "verdict")
         for side in SIDES:
             for quantity in ("position", "force"):
                 connect(

@@ -13,10 +13,19 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
-from drake_dress.diagrams.build import controller_policy, effects, plant_station, rates
+from drake_dress.diagrams.build import (
+    controller_policy,
+    effects,
+    plant_station,
+    rates,
+    safety_limits,
+    station_parameters,
+)
 from drake_dress.diagrams.dressing import Dressing, is_finished, make_dressing
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
+from drake_dress.diagrams.station import start_grippers
+from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog, RunLogWriter
@@ -48,11 +57,15 @@ def run_scenario(
         realtime_rate: at most this many simulated seconds per second; 0 for no limit.
 
     Raises:
-        UserError: the garment cannot be used.
+        UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
     """
     scenario = apply_variation(scenario)
     mesh = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
+    limits = safety_limits(scenario)
+    broken = limits.broken_at(start_grippers(station_parameters(scenario, mesh)))
+    if broken is not None:
+        raise UserError(str(source), "safety", f"{broken} at the start")
     out.mkdir(parents=True, exist_ok=True)
     page = _open_meshcat() if meshcat else None
 
@@ -75,6 +88,7 @@ def run_scenario(
             policy,
             barycentric_transfer(mesh, belief),
             rates(scenario),
+            limits,
             writer,
             page,
             effects(scenario),

@@ -170,7 +170,7 @@ class GlobalMpc:
     progress_step: float = 0.04  # advance of s asked for per step (k)
     approach_distance: float = 0.20  # cap of l_h, m
     waiting_progress: float = 0.3  # least s of a waiting sleeve
-    force_limit: float = 21.0  # beyond it grippers give way, N
+    force_limit: float | None = None  # deprecated, N: is safety.force_limit now
 
 
 @dataclass
@@ -181,6 +181,35 @@ class Controller:
     material: Material = field(default_factory=Material)
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
     command_rate: float = 100.0  # Hz
+
+
+@dataclass
+class Workspace:
+    """A box in the world frame that the grippers' commands stay in; m."""
+
+    low: list[float] = field(default_factory=list)  # x, y, z
+    high: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Safety:
+    """Limits that no controller's request gets past; see models/control/safety.py."""
+
+    max_speed: float = 0.25  # of a gripper's command, m/s
+    max_acceleration: float = 2.0  # the same, m/s²
+    max_braking: float = 6.0  # where the other limits need it; never exceeded, m/s²
+    force_limit: float = 21.0  # no pulling from here on, N; beyond it grippers give way
+    soft_force_limit: float | None = None  # pulling fades from here on, N; half of it if empty
+    force_filter_time: float = 0.05  # of the force's low-pass, s
+    yield_rate: float = 0.005  # speed of giving way per force beyond the limit, m/s/N
+    yield_speed: float = 0.1  # of giving way, at most, m/s
+    relax_speed: float = 0.02  # of giving way while stopped, m/s
+    stop_time: float = 0.5  # beyond the force limit, after which both grippers stop, s
+    max_lead: float = 0.02  # of a command before its gripper, m
+    stale_time: float = 0.1  # age at which a request is not obeyed any more, s
+    least_distance: float = 0.08  # between the grippers, m
+    largest_distance: float | None = None  # between the grippers, m; any if empty
+    workspace: Workspace | None = None  # everywhere if empty
 
 
 @dataclass
@@ -255,6 +284,7 @@ class Scenario:
     person: Person = field(default_factory=Person)
     plant: Plant = field(default_factory=Plant)
     controller: Controller = field(default_factory=Controller)
+    safety: Safety = field(default_factory=Safety)
     station: Station = field(default_factory=Station)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
@@ -317,6 +347,20 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.clearance": (0.0, 1e6),
     "weights.free_clearance": (0.0, 1.0),
     "command_rate": (10.0, 1000.0),
+    "safety.max_speed": (0.001, 2.0),
+    "safety.max_acceleration": (0.01, 50.0),
+    "safety.max_braking": (0.01, 100.0),
+    "safety.force_limit": (1.0, 200.0),
+    "safety.soft_force_limit": (0.0, 200.0),
+    "safety.force_filter_time": (0.0, 1.0),
+    "safety.yield_rate": (0.0, 0.1),
+    "safety.yield_speed": (0.0, 1.0),
+    "safety.relax_speed": (0.001, 0.2),
+    "safety.stop_time": (0.0, 60.0),
+    "safety.max_lead": (0.001, 0.2),
+    "safety.stale_time": (0.005, 5.0),
+    "safety.least_distance": (0.0, 1.0),
+    "safety.largest_distance": (0.05, 3.0),
     "gripper.max_speed": (0.001, 2.0),
     "gripper.max_acceleration": (0.01, 50.0),
     "start.distance_behind": (0.1, 2.0),
@@ -360,6 +404,8 @@ def load_scenario(
     except (RuntimeError, ValueError, TypeError) as error:
         raise UserError(source, "", f"cannot be read: {error}") from error
     _check_ranges(source, "", scenario)
+    _move_force_limit(source, content, scenario)
+    _check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
     mpc = scenario.controller.global_mpc
     if mpc.delay >= mpc.period:
         raise UserError(
@@ -527,6 +573,65 @@ def _check_ranges(source: str, key: str, value: Any) -> None:
         )
         if bounds is not None and not bounds[0] <= value <= bounds[1]:
             raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
+
+
+def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:
+    """Takes the limit from where it stood before there was a group `safety`."""
+    mpc = scenario.controller.global_mpc
+    if mpc.force_limit is None:
+        return
+    if "force_limit" in content.get("safety", {}):
+        raise UserError(
+            source,
+            "controller.global_mpc.force_limit",
+            f"is {mpc.force_limit} N beside safety.force_limit, "
+            "expected the latter alone: this key is its old name",
+        )
+    scenario.safety.force_limit, mpc.force_limit = mpc.force_limit, None
+
+
+def _check_safety(source: str, safety: Safety, command_period: float) -> None:
+    """Holds limits against each other."""
+    soft, least = safety.soft_force_limit, safety.least_distance
+    if soft is not None and soft >= safety.force_limit:
+        raise UserError(
+            source,
+            "safety.soft_force_limit",
+            f"is {soft} N, expected less than force_limit, {safety.force_limit} N",
+        )
+    if safety.max_braking < safety.max_acceleration:
+        raise UserError(
+            source,
+            "safety.max_braking",
+            f"is {safety.max_braking} m/s², expected max_acceleration, "
+            f"{safety.max_acceleration} m/s², at least",
+        )
+    if safety.largest_distance is not None and safety.largest_distance <= least:
+        raise UserError(
+            source,
+            "safety.largest_distance",
+            f"is {safety.largest_distance} m, expected more than least_distance, {least} m",
+        )
+    if safety.stale_time < command_period:
+        raise UserError(
+            source,
+            "safety.stale_time",
+            f"is {safety.stale_time} s, expected a period of the commands, "
+            f"{command_period:g} s, at least",
+        )
+    if safety.workspace is not None:
+        corners = {"low": safety.workspace.low, "high": safety.workspace.high}
+        for name, corner in corners.items():
+            if len(corner) != 3 or not all(math.isfinite(x) for x in corner):
+                raise UserError(
+                    source, f"safety.workspace.{name}", f"is {corner}, expected x, y, z in m"
+                )
+        if not all(low < high for low, high in zip(*corners.values(), strict=True)):
+            raise UserError(
+                source,
+                "safety.workspace.high",
+                f"is {corners['high']}, expected more than low, {corners['low']}, on each axis",
+            )
 
 
 def _without_none(schema: Any) -> Any:

@@ -96,9 +96,7 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     builder.Connect(tone.get_output_port(), plant.get_applied_generalized_force_input_port())
 
     held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
-    top = shoulder_height(p.measures, p.posture) + p.height_offset
-    hung = p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
-    grippers = np.stack([hung[p.mesh.grasp[side]].mean(axis=0) for side in SIDES])
+    hung, grippers = hung_garment(p), start_grippers(p)
     start = settled(p, hung, held)
 
     cloth = builder.AddNamedSystem(
@@ -150,6 +148,18 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     diagram = builder.Build()
     diagram.set_name("station")
     return Station(diagram, plant, scene_graph, person, cloth, grippers)
+
+
+def hung_garment(p: StationParameters) -> FloatArray:
+    """Returns the garment's rest shape (n,3) where its grippers are at first, p_WN, m."""
+    top = shoulder_height(p.measures, p.posture) + p.height_offset
+    return p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
+
+
+def start_grippers(p: StationParameters) -> FloatArray:
+    """Returns where left and right gripper are at first, p_WG (2,3), m."""
+    hung = hung_garment(p)
+    return np.stack([hung[p.mesh.grasp[side]].mean(axis=0) for side in SIDES])
 
 
 def _integrator(p: StationParameters, held: np.ndarray) -> Integrator:

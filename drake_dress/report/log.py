@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.control.safety import Verdict
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES, Side
 
@@ -60,6 +61,8 @@ class Sample:
         estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
         estimate_joint_position: (6,3), m; None where it has none.
         capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
+        safety: (2,) flags of `models.control.safety.Verdict` that came up since the sample before;
+            left, right.
     """
 
     time: float
@@ -77,6 +80,7 @@ class Sample:
     estimate_joint_position: npt.ArrayLike | None = None
     capsule_a: npt.ArrayLike | None = None
     capsule_b: npt.ArrayLike | None = None
+    safety: npt.ArrayLike = (0, 0)
 
 
 class RunLogWriter:
@@ -147,6 +151,9 @@ class RunLogWriter:
         self._add("/control/stage", (2,), "1", dtype="i1")
         self._series["/control/stage"].attrs["names"] = list(SIDES)
         self._series["/control/stage"].attrs["values"] = list(STAGE_NAMES)
+        self._add("/control/safety", (2,), "1", dtype="i2")
+        self._series["/control/safety"].attrs["names"] = list(SIDES)
+        self._series["/control/safety"].attrs["flags"] = [f"{v.value} {v.name}" for v in Verdict]
         for name in ("global", "local"):
             self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
         self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
@@ -208,6 +215,7 @@ class RunLogWriter:
             "/garment/contact_force": sample.contact_force,
             "/human/joint_position": sample.joint_position,
             "/control/stage": sample.stage,
+            "/control/safety": sample.safety,
             "/control/global/solve_time": sample.global_solve_time,
             "/control/local/solve_time": sample.local_solve_time,
         }
@@ -427,6 +435,13 @@ class RunLog:
         """(T,2) 0 prepare, 1 dress, 2 done; left, right."""
         return np.asarray(self.file["/control/stage"], dtype=np.int64)
 
+    @cached_property
+    def safety(self) -> npt.NDArray[np.int64] | None:
+        """(T,2) flags of `models.control.safety.Verdict`; left, right; None where not logged."""
+        if "/control/safety" not in self.file:
+            return None
+        return np.asarray(self.file["/control/safety"], dtype=np.int64)
+
     def solve_time(self, controller: str) -> FloatArray:
         """Returns (T,) s of the `global` or `local` controller, NaN where no solve ended."""
         name = f"/control/{controller}/solve_time"
@@ -471,6 +486,7 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
     "/human/capsule_a": ("T", "c", 3),
     "/human/capsule_b": ("T", "c", 3),
     "/human/capsule_radius": ("c",),
+    "/control/safety": ("T", 2),
     "/control/global/solve_time": ("T",),
     "/control/local/solve_time": ("T",),
 }

@@ -77,6 +77,7 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
         f"<p>{html.escape(detail)}</p></header>",
         "<h2>Limits asked and reached</h2>",
         _limits(summary, rules),
+        _safety(summary),
         "<h2>Pace</h2>",
         _pace(summary),
     ]
@@ -145,6 +146,20 @@ def _limits(summary: dict[str, Any], rules: SuccessRules) -> str:
         "<table><thead><tr><th></th><th>asked</th><th>reached</th><th></th></tr></thead>"
         f"<tbody>{body}</tbody></table>"
     )
+
+
+def _safety(summary: dict[str, Any]) -> str:
+    """Returns a line on what the safety governor cut; empty where it cut nothing."""
+    cuts = summary.get("safety_cut_s") or {}
+    told = [
+        f"{side}: " + ", ".join(f"{name} {time:.1f} s" for name, time in cuts[side].items())
+        for side in SIDES
+        if cuts.get(side)
+    ]
+    if not told:
+        return ""
+    line = html.escape("; ".join(told))
+    return f'<p class="note">Requests were cut by the safety governor. {line}.</p>'
 
 
 def _pace(summary: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.control.safety import Verdict
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
@@ -51,7 +52,9 @@ def summarize(
     over the edges of |length / rest length - 1|, at its worst sample; `max_edge_strain_all` the
     worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
-    time from which both sleeves stay on (s and linking number).
+    time from which both sleeves stay on (s and linking number). `safety_cut_s` is, for each side
+    and each flag of the safety governor that came up, the time of the samples that have it; None
+    where not logged.
 
     Args:
         log: of the run.
@@ -96,6 +99,7 @@ def summarize(
             "median": 1e3 * float(np.median(solve)) if len(solve) else None,
             "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
         }
+    summary["safety_cut_s"] = _safety_cuts(log)
     return summary | {"seed": log.seed, "version": log.version}
 
 
@@ -134,6 +138,17 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         limit = f"{100 * m.edge_strain[i]:.1f} % > {100 * rules.max_edge_strain:g} %"
         return f"edges over-strained: 99th percentile {limit} at t = {log.time[i]:.2f} s"
     return None
+
+
+def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:
+    if log.safety is None:
+        return None
+    since_last = np.diff(log.time, prepend=log.time[:1])
+    cuts: dict[str, dict[str, float]] = {}
+    for k, side in enumerate(SIDES):
+        time = {v: float(since_last[(log.safety[:, k] & v.value) != 0].sum()) for v in Verdict}
+        cuts[side] = {str(v.name).lower(): t for v, t in time.items() if t > 0.0}
+    return cuts
 
 
 def _number(value: float) -> float | None:

@@ -38,8 +38,10 @@ class RunRecorder(LeafSystem):
         - solve_time
         - estimated_position
         - estimated_joint_position
+        - verdict
 
-    Sizes and units as at the ports of station and controllers.
+    Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
+    samples nothing is lost: a sample holds all their flags.
 
     Args:
         writer: the open log.
@@ -47,6 +49,7 @@ class RunRecorder(LeafSystem):
         estimate_count: nodes of the controller's garment.
         capsules: of the person, with the index of the body each is fixed in.
         period: between samples, s.
+        verdict_period: between verdicts, s.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class RunRecorder(LeafSystem):
         estimate_count: int,
         capsules: Sequence[tuple[int, Capsule]],
         period: float,
+        verdict_period: float,
     ) -> None:
         super().__init__()
         self._writer = writer
@@ -63,6 +67,7 @@ class RunRecorder(LeafSystem):
         self._capsules = list(capsules)
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
         self._solves = 0.0
+        self._verdict = np.zeros(2, dtype=int)
         n = len(mesh.rest_position)
         self.DeclareVectorInputPort("garment_position", 3 * n)
         self.DeclareVectorInputPort("contact", n)
@@ -76,7 +81,12 @@ class RunRecorder(LeafSystem):
         self.DeclareVectorInputPort("solve_time", 2)
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
+        self.DeclareVectorInputPort("verdict", 2)
+        self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
+
+    def _collect(self, context: Context) -> None:
+        self._verdict |= self.GetInputPort("verdict").Eval(context).astype(int)
 
     def _append(self, context: Context) -> None:
         def value(name: str) -> np.ndarray:
@@ -103,6 +113,8 @@ class RunRecorder(LeafSystem):
         solve_time, solves = value("solve_time")
         ended = solves > self._solves
         self._solves = float(solves)
+        self._collect(context)
+        verdict, self._verdict = self._verdict, np.zeros(2, dtype=int)
         self._writer.append(
             Sample(
                 time=context.get_time(),
@@ -114,6 +126,7 @@ class RunRecorder(LeafSystem):
                 gripper_force={side: value(f"{side}_gripper_force") for side in SIDES},
                 dressing=dressing,
                 stage=value("stage"),
+                safety=verdict,
                 global_solve_time=float(solve_time) if ended else np.nan,
                 estimate_garment_position=value("estimated_position").reshape(-1, 3),
                 estimate_joint_position=value("estimated_joint_position").reshape(6, 3),

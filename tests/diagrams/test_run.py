@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from drake_dress.__main__ import main
+from drake_dress.models.control.safety import Verdict
 
 SCENARIO = """# a second of it, coarse
 duration: 1.0
@@ -43,6 +44,17 @@ def test_same_seed_gives_the_same_numbers(run: tuple[int, Path]) -> None:
     with h5py.File(folder / "out" / "run.h5") as a, h5py.File(folder / "again" / "run.h5") as b:
         for name in ("garment/position", "gripper/left/force", "human/joint_position"):
             np.testing.assert_array_equal(a[name][()], b[name][()])
+
+
+def test_log_tells_what_safety_cut(run: tuple[int, Path]) -> None:
+    _, folder = run
+    with h5py.File(folder / "out" / "run.h5") as log:
+        safety = log["control/safety"]
+        assert safety.shape == (len(log["time"]), 2)
+        assert f"{Verdict.ACCELERATION.value} ACCELERATION" in list(safety.attrs["flags"])
+        # the first plan sets out at once, which grippers cannot
+        assert np.all(np.any(safety[()] & Verdict.ACCELERATION.value, axis=0))
+        assert not np.any(safety[()] & (Verdict.INVALID | Verdict.STALE | Verdict.UNMEASURED).value)
 
 
 def test_interrupt_leaves_a_log_of_what_had_run(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from drake_dress.diagrams.build import safety_limits
 from drake_dress.diagrams.scenario import (
     Arm,
     Scenario,
@@ -35,6 +36,11 @@ controller:
   material: {stretch_stiffness: 80}
   global_mpc: {period: 1.0, delay: 0.3, horizon: 4, weights: {direction: 0.1}}
   command_rate: 200.0
+safety:
+  force_limit: 15.0
+  soft_force_limit: 5.0
+  largest_distance: 0.7
+  workspace: {low: [-2.0, -1.0, 0.5], high: [1, 1.0, 2.0]}
 station: {kind: simulated, gripper: {max_speed: 0.1}, start: {height_offset: 0.1}}
 variation: {arm_angle_deg: 5.0}
 log: {rate: 10.0}
@@ -69,6 +75,25 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
     assert scenario.duration == 3.0
     assert scenario.garment.mesh is not None and scenario.garment.mesh.file == "x.obj"
     assert scenario.seed == 5
+
+
+def test_old_name_of_the_force_limit_still_sets_it(tmp_path: Path) -> None:
+    old = "controller.global_mpc.force_limit=12.5"
+    scenario = load_scenario(write(tmp_path, "seed: 0"), [old])
+    assert scenario.safety.force_limit == 12.5
+    assert safety_limits(scenario).hard_force == 12.5
+    assert safety_limits(scenario).soft_force == 6.25
+    again = load_scenario(write(tmp_path, resolved_yaml(scenario)))
+    assert again == scenario
+
+
+def test_safety_group_reaches_the_limits(tmp_path: Path) -> None:
+    limits = safety_limits(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)))
+    assert (limits.soft_force, limits.hard_force, limits.largest_distance) == (5.0, 15.0, 0.7)
+    assert limits.workspace is not None
+    assert limits.workspace.tolist() == [[-2.0, -1.0, 0.5], [1.0, 1.0, 2.0]]
+    defaults = safety_limits(load_scenario(write(tmp_path, "seed: 0")))
+    assert (defaults.soft_force, defaults.hard_force, defaults.workspace) == (10.5, 21.0, None)
 
 
 def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:

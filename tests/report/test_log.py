@@ -73,6 +73,7 @@ def test_layout_is_the_published_one(path, garment, samples):
         "human/joint_position": (count, 6, 3),
         "human/radius": (6,),
         "control/stage": (count, 2),
+        "control/safety": (count, 2),
         "control/global/solve_time": (count,),
         "control/local/solve_time": (count,),
         "estimate/garment/position": (count, n, 3),
@@ -92,6 +93,18 @@ def test_layout_is_the_published_one(path, garment, samples):
         assert list(file["human/joint_position"].attrs["names"]) == list(JOINT_NAMES)
         assert file["gripper/left/force"].attrs["unit"] == "N"
         assert file["garment/position"].attrs["frame"] == "world"
+
+
+def test_log_without_verdicts_is_still_a_log(path):
+    with RunLog.open(path) as log:
+        np.testing.assert_array_equal(log.safety, 0)
+    _edit(path, _delete_safety)
+    with RunLog.open(path) as log:
+        assert log.safety is None
+
+
+def _delete_safety(file: h5py.File) -> None:
+    del file["control/safety"]
 
 
 def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from drake_dress.errors import UserError
+from drake_dress.models.control.safety import Verdict
 from drake_dress.report.log import RunLog
 from drake_dress.report.report_html import write_report
 from drake_dress.report.summary import summarize, write_summary
@@ -33,6 +35,14 @@ def test_report_of_a_failure_says_the_reason(tmp_path):
     text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06), beside=True))
     assert "The dressing failed" in text
     assert "left arm outside the sleeve: linking number 0" in text
+
+
+def test_report_tells_what_safety_cut_and_only_then(tmp_path):
+    samples = synthetic.dressing(synthetic.coat(0.06), travel=0.0)
+    assert "safety governor" not in _run(tmp_path, samples)
+    samples[3] = replace(samples[3], safety=[0, int(Verdict.FORCE | Verdict.STOPPED)])
+    text = _run(tmp_path, samples)
+    assert "cut by the safety governor. right: force 0.5 s, stopped 0.5 s." in text
 
 
 def test_insertion_of_each_sleeve_is_pictured(tmp_path):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.control.safety import Verdict
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import first_lasting, penetration_depth, unique_edges
 from drake_dress.report.summary import SuccessRules, summarize, write_summary
@@ -29,6 +30,7 @@ KEYS = {
     "max_penetration_m",
     "realtime_factor",
     "wall_time_s",
+    "safety_cut_s",
     "global_rate_hz",
     "local_rate_hz",
     "global_solve_ms",
@@ -85,6 +87,17 @@ def test_s_of_two_with_the_arms_outside_is_no_success(summary_of, garment):
     assert summary["reason"] == "left arm outside the sleeve: linking number 0"
     assert not summary["arm_inside_left"] and not summary["arm_inside_right"]
     assert summary["dressing_time_s"] is None
+
+
+def test_what_safety_cut_is_summed_by_side_and_flag(summary_of, garment):
+    samples = _dressed(garment)
+    flags = Verdict.FORCE | Verdict.BRAKING
+    samples[3] = replace(samples[3], safety=[int(flags), 0])
+    samples[4] = replace(samples[4], safety=[int(Verdict.FORCE), 0])
+    assert summary_of(samples)["safety_cut_s"] == {
+        "left": {"force": pytest.approx(1.0), "braking": pytest.approx(0.5)},
+        "right": {},
+    }
 
 
 def test_one_sleeve_is_no_success(summary_of, garment):

@@ -5,51 +5,36 @@ from pydrake.common.value import Value
 from drake_dress.systems.global_mpc import TimedPlan
 from drake_dress.systems.plan_follower import PlanFollower
 
-LIMIT = 30.0
+PLAN = TimedPlan(1.0, 0.1, np.arange(18.0).reshape(3, 2, 3))
 
 
-def commanded_speed(force: list[float], velocity: list[float], measured_at: float = 0.0) -> float:
-    """Returns the speed of the left command along x after half a second."""
-    follower = PlanFollower(np.zeros((2, 3)), 0.01, LIMIT, max_lead=10.0)
+def asked_at(time: float) -> np.ndarray:
+    """Returns (2,3) what is asked for under `PLAN`."""
+    follower = PlanFollower()
     context = follower.CreateDefaultContext()
-    plan = TimedPlan(0.0, 10.0, np.tile(velocity, (1, 2, 1)))
-    follower.get_input_port(0).FixValue(context, Value(plan))
-    for side in ("left", "right"):
-        follower.GetInputPort(f"{side}_gripper_position").FixValue(context, [measured_at, 0.0, 0.0])
-        follower.GetInputPort(f"{side}_gripper_force").FixValue(context, force)
-    x = []
-    for _ in range(100):
-        values = follower.EvalUniquePeriodicDiscreteUpdate(context)
-        context.get_mutable_discrete_state_vector().SetFromVector(values.value())
-        x.append(follower.GetOutputPort("left_position_command").Eval(context)[0])
-    return (x[-1] - x[-2]) / 0.01
+    follower.get_input_port(0).FixValue(context, Value(PLAN))
+    context.SetTime(time)
+    assert follower.GetOutputPort("request_time").Eval(context) == [time]
+    return np.stack(
+        [follower.GetOutputPort(f"{s}_velocity_request").Eval(context) for s in ("left", "right")]
+    )
 
 
-def test_without_force_the_plan_is_followed() -> None:
-    assert commanded_speed([0, 0, 0], [0.1, 0, 0]) == pytest.approx(0.1)
+@pytest.mark.parametrize(("time", "row"), [(1.0, 0), (1.09, 0), (1.1, 1), (1.2999, 2)])
+def test_each_velocity_of_the_plan_is_asked_for_in_its_time(time: float, row: int) -> None:
+    np.testing.assert_array_equal(asked_at(time), PLAN.velocity[row])
 
 
-def test_pulling_fades_out_as_force_rises() -> None:
-    assert commanded_speed([-22.5, 0, 0], [0.1, 0, 0]) == pytest.approx(0.05, rel=0.01)
-    assert commanded_speed([-LIMIT, 0, 0], [0.1, 0, 0]) == pytest.approx(0.0, abs=1e-3)
+@pytest.mark.parametrize("time", [0.0, 0.95, 1.3, 50.0])
+def test_plan_that_does_not_run_means_rest(time: float) -> None:
+    np.testing.assert_array_equal(asked_at(time), 0.0)
 
 
-def test_beyond_the_limit_the_gripper_gives_way() -> None:
-    assert commanded_speed([-40.0, 0, 0], [0.1, 0, 0]) < -0.01
-
-
-def test_moving_with_the_force_is_not_held_back() -> None:
-    assert commanded_speed([22.5, 0, 0], [0.1, 0, 0]) == pytest.approx(0.1)
-
-
-def test_plan_that_has_run_out_means_rest() -> None:
-    follower = PlanFollower(np.zeros((2, 3)), 0.01, LIMIT)
+def test_request_changes_with_time_alone() -> None:
+    follower = PlanFollower()
     context = follower.CreateDefaultContext()
-    context.SetTime(5.0)
-    plan = TimedPlan(0.0, 0.1, np.full((6, 2, 3), 0.1))
-    follower.get_input_port(0).FixValue(context, Value(plan))
-    for side in ("left", "right"):
-        follower.GetInputPort(f"{side}_gripper_position").FixValue(context, [0, 0, 0])
-        follower.GetInputPort(f"{side}_gripper_force").FixValue(context, [0, 0, 0])
-    values = follower.EvalUniquePeriodicDiscreteUpdate(context)
-    np.testing.assert_array_equal(values.value()[:6], 0.0)
+    follower.get_input_port(0).FixValue(context, Value(PLAN))
+    port = follower.GetOutputPort("left_velocity_request")
+    for k in range(3):
+        context.SetTime(1.05 + 0.1 * k)
+        np.testing.assert_array_equal(port.Eval(context), PLAN.velocity[k, 0])

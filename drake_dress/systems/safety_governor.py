@@ -1,0 +1,110 @@
+"""What stands between a controller and two arms."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from drake_dress.models.control.safety import (
+    GovernorState,
+    Measurement,
+    Request,
+    SafetyLimits,
+    step,
+)
+from drake_dress.models.sides import SIDES
+
+
+class SafetyGovernor(LeafSystem):
+    """Turns velocity requests into position commands that obey limits, whatever is requested.
+
+    .. pydrake_system::
+
+        name: SafetyGovernor
+        input_ports:
+        - left_velocity_request
+        - right_velocity_request
+        - request_time
+        - left_gripper_position
+        - right_gripper_position
+        - left_gripper_force
+        - right_gripper_force
+        output_ports:
+        - left_position_command
+        - right_position_command
+        - left_velocity_command
+        - right_velocity_command
+        - verdict
+
+    Requests (3,) m/s in W; request_time (1,) when the controller made both, s, of the diagram's
+    clock. Positions (3,) p_WG, m; forces (3,) of the garment on the gripper, N. verdict (2,): of
+    left and right, the flags of `models.control.safety.Verdict` as a number. Outputs are of the
+    state alone, no feedthrough. Any input may be NaN or infinite.
+
+    The law is that of `models/control/safety.py`. The governor integrates its commands itself: it
+    takes no position from a controller.
+
+    Args:
+        start: (2,3) p_WG of left and right at time 0, m.
+        period: of the commands, s.
+        limits: which are kept.
+
+    Raises:
+        ValueError: the start is outside the limits of place.
+    """
+
+    def __init__(self, start: np.ndarray, period: float, limits: SafetyLimits) -> None:
+        super().__init__()
+        start = np.asarray(start, dtype=float).reshape(2, 3)
+        broken = limits.broken_at(start)
+        if broken is not None:
+            raise ValueError(broken)
+        self._period = period
+        self._limits = limits
+        self._memory = self.DeclareDiscreteState(GovernorState(start).packed())
+        self._verdict = self.DeclareDiscreteState(np.zeros(2))
+        for side in SIDES:
+            self.DeclareVectorInputPort(f"{side}_velocity_request", 3)
+        self.DeclareVectorInputPort("request_time", 1)
+        for name in ("position", "force"):
+            for side in SIDES:
+                self.DeclareVectorInputPort(f"{side}_gripper_{name}", 3)
+        ticket = {self.discrete_state_ticket(self._memory)}
+        for offset, name in ((0, "position"), (6, "velocity")):
+            for i, side in enumerate(SIDES):
+                rows = slice(offset + 3 * i, offset + 3 * i + 3)
+                self.DeclareVectorOutputPort(f"{side}_{name}_command", 3, self._show(rows), ticket)
+        self.DeclareVectorOutputPort(
+            "verdict", 2, self._calc_verdict, {self.discrete_state_ticket(self._verdict)}
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        # compiled now and not when something is first cut, which must not wait half a second
+        too_fast = Request(np.full((2, 3), limits.max_speed), 0.0)
+        step(GovernorState(start), too_fast, Measurement(start, 0.0 * start), limits, 0.0, period)
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        def of_both(name: str) -> np.ndarray:
+            return np.stack([self.GetInputPort(f"{side}_{name}").Eval(context) for side in SIDES])
+
+        state, verdicts = step(
+            GovernorState.unpacked(context.get_discrete_state(self._memory).value()),
+            Request(
+                of_both("velocity_request"),
+                float(self.GetInputPort("request_time").Eval(context)[0]),
+            ),
+            Measurement(of_both("gripper_position"), of_both("gripper_force")),
+            self._limits,
+            context.get_time(),
+            self._period,
+        )
+        discrete.set_value(self._memory, state.packed())
+        discrete.set_value(self._verdict, [float(v) for v in verdicts])
+
+    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state(self._memory).value()[rows])
+
+        return calc
+
+    def _calc_verdict(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state(self._verdict).value())

@@ -1,0 +1,328 @@
+"""Limits hold whatever is asked and measured; what is within them passes unchanged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drake_dress.models.control.safety import (
+    GovernorState,
+    Measurement,
+    Request,
+    SafetyLimits,
+    Verdict,
+    step,
+)
+
+DT = 0.01
+START = np.array([[0.0, 0.3, 1.4], [0.0, -0.3, 1.4]])
+LIMITS = SafetyLimits()
+X, Y = np.eye(3)[:2]
+NOTHING = np.zeros((2, 3))
+ANY_NUMBER = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.floats(-1.0, 1.0),
+    st.floats(-50.0, 50.0),
+)
+
+
+class Arms:
+    """Governed grippers that follow at once, unless they are told to stand still."""
+
+    def __init__(self, limits: SafetyLimits = LIMITS, follow: bool = True) -> None:
+        self.limits, self.follow = limits, follow
+        self.state = GovernorState(START)
+        self.time = 0.0
+        self.verdicts = (Verdict.NONE, Verdict.NONE)
+        self.path = [START]
+        self.seen = Verdict.NONE
+
+    def ask(
+        self,
+        velocity: np.ndarray,
+        force: np.ndarray = NOTHING,
+        duration: float = DT,
+        stamp: float | None = None,
+        position: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Asks for `duration`; returns (T,2,3) the commands' velocities by their positions."""
+        path = [self.state.position]
+        for _ in range(round(duration / DT)):
+            measured = self.state.position if self.follow else START
+            self.state, self.verdicts = step(
+                self.state,
+                Request(np.broadcast_to(velocity, (2, 3)), self.time if stamp is None else stamp),
+                Measurement(
+                    measured if position is None else position, np.broadcast_to(force, (2, 3))
+                ),
+                self.limits,
+                self.time,
+                DT,
+            )
+            self.time += DT
+            self.seen |= self.verdicts[0] | self.verdicts[1]
+            self.path.append(self.state.position)
+            path.append(self.state.position)
+        return np.diff(path, axis=0) / DT
+
+
+def test_request_within_all_limits_passes_unchanged() -> None:
+    arms = Arms()
+    rng = np.random.default_rng(0)
+    wanted = NOTHING
+    for _ in range(200):
+        change = rng.normal(size=(2, 3))
+        change *= 0.9 * LIMITS.max_acceleration * DT / np.linalg.norm(change, axis=1)[:, None]
+        if np.linalg.norm(wanted + change, axis=1).max() < LIMITS.max_speed:
+            wanted = wanted + change
+        arms.ask(wanted, force=8.0 * X)
+        np.testing.assert_array_equal(arms.state.velocity, wanted)
+        assert arms.verdicts == (Verdict.NONE, Verdict.NONE)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(st.lists(ANY_NUMBER, min_size=19, max_size=19), min_size=2, max_size=12),
+    st.booleans(),
+)
+def test_no_input_gets_past_speed_and_acceleration(rows: list[list[float]], fresh: bool) -> None:
+    arms = Arms(SafetyLimits(workspace=START.mean(axis=0) + [[-0.5] * 3, [0.5] * 3]))
+    before = NOTHING
+    for row in rows:
+        values = np.array(row)
+        velocity = arms.ask(
+            values[:6].reshape(2, 3),
+            values[6:12].reshape(2, 3),
+            stamp=None if fresh else float(values[18]),
+            position=values[12:18].reshape(2, 3),
+        )[0]
+        assert np.isfinite(arms.state.position).all()
+        assert np.linalg.norm(velocity, axis=1).max() <= LIMITS.max_speed + 1e-9
+        change = np.linalg.norm(velocity - before, axis=1).max()
+        assert change <= LIMITS.max_braking * DT + 1e-9
+        before = velocity
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_pull_at_the_hard_limit_only_falls_until_it_is_gone(seed: int) -> None:
+    # other limits want otherwise: the workspace ends here, and the gripper stands still behind
+    rng = np.random.default_rng(seed)
+    last = rng.normal(size=(2, 3))
+    last *= LIMITS.max_speed * rng.random() / np.linalg.norm(last, axis=1).max()
+    limits = replace(
+        LIMITS,
+        workspace=START.mean(axis=0) + [[-0.01, -0.31, -0.01], [0.01, 0.31, 0.01]],
+        largest_distance=0.605,
+    )
+    force = rng.normal(size=(2, 3))
+    size = np.linalg.norm(force, axis=1)[:, None]
+    force *= LIMITS.hard_force * rng.uniform(1.0, 3.0, size=(2, 1)) / size
+    against = -force / np.linalg.norm(force, axis=1)[:, None]
+    state = GovernorState(START, last)
+    measured = START + 0.02 * rng.normal(size=(2, 3))
+    for k in range(20):
+        pull = np.sum(against * state.velocity, axis=1)
+        request = Request(0.3 * rng.normal(size=(2, 3)), k * DT)
+        state, _ = step(state, request, Measurement(measured, force), limits, k * DT, DT)
+        left = np.maximum(0.0, pull - limits.max_braking * DT)
+        assert np.all(np.sum(against * state.velocity, axis=1) <= left + 1e-9)
+    assert np.all(np.sum(against * state.velocity, axis=1) <= 1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_pull_fades_as_force_rises_and_the_rest_stays(share: float) -> None:
+    arms = Arms(follow=True)
+    force = LIMITS.hard_force - share * (LIMITS.hard_force - LIMITS.soft_force)
+    wanted = np.array([0.08, 0.06, 0.0])
+    velocity = arms.ask(wanted, -force * X, duration=1.0)[-1]
+    np.testing.assert_allclose(velocity, np.tile([0.08 * share, 0.06, 0.0], (2, 1)), atol=1e-6)
+    assert (arms.verdicts[0] & Verdict.FORCE != 0) == (share < 1.0)
+
+
+def test_moving_with_the_force_is_not_held_back() -> None:
+    velocity = Arms().ask(0.1 * X, 0.9 * LIMITS.hard_force * X, duration=1.0)[-1]
+    np.testing.assert_allclose(velocity, np.tile(0.1 * X, (2, 1)), atol=1e-9)
+
+
+def test_beyond_the_limit_the_gripper_gives_way_along_the_force() -> None:
+    arms = Arms(replace(LIMITS, stop_time=60.0))
+    velocity = arms.ask(0.2 * X + 0.05 * Y, -(LIMITS.hard_force + 10.0) * X, duration=1.0)[-1]
+    np.testing.assert_allclose(velocity, np.tile(-0.05 * X + 0.05 * Y, (2, 1)), atol=1e-6)
+    velocity = arms.ask(0.2 * X, -(LIMITS.hard_force + 1e5) * X, duration=1.0)[-1]
+    np.testing.assert_allclose(velocity, np.tile(-LIMITS.yield_speed * X, (2, 1)), atol=1e-6)
+
+
+def test_force_over_the_limit_is_answered_at_once_and_flutter_is_not() -> None:
+    arms = Arms()
+    arms.ask(0.12 * X, duration=0.5)
+    velocity = arms.ask(0.12 * X, -0.99 * LIMITS.hard_force * X)[-1]
+    np.testing.assert_allclose(velocity, np.tile(0.12 * X, (2, 1)))  # one sample: flutter
+    velocity = arms.ask(0.12 * X, -1.0 * LIMITS.hard_force * X)[-1]
+    np.testing.assert_allclose(velocity[:, 0], 0.12 - LIMITS.max_braking * DT)
+    assert Verdict.BRAKING in arms.verdicts[0]
+
+
+def test_lasting_force_stops_both_until_it_is_under_the_soft_limit() -> None:
+    arms = Arms()
+    left = np.array([[-22.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    arms.ask(0.1 * Y, left, duration=LIMITS.stop_time - DT)
+    assert Verdict.STOPPED not in arms.verdicts[0]
+    arms.ask(0.1 * Y, left, duration=2 * DT)
+    assert Verdict.STOPPED in arms.verdicts[0] and Verdict.STOPPED in arms.verdicts[1]
+    # between soft and hard it stays stopped: the pulled gripper gives way, the other rests
+    velocity = arms.ask(0.1 * Y, 0.6 * left, duration=3.0)[-1]
+    np.testing.assert_allclose(velocity, [-LIMITS.relax_speed * X, 0.0 * X], atol=1e-9)
+    velocity = arms.ask(0.1 * Y, 0.4 * left, duration=1.0)[-1]
+    np.testing.assert_allclose(velocity, np.tile(0.1 * Y, (2, 1)), atol=1e-9)
+    assert arms.verdicts == (Verdict.NONE, Verdict.NONE)
+
+
+def test_gripper_that_gives_way_while_stopped_does_not_leave_the_workspace() -> None:
+    # a weight over the soft limit would draw it down for ever
+    box = START.mean(axis=0) + np.array([[-0.1, -0.5, -0.1], [0.1, 0.5, 0.1]])
+    arms = Arms(replace(LIMITS, workspace=box))
+    arms.ask(NOTHING, [0.0, 0.0, -22.0], duration=1.5 * LIMITS.stop_time)
+    arms.ask(NOTHING, [0.0, 0.0, -15.0], duration=10.0)
+    assert Verdict.STOPPED in arms.verdicts[0]
+    np.testing.assert_allclose(arms.state.position[:, 2], box[0, 2], atol=1e-4)
+    assert np.array(arms.path)[:, :, 2].min() >= box[0, 2] - 1e-12
+
+
+def test_force_that_chatters_about_the_limit_stops_in_the_end() -> None:
+    arms = Arms()
+    for k in range(300):
+        arms.ask(0.1 * Y, -(24.0 if k % 3 else 15.0) * X)
+    assert Verdict.STOPPED in arms.verdicts[0]
+
+
+def test_stale_request_comes_to_rest_by_ordinary_braking() -> None:
+    arms = Arms()
+    arms.ask(LIMITS.max_speed * X, duration=0.5)
+    last = arms.time - DT
+    arms.ask(LIMITS.max_speed * X, duration=LIMITS.stale_time, stamp=last)
+    assert arms.verdicts[0] == Verdict.NONE
+    braking = LIMITS.max_speed / LIMITS.max_acceleration
+    velocity = arms.ask(LIMITS.max_speed * X, duration=braking + DT, stamp=last)
+    assert np.linalg.norm(velocity[0], axis=1).max() < LIMITS.max_speed
+    np.testing.assert_array_equal(velocity[-1], 0.0)
+    changes = np.linalg.norm(np.diff(velocity, axis=0), axis=2)
+    assert changes.max() <= LIMITS.max_acceleration * DT + 1e-9
+    assert Verdict.STALE in arms.verdicts[0]
+
+
+def test_old_request_is_not_obeyed_after_a_newer_one() -> None:
+    arms = Arms()
+    arms.ask(NOTHING, duration=0.5)
+    arms.ask(0.02 * X, stamp=arms.time - 0.05)
+    assert Verdict.STALE in arms.verdicts[0]
+    np.testing.assert_array_equal(arms.state.velocity, 0.0)
+
+
+def test_request_from_the_future_is_not_obeyed_and_shuts_nobody_out() -> None:
+    arms = Arms()
+    arms.ask(0.02 * X, stamp=1e9)
+    np.testing.assert_array_equal(arms.state.velocity, 0.0)
+    arms.ask(0.02 * X)
+    np.testing.assert_array_equal(arms.state.velocity, np.tile(0.02 * X, (2, 1)))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300, 100.0])
+def test_one_side_that_is_no_velocity_brings_both_to_rest(bad: float) -> None:
+    arms = Arms()
+    arms.ask(0.1 * X, duration=0.5)
+    arms.ask(np.array([[0.1, 0.0, 0.0], [0.0, bad, 0.0]]), duration=0.1)
+    np.testing.assert_allclose(arms.state.velocity, 0.0, atol=1e-12)
+    assert Verdict.INVALID in arms.verdicts[0] and Verdict.INVALID in arms.verdicts[1]
+
+
+@pytest.mark.parametrize("quantity", ["force", "position"])
+def test_one_side_unmeasured_stops_both_until_it_is_measured(quantity: str) -> None:
+    arms = Arms()
+    arms.ask(0.2 * X, duration=0.5)
+    hidden = np.array([[np.nan, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    hidden = hidden + (arms.state.position if quantity == "position" else 0.0)
+    arms.ask(0.2 * X, duration=0.2 / LIMITS.max_braking + DT, **{quantity: hidden})
+    np.testing.assert_allclose(arms.state.velocity, 0.0, atol=1e-12)
+    assert Verdict.UNMEASURED in arms.verdicts[0] and Verdict.UNMEASURED not in arms.verdicts[1]
+    arms.ask(0.2 * X, duration=0.5)
+    np.testing.assert_allclose(arms.state.velocity, np.tile(0.2 * X, (2, 1)))
+
+
+def test_command_does_not_run_away_from_a_gripper_that_stands_still() -> None:
+    arms = Arms(follow=False)
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        arms.ask(rng.normal(size=(2, 3)), duration=0.12)
+    furthest = np.linalg.norm(np.array(arms.path) - START, axis=2).max()
+    assert 0.9 * LIMITS.max_lead < furthest <= LIMITS.max_lead + 1e-12
+    assert Verdict.LEAD in arms.seen
+
+
+def test_nothing_winds_up_while_a_gripper_is_held_back() -> None:
+    arms = Arms(follow=False)
+    arms.ask(0.2 * X, duration=10.0)
+    velocity = arms.ask(-0.2 * X, duration=DT)[0]
+    assert np.all(velocity[:, 0] < 0.0)
+
+
+def test_workspace_is_reached_and_not_left() -> None:
+    box = START.mean(axis=0) + np.array([[-0.1, -0.5, -0.1], [0.1, 0.5, 0.1]])
+    arms = Arms(replace(LIMITS, workspace=box))
+    rng = np.random.default_rng(5)
+    for _ in range(30):
+        arms.ask(0.25 * rng.choice([-1.0, 1.0], size=(2, 3)), duration=0.8)
+    path = np.array(arms.path)
+    assert np.all(path >= box[0] - 1e-12) and np.all(path <= box[1] + 1e-12)
+    assert path[:, :, 2].min() < box[0, 2] + 1e-3
+    assert Verdict.WORKSPACE in arms.seen
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_grippers_keep_their_distances(sign: float) -> None:
+    arms = Arms(replace(LIMITS, least_distance=0.2, largest_distance=0.8))
+    for k in range(400):
+        turning = 0.1 * np.array([[np.sin(0.02 * k), 0.0, 0.1], [-np.sin(0.02 * k), 0.0, -0.1]])
+        outward = sign * np.array([[0.0, 0.2, 0.0], [0.0, -0.2, 0.0]])
+        arms.ask(outward + turning)
+    path = np.array(arms.path)
+    apart = np.linalg.norm(path[:, 0] - path[:, 1], axis=1)
+    if sign > 0.0:
+        assert 0.79 < apart.max() <= 0.8 + 1e-12
+    else:
+        assert 0.2 - 1e-12 <= apart.min() < 0.21
+    assert Verdict.DISTANCE in arms.seen
+
+
+def test_state_survives_being_packed() -> None:
+    arms = Arms()
+    arms.ask(0.1 * X, -30.0 * Y, duration=0.7)
+    assert arms.state.stopped
+    packed = arms.state.packed()
+    assert packed.shape == (GovernorState.SIZE,)
+    np.testing.assert_array_equal(GovernorState.unpacked(packed).packed(), packed)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"max_speed": 0.0},
+        {"max_speed": np.nan},
+        {"max_braking": 1.0},
+        {"soft_force": 30.0},
+        {"least_distance": 0.3, "largest_distance": 0.2},
+        {"workspace": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])},
+    ],
+)
+def test_limits_that_contradict_each_other_are_refused(bad: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(reversed(bad)).split("_")[-1]):
+        SafetyLimits(**bad)
+
+
+def test_start_outside_the_limits_of_place_is_told() -> None:
+    assert LIMITS.broken_at(START) is None
+    assert "0.600 m apart" in str(replace(LIMITS, largest_distance=0.5).broken_at(START))
+    box = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.3]])
+    assert "outside the workspace" in str(replace(LIMITS, workspace=box).broken_at(START))
