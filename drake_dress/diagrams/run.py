@@ -13,7 +13,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
-from drake_dress.diagrams.build import controller_policy, effects, plant_station, rates
+from drake_dress.diagrams.build import (
+    controller_policy,
+    effects,
+    plant_station,
+    predictor,
+    rates,
+)
 from drake_dress.diagrams.dressing import Dressing, is_finished, make_dressing
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
@@ -78,6 +84,7 @@ def run_scenario(
             writer,
             page,
             effects(scenario),
+            predictor(scenario),
         )
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)
     wall_time = clock.perf_counter() - begin
