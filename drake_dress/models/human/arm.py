@@ -75,34 +75,31 @@ class Arm:
 
         U = Σ m g z over both limbs' middles.
         """
-        axes, upper, fore = self._weights(angles)
-        slope = np.concatenate([np.cross(axes, upper + fore)[:3], np.cross(axes[3:], fore)])
-        torque: FloatArray = -slope[:, 2]
+        axes, carried = self._weights(angles)
+        torque: FloatArray = axes[:, 1] * carried[:, 0] - axes[:, 0] * carried[:, 1]
         return torque
 
     def gravity_stiffness(self, angles: FloatArray) -> FloatArray:
         """Returns (4,4) ∂²U/∂q², N·m/rad: positive where gravity draws the arm back.
 
         A vector d that hinges i ≤ j both carry, i the nearer to the torso, has
-        ∂²d/∂q_i∂q_j = a_i × (a_j × d).
+        ∂²d/∂q_i∂q_j = a_i × (a_j × d) = a_j (a_i·d) − d (a_i·a_j).
         """
-        axes, upper, fore = self._weights(angles)
-        carried = np.cross(axes, np.stack([upper + fore] * 3 + [fore]))
-        stiffness = np.empty((4, 4))
-        for j in range(4):
-            stiffness[: j + 1, j] = np.cross(axes[: j + 1], carried[j])[:, 2]
-            stiffness[j, :j] = stiffness[:j, j]
+        axes, carried = self._weights(angles)
+        nearer = np.triu((axes @ carried.T) * axes[:, 2] - (axes @ axes.T) * carried[:, 2])
+        stiffness: FloatArray = nearer + np.triu(nearer, 1).T
         return stiffness
 
-    def _weights(self, angles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Returns axes (4,3), and vectors whose heights add up to U: of upper arm, forearm, N·m."""
+    def _weights(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns axes (4,3), and what each hinge carries (4,3): weight times lever, N·m.
+
+        U changes as the height of what is carried.
+        """
         m = self.measures
         axes, upper, fore = self._chain(angles)
-        return (
-            axes,
-            GRAVITY * (0.5 * m.upper_arm_mass + m.forearm_mass) * upper,
-            0.5 * GRAVITY * m.forearm_mass * fore,
-        )
+        of_fore = 0.5 * GRAVITY * m.forearm_mass * fore
+        of_both = GRAVITY * (0.5 * m.upper_arm_mass + m.forearm_mass) * upper + of_fore
+        return axes, np.stack([of_both, of_both, of_both, of_fore])
 
     def _chain(self, angles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Returns the hinges' axes (4,3), shoulder → elbow and elbow → hand (3,), m."""

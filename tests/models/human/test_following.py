@@ -59,7 +59,7 @@ def test_led_by_less_than_the_threshold_nothing_is_followed() -> None:
 def test_what_is_led_further_is_followed_up_to_the_threshold() -> None:
     p = FollowingParameters(time_constant=0.5, threshold=0.3)
     led = REST + [0.4, -0.3, 0.2, 0.3]
-    s = held_at(led, 20.0, p)
+    s = held_at(led, 10.0, p)
     felt = (np.diag(STIFFNESS) + ARM.gravity_stiffness(s)) @ (led - s)
     assert np.abs(felt).max() == pytest.approx(0.3, abs=0.01)
     assert np.linalg.norm(led - s) < 0.3 * np.linalg.norm(led - REST)
@@ -89,20 +89,20 @@ def test_person_goes_back_to_comfort_where_that_is_asked() -> None:
     np.testing.assert_allclose(after - REST, np.exp(-1.0) * (s - REST), rtol=1e-2)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_leader_never_gains_on_the_way(seed: int) -> None:
     """From rest, springs, tone and weight give back no more than was put in, at any time."""
     p = FollowingParameters(time_constant=0.5, threshold=0.2)
-    t = np.arange(0.0, 3.0, STEP / 4.0)
+    t = np.arange(0.0, 2.0, STEP)
     path = random_cycle(np.random.default_rng(seed), t)
     s, gained, most = REST.copy(), 0.0, -np.inf
     for before, after in zip(path[:-1], path[1:], strict=True):
         middle = 0.5 * (before + after)
         gained += float(pull(s, middle) @ (after - before))
-        s = s + STEP / 4.0 * rate(s, middle, p)
+        s = s + STEP * rate(s, middle, p)
         most = max(most, gained)
     assert gained < -0.05
-    assert most < 1e-4
+    assert most < 2e-3
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -110,16 +110,16 @@ def test_leader_never_gains_on_the_way(seed: int) -> None:
 def test_closed_cycle_costs_the_leader_work(seed: int, back: float | None) -> None:
     """Also with a return to comfort, once the set-point repeats from cycle to cycle."""
     p = FollowingParameters(time_constant=0.5, threshold=0.2, return_time_constant=back)
-    t = np.linspace(0.0, 1.0, 1501)
+    t = np.linspace(0.0, 1.0, 601)
     path = random_cycle(np.random.default_rng(10 + seed), t)
-    s, step = REST.copy(), 4.0 / 1500
-    for _ in range(6):
+    s, step = REST.copy(), 4.0 / 600
+    for _ in range(4):
         start, gained = s.copy(), 0.0
         for before, after in zip(path[:-1], path[1:], strict=True):
             middle = 0.5 * (before + after)
             gained += float(pull(s, middle) @ (after - before))
             s = s + step * rate(s, middle, p)
-    np.testing.assert_allclose(s, start, atol=1e-3)
+    np.testing.assert_allclose(s, start, atol=5e-3)
     assert gained < -0.01
 
 
