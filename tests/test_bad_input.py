@@ -22,6 +22,58 @@ BAD_YAML = {
     "empty group": ("plant:", ["plant", "keys"]),
     "number for text": ("person: {posture: 3}", ["person.posture", "standing"]),
     "unknown posture": ("person: {posture: lying}", ["person.posture", "standing or sitting"]),
+    "unknown person": (
+        "person: {behaviour: {kind: robot}}",
+        ["person.behaviour.kind", "dummy or passive or active"],
+    ),
+    "unknown motion": (
+        "person: {behaviour: {kind: active, motions: [{turm: {}}]}}",
+        ["person.behaviour.motions[0].turm", "turn"],
+    ),
+    "unknown side": (
+        "person: {behaviour: {kind: active, motions: [{turn: {}}, {wave: {side: up}}]}}",
+        ["person.behaviour.motions[1].wave.side", "left or right or both"],
+    ),
+    "two motions in one": (
+        "person: {behaviour: {kind: active, motions: [{turn: {}, wave: {}}]}}",
+        ["person.behaviour.motions[0]", "turn and wave", "just one"],
+    ),
+    "no motion": (
+        "person: {behaviour: {kind: active, motions: [{}]}}",
+        ["person.behaviour.motions[0]", "nothing", "just one"],
+    ),
+    "motions that are no list": (
+        "person: {behaviour: {kind: active, motions: {turn: {}}}}",
+        ["person.behaviour.motions", "a list"],
+    ),
+    "motions of a dummy": (
+        "person: {behaviour: {motions: [{turn: {}}]}}",
+        ["person.behaviour.motions", "dummy", "kind: active"],
+    ),
+    "two reaches of one hand": (
+        "person: {behaviour: {kind: active, motions: [{reach: {}}, {reach: {side: left}}]}}",
+        ["person.behaviour.motions[1].reach.side", "left", "one reach"],
+    ),
+    "turn too far": (
+        "person: {behaviour: {kind: active, motions: [{turn: {angle_deg: 200}}]}}",
+        ["person.behaviour.motions[0].turn.angle_deg", "-90 to 90"],
+    ),
+    "turn too fast": (
+        "person: {behaviour: {kind: active, motions: [{turn: {angle_deg: 90, duration: 1}}]}}",
+        ["person.behaviour.motions[0].turn.duration", "rad/s"],
+    ),
+    "wave too fast": (
+        "person: {behaviour: {kind: active, motions: [{wave: {amplitude: 0.2, frequency: 2}}]}}",
+        ["person.behaviour.motions[0].wave", "max_hand_speed"],
+    ),
+    "tremor out of range": (
+        "person: {behaviour: {tremor: {frequency: 50}}}",
+        ["person.behaviour.tremor.frequency", "1 to 15"],
+    ),
+    "unknown predictor": (
+        "controller: {predictor: oracle}",
+        ["controller.predictor", "still or constant_velocity"],
+    ),
     "unknown preset": ("garment: {coat: {preset: cape}}", ["garment.coat.preset", "jacket"]),
     "unknown station": ("station: {kind: moon}", ["station.kind", "simulated"]),
     "too long": ("duration: 1e9", ["duration", "600"]),

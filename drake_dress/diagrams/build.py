@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.geometry import Meshcat
 
 from drake_dress.diagrams import scenario as schema
+from drake_dress.diagrams.behaviour import Behaviour, Kind
 from drake_dress.diagrams.dressing import Rates
 from drake_dress.diagrams.person import JointParameters, Person
 from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
@@ -17,7 +18,16 @@ from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human import motions
+from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_joint
+from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.prediction import (
+    ConstantVelocityPredictor,
+    MotionPredictor,
+    StillPredictor,
+)
+from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES
 
 
@@ -42,6 +52,7 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         posture=posture(person),
         arms={"left": arm(person.left_arm), "right": arm(person.right_arm)},
         joints=JointParameters(**vars(person.joints)),
+        behaviour=behaviour(scenario),
         gripper_max_speed=scenario.station.gripper.max_speed,
         gripper_max_acceleration=scenario.station.gripper.max_acceleration,
         distance_behind=start.distance_behind,
@@ -74,6 +85,44 @@ def controller_policy(
         stages=StageParameters(waiting_progress=g.waiting_progress),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
+
+
+def behaviour(scenario: schema.Scenario) -> Behaviour:
+    """Returns what the person does of its own."""
+    b = scenario.person.behaviour
+    kinds: dict[str, Kind] = {"passive": "passive", "active": "active"}
+    return Behaviour(
+        kind=kinds.get(b.kind, "dummy"),
+        active=ActiveParameters(
+            following=FollowingParameters(**vars(b.following)),
+            max_hand_speed=b.max_hand_speed,
+            max_joint_speed=b.max_joint_speed,
+        ),
+        motions=tuple(motion(m) for m in b.motions),
+        tremor=TremorParameters(**vars(b.tremor)) if b.tremor is not None else None,
+        seed=scenario.seed,
+    )
+
+
+def motion(values: schema.Motion) -> motions.Motion:
+    """Returns the one motion that is given; degrees become radians."""
+    if values.turn is not None:
+        turn = values.turn
+        return motions.Turn(
+            start=turn.start, angle=float(np.deg2rad(turn.angle_deg)), duration=turn.duration
+        )
+    kinds = {"reach": motions.Reach, "withdraw": motions.Withdraw, "wave": motions.Wave}
+    name = next(n for n in kinds if getattr(values, n) is not None)
+    given = dict(vars(getattr(values, name)))
+    side = given.pop("side")
+    return kinds[name](sides=tuple(s for s in SIDES if side in (s, "both")), **given)
+
+
+def predictor(scenario: schema.Scenario) -> MotionPredictor:
+    """Returns how the controller believes that the arms move on."""
+    if scenario.controller.predictor == "constant_velocity":
+        return ConstantVelocityPredictor()
+    return StillPredictor()
 
 
 def effects(scenario: schema.Scenario) -> tuple[Effect, ...]:

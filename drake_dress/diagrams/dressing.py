@@ -18,6 +18,7 @@ from drake_dress.models.effects.composition import true_times
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.sensing import TimeOffset
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
 from drake_dress.systems.delay import delayed
@@ -60,6 +61,7 @@ def make_dressing(
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
     effects: Sequence[Effect] = (),
+    predictor: MotionPredictor | None = None,
 ) -> Dressing:
     """Returns station and controllers wired together.
 
@@ -74,6 +76,7 @@ def make_dressing(
         meshcat: where the run is shown, if it is.
         effects: those on cameras and their clock, which lie between truth and controllers. A clock
             that is behind changes nothing for controllers that do not look at stamps.
+        predictor: what is believed of how the arms move on; that they stay, when None.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
@@ -81,7 +84,7 @@ def make_dressing(
     joints = builder.AddNamedSystem(
         "joint_oracle", JointOracle(station.person.joint_points, effects)
     )
-    predictor = builder.AddNamedSystem("human_predictor", HumanPredictor(policy.parameters.horizon))
+    predictor = builder.AddNamedSystem("human_predictor", _predictor(policy, predictor))
     mpc = builder.AddNamedSystem(
         "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
     )
@@ -163,6 +166,12 @@ def make_dressing(
     diagram = builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, mpc)
+
+
+def _predictor(policy: DressingPolicy, predictor: MotionPredictor | None) -> HumanPredictor:
+    """Returns what predicts the joints at the steps of the global controller."""
+    p = policy.parameters
+    return HumanPredictor(predictor or StillPredictor(), p.time_step, p.horizon)
 
 
 def is_finished(stage: np.ndarray) -> bool:

@@ -1,13 +1,14 @@
-"""The person as bodies of a MultibodyPlant: a torso that stands, arms that yield.
+"""The person as bodies of a MultibodyPlant: a torso that stands or turns, arms that yield.
 
 Each arm is three hinges at the shoulder and one at the elbow, each a spring and a damper about the
 scenario's pose. The pose is held against gravity by muscle tone: constant torques, as a person who
 holds still sets once and then forgets. Away from the pose gravity acts in full, so what a hand
 yields to a force follows from the springs and from the change of gravity's torques together.
+A person who turns has a joint about the vertical as well, held by its stance at the yaw it wants.
 
-Limitations: the torso does not sway. Above the horizontal, gravity pulls an arm away from its pose;
-a pose there topples unless the shoulder's stiffness is more than what the arm's weight takes away
-(up to 7.6 N·m/rad for the measures preset).
+Limitations: the torso does not sway, and turns as one with the legs. Above the horizontal, gravity
+pulls an arm away from its pose; a pose there topples unless the shoulder's stiffness is more than
+what the arm's weight takes away (up to 7.6 N·m/rad for the measures preset).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pydrake.multibody.tree import (
     BodyIndex,
     FixedOffsetFrame,
     ModelInstanceIndex,
+    PdControllerGains,
     RevoluteJoint,
     RevoluteSpring,
     RigidBody,
@@ -33,6 +35,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from drake_dress.errors import UserError
+from drake_dress.models.human.arm import JOINT_NAMES, Arm, Arms
 from drake_dress.models.human.body import (
     SIDES,
     ArmPose,
@@ -45,8 +48,12 @@ from drake_dress.models.human.body import (
 )
 
 FloatArray = npt.NDArray[np.float64]
+IndexArray = npt.NDArray[np.intp]
 Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
+# A coat that pulls at one side of the chest with 20 N turns a person who stands firm by less than
+# a degree; critically damped with the torso's inertia. N·m/rad, N·m·s/rad.
+_STANCE_STIFFNESS, _STANCE_DAMPING = 300.0, 40.0
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,8 @@ class Person:
         joint_points: body index and point in its frame (3,), m, of shoulder, elbow, hand, left
             then right; `joint_positions` evaluates them.
         radius: (6,) limb radius at those points, m.
+        origin: of the torso's frame (3,), m, world.
+        turns: whether a joint about the vertical turns the torso.
     """
 
     model: ModelInstanceIndex
@@ -107,6 +116,8 @@ class Person:
     body_indices: dict[str, BodyIndex]
     joint_points: list[tuple[int, FloatArray]]
     radius: FloatArray
+    origin: FloatArray
+    turns: bool = False
 
     def tone_torque(self, plant: MultibodyPlant) -> FloatArray:
         """Returns the generalized forces (nv,) that balance gravity in the rest pose, N·m.
@@ -124,6 +135,23 @@ class Person:
         )
         return torque
 
+    def arm_dofs(self, plant: MultibodyPlant) -> IndexArray:
+        """Returns (8,) the arms' joints in the plant's velocities: left, then right.
+
+        Each arm's are abduction, extension, rotation, elbow.
+        """
+        names = [f"{side}_{name}" for side in SIDES for name in JOINT_NAMES]
+        starts = [plant.GetJointByName(n, self.model).velocity_start() for n in names]
+        return np.array(starts, dtype=np.intp)
+
+    def own_dofs(self, plant: MultibodyPlant) -> IndexArray:
+        """Returns which of the plant's velocities are the person's, in the instance's order.
+
+        All joints are hinges, so positions and velocities are ordered alike.
+        """
+        every = np.arange(plant.num_velocities(), dtype=np.float64)
+        return plant.GetVelocitiesFromArray(self.model, every).astype(np.intp)
+
 
 def add_person(
     plant: MultibodyPlant,
@@ -132,6 +160,7 @@ def add_person(
     arms: dict[Side, ArmPose],
     joints: JointParameters,
     position: FloatArray | None = None,
+    turns: bool = False,
 ) -> Person:
     """Adds a person who stands or sits at `position` (2,), m, and faces +x.
 
@@ -145,6 +174,7 @@ def add_person(
         arms: rest pose of each arm. One past a limit is kept, and the limit moved to it.
         joints: stiffness, damping and limits.
         position: of the torso on the floor; the origin when None.
+        turns: whether the torso turns about the vertical; else it is welded to the world.
 
     Raises:
         UserError: posture, position or arms are not as said here.
@@ -161,7 +191,10 @@ def add_person(
     capsules = body_capsules(measures, posture)
     origin = np.array([place[0], place[1], 0.0])
     torso = plant.AddRigidBody("torso", model, SpatialInertia.SolidBoxWithMass(60.0, 0.2, 0.4, 0.6))
-    plant.WeldFrames(plant.world_frame(), torso.body_frame(), RigidTransform(origin))
+    if turns:
+        _add_stance(plant, torso, RigidTransform(origin))
+    else:
+        plant.WeldFrames(plant.world_frame(), torso.body_frame(), RigidTransform(origin))
     bodies: dict[str, RigidBody] = {"torso": torso}
     points: list[tuple[int, FloatArray]] = []
     for side in SIDES:
@@ -183,7 +216,39 @@ def add_person(
         {name: body.index() for name, body in bodies.items()},
         points,
         np.array(limb * 2),
+        origin,
+        turns,
     )
+
+
+def person_arms(
+    measures: BodyMeasures, posture: Posture, arms: dict[Side, ArmPose], joints: JointParameters
+) -> Arms:
+    """Returns both arms as `add_person` makes them of the same values."""
+    rest = np.array([_angles(arms[side]) for side in SIDES])
+    limits = np.array([getattr(joints, f"{name}_limits") for name in JOINT_NAMES]).T
+    left, right = (Arm(measures, posture, side) for side in SIDES)
+    return Arms(
+        (left, right),
+        rest,
+        np.stack([[np.minimum(limits[0], r), np.maximum(limits[1], r)] for r in rest]),
+        np.array([joints.shoulder_stiffness] * 3 + [joints.elbow_stiffness]),
+        np.array([joints.shoulder_damping] * 3 + [joints.elbow_damping]),
+    )
+
+
+def _angles(pose: ArmPose) -> list[float]:
+    return [pose.abduction, pose.extension, pose.rotation, pose.elbow_flexion]
+
+
+def _add_stance(plant: MultibodyPlant, torso: RigidBody, X_WTorso: RigidTransform) -> None:  # noqa: N803
+    """Adds the joint by which a person turns; its actuator holds it at the yaw it is given."""
+    foot = plant.AddFrame(FixedOffsetFrame("stance_frame", plant.world_frame(), X_WTorso))
+    joint = plant.AddJoint(
+        RevoluteJoint("stance", foot, torso.body_frame(), np.array([0.0, 0.0, 1.0]))
+    )
+    actuator = plant.AddJointActuator("stance", joint)
+    actuator.set_controller_gains(PdControllerGains(p=_STANCE_STIFFNESS, d=_STANCE_DAMPING))
 
 
 def _add_arm(

@@ -17,6 +17,7 @@ from drake_dress.diagrams.build import (
     controller_policy,
     effects,
     plant_station,
+    predictor,
     rates,
     safety_limits,
     station_parameters,
@@ -92,6 +93,7 @@ def run_scenario(
             writer,
             page,
             effects(scenario),
+            predictor(scenario),
         )
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)
     wall_time = clock.perf_counter() - begin

@@ -7,6 +7,7 @@ so that a mistake is told with its dotted key, and after it against the ranges i
 import dataclasses
 import difflib
 import math
+import re
 import types
 import typing
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.human import motions
 
 
 @dataclass
@@ -116,6 +118,88 @@ class Joints:
 
 
 @dataclass
+class Following:
+    """How a person gives way who lets the garment lead; see models/human/following.py."""
+
+    time_constant: float = 1.0  # in which a joint held away from where it was set is followed, s
+    threshold: float = 0.3  # of the torque at a joint, up to which nothing is followed, N·m
+    return_time_constant: float | None = None  # to the rest pose, s; empty: stays where it was led
+    max_speed: float = 1.0  # of a joint's set-point, rad/s
+
+
+@dataclass
+class Reach:
+    """The hand goes into the sleeve, once its armhole is near."""
+
+    side: str = "both"
+    start: float = 0.0  # s, at the earliest
+    within: float = 0.25  # from hand to armhole, m
+    push: float = 0.05  # of the hand beyond the armhole; then it follows, m
+
+
+@dataclass
+class Turn:
+    """The body turns about the vertical and stays so."""
+
+    angle_deg: float = 15.0  # leftward
+    start: float = 15.0  # s
+    duration: float = 3.0  # s
+
+
+@dataclass
+class Withdraw:
+    """The hand is drawn to the body's side for a while, then goes back."""
+
+    side: str = "both"
+    start: float = 10.0  # s
+    duration: float = 4.0  # s
+    distance: float = 0.10  # m
+
+
+@dataclass
+class Wave:
+    """The hand goes to and fro sideways."""
+
+    side: str = "both"
+    start: float = 10.0  # s
+    duration: float = 3.0  # s
+    amplitude: float = 0.05  # m
+    frequency: float = 1.0  # Hz
+
+
+@dataclass
+class Motion:
+    """One motion of an active person: just one of these."""
+
+    reach: Reach | None = None
+    turn: Turn | None = None
+    withdraw: Withdraw | None = None
+    wave: Wave | None = None
+
+
+@dataclass
+class Tremor:
+    """Shaking of both hands; 4 to 12 Hz and up to 2 cm, see models/human/tremor.py."""
+
+    amplitude: float = 0.005  # of the hand, m
+    frequency: float = 5.0  # Hz
+
+
+@dataclass
+class Behaviour:
+    """What the person does of its own; the controller is not told."""
+
+    # dummy: springs about the rest pose. passive: follows the garment. active: has motions of its
+    # own, and follows between them.
+    kind: str = "dummy"
+    following: Following = field(default_factory=Following)
+    motions: list[Motion] = field(default_factory=list)
+    max_hand_speed: float = 0.5  # of motions of the hand, m/s
+    max_joint_speed: float = 2.5  # likewise, rad/s
+    tremor: Tremor | None = None
+
+
+@dataclass
 class Person:
     """The person, or a dummy: a person without will."""
 
@@ -124,6 +208,7 @@ class Person:
     left_arm: Arm = field(default_factory=Arm)
     right_arm: Arm = field(default_factory=Arm)
     joints: Joints = field(default_factory=Joints)
+    behaviour: Behaviour = field(default_factory=Behaviour)
 
 
 @dataclass
@@ -180,6 +265,8 @@ class Controller:
     spacing: float = 0.028  # of the believed garment's mesh, m
     material: Material = field(default_factory=Material)
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
+    # how the arms are believed to move on: still, or constant_velocity
+    predictor: str = "still"
     command_rate: float = 100.0  # Hz
 
 
@@ -297,6 +384,12 @@ _CHOICES = {
     "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": ("m", "cm", "mm"),
     "person.posture": ("standing", "sitting"),
+    "person.behaviour.kind": ("dummy", "passive", "active"),
+    **{
+        f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
+        for motion in ("reach", "withdraw", "wave")
+    },
+    "controller.predictor": ("still", "constant_velocity"),
     "plant.integrator": ("implicit", "projective_dynamics"),
     "station.kind": ("simulated",),
 }
@@ -325,6 +418,27 @@ _RANGES: dict[str, tuple[float, float]] = {
     "extension_deg": (-150.0, 70.0),
     "rotation_deg": (-70.0, 70.0),
     "elbow_deg": (0.0, 140.0),
+    "following.time_constant": (0.05, 1000.0),
+    "following.threshold": (0.0, 100.0),
+    "following.return_time_constant": (0.05, 1000.0),
+    "following.max_speed": (0.01, 5.0),
+    "behaviour.max_hand_speed": (0.01, 2.0),
+    "behaviour.max_joint_speed": (0.01, 10.0),
+    "reach.start": (0.0, 600.0),
+    "reach.within": (0.01, 1.0),
+    "reach.push": (0.0, 0.3),
+    "turn.angle_deg": (-90.0, 90.0),
+    "turn.start": (0.0, 600.0),
+    "turn.duration": (0.1, 60.0),
+    "withdraw.start": (0.0, 600.0),
+    "withdraw.duration": (0.1, 600.0),
+    "withdraw.distance": (0.01, 0.4),
+    "wave.start": (0.0, 600.0),
+    "wave.duration": (0.1, 600.0),
+    "wave.amplitude": (0.001, 0.3),
+    "wave.frequency": (0.1, 5.0),
+    "tremor.amplitude": (0.0, 0.05),
+    "tremor.frequency": (1.0, 15.0),
     "global_mpc.period": (0.05, 10.0),
     "global_mpc.delay": (0.001, 10.0),
     "global_mpc.time_step": (0.005, 2.0),
@@ -406,6 +520,7 @@ def load_scenario(
     _check_ranges(source, "", scenario)
     _move_force_limit(source, content, scenario)
     _check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
+    _check_behaviour(source, scenario.person.behaviour)
     mpc = scenario.controller.global_mpc
     if mpc.delay >= mpc.period:
         raise UserError(
@@ -551,7 +666,7 @@ def _check(source: str, key: str, value: Any, schema: Any) -> Any:
         if isinstance(value, bool) or not isinstance(value, int):
             raise UserError(source, key, f"is {_kind(value)}, expected a whole number")
     elif schema is str:
-        choices = _CHOICES.get(key)
+        choices = _CHOICES.get(re.sub(r"\[\d+\]", "", key))
         if choices is not None and value not in choices:
             raise UserError(source, key, f"is {_kind(value)}, expected {' or '.join(choices)}")
         if not isinstance(value, str):
@@ -564,6 +679,9 @@ def _check_ranges(source: str, key: str, value: Any) -> None:
         for entry in dataclasses.fields(value):
             inner = f"{key}.{entry.name}" if key else entry.name
             _check_ranges(source, inner, getattr(value, entry.name))
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            _check_ranges(source, f"{key}[{i}]", item)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise UserError(source, key, f"is {value}, expected a finite number")
@@ -631,6 +749,59 @@ def _check_safety(source: str, safety: Safety, command_period: float) -> None:
                 source,
                 "safety.workspace.high",
                 f"is {corners['high']}, expected more than low, {corners['low']}, on each axis",
+            )
+
+
+def _check_behaviour(source: str, behaviour: Behaviour) -> None:
+    """Holds the motions against each other and against the kind of person."""
+    key = "person.behaviour.motions"
+    if behaviour.motions and behaviour.kind != "active":
+        raise UserError(
+            source, key, f"are given to a {behaviour.kind} person, expected kind: active"
+        )
+    names = [entry.name for entry in dataclasses.fields(Motion)]
+    reaching: set[str] = set()
+    for i, motion in enumerate(behaviour.motions):
+        given = [name for name in names if getattr(motion, name) is not None]
+        if len(given) != 1:
+            came = " and ".join(given) or "nothing"
+            raise UserError(
+                source, f"{key}[{i}]", f"is {came}, expected just one of {', '.join(names)}"
+            )
+        _check_speed(source, f"{key}[{i}]", motion, behaviour.max_hand_speed)
+        if motion.reach is not None:
+            side = motion.reach.side
+            sides = {"left", "right"} if side == "both" else {side}
+            if sides & reaching:
+                raise UserError(
+                    source,
+                    f"{key}[{i}].reach.side",
+                    f"is {side}, expected one reach for each hand",
+                )
+            reaching |= sides
+
+
+def _check_speed(source: str, key: str, motion: Motion, max_hand_speed: float) -> None:
+    if motion.turn is not None:
+        turn = motions.Turn(
+            angle=math.radians(motion.turn.angle_deg), duration=motion.turn.duration
+        )
+        if turn.speed > motions.FASTEST_TURN:
+            raise UserError(
+                source,
+                f"{key}.turn.duration",
+                f"is {turn.duration} s, a turn at up to {turn.speed:.2g} rad/s, "
+                f"expected at most {motions.FASTEST_TURN} rad/s",
+            )
+    if motion.wave is not None:
+        w = motion.wave
+        wave = motions.Wave(duration=w.duration, amplitude=w.amplitude, frequency=w.frequency)
+        if wave.speed > max_hand_speed:
+            raise UserError(
+                source,
+                f"{key}.wave",
+                f"moves the hand at up to {wave.speed:.2g} m/s, "
+                f"expected at most max_hand_speed, {max_hand_speed:g} m/s",
             )
 
 

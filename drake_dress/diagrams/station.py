@@ -13,15 +13,15 @@ What only simulation can know has the prefix `cheat_`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
+from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
@@ -60,6 +60,7 @@ class StationParameters:
     posture: Posture
     arms: dict[Side, ArmPose]
     joints: JointParameters
+    behaviour: Behaviour = field(default_factory=Behaviour)
     gripper_max_speed: float = 0.25
     gripper_max_acceleration: float = 2.0
     distance_behind: float = 0.45
@@ -88,12 +89,9 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     """Returns a station with two floating grippers that hold a coat behind a person."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.time_step)
-    person = add_person(
-        plant, body_with_effects(p.measures, p.effects), p.posture, p.arms, p.joints
-    )
+    body = body_with_effects(p.measures, p.effects)
+    person = add_person(plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
     plant.Finalize()
-    tone = builder.AddSystem(ConstantVectorSource(person.tone_torque(plant)))
-    builder.Connect(tone.get_output_port(), plant.get_applied_generalized_force_input_port())
 
     held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
     hung, grippers = hung_garment(p), start_grippers(p)
@@ -118,6 +116,15 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     )
     builder.Connect(
         cloth.GetOutputPort("person_forces"), plant.get_applied_spatial_force_input_port()
+    )
+    add_behaviour(
+        builder,
+        plant,
+        person,
+        person_arms(body, p.posture, p.arms, p.joints),
+        p.behaviour,
+        p.mesh,
+        cloth.GetOutputPort("garment_position"),
     )
     # a gripper that were earlier than it reports would have to know the future
     late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from drake_dress.models.human.prediction import MotionPredictor, resampled
 
 
 class HumanPredictor(LeafSystem):
-    """Predicts that the arms stay where they are seen: a dummy has no will.
+    """Remembers how the arms moved, and asks a predictor how they move on.
 
     .. pydrake_system::
 
@@ -17,18 +19,38 @@ class HumanPredictor(LeafSystem):
         output_ports:
         - predicted_joint_position
 
-    joint_position: (18,), m. predicted_joint_position: ((N+1)·18,) row-major (N+1,6,3), row 0 is
-    now, then every step of the controller's prediction.
+    joint_position: (18,) row-major (6,3), m, NaN where a joint is not seen; sampled at the
+    predictor's period. predicted_joint_position: ((steps+1)·18,) row-major (steps+1,6,3), m, row 0
+    is now, then every `time_step`. It is as fresh as its input: now is the last of the history,
+    the samples before it are taken at whole periods before now. Before time 0 nothing was seen.
 
     Args:
-        horizon: N.
+        predictor: does the work.
+        time_step: between predicted rows, s.
+        steps: how many rows beyond now.
     """
 
-    def __init__(self, horizon: int) -> None:
+    def __init__(self, predictor: MotionPredictor, time_step: float, steps: int) -> None:
         super().__init__()
-        self._horizon = horizon
+        self._predictor = predictor
+        self._time_step, self._steps = time_step, steps
+        self._samples = self.DeclareDiscreteState(np.full(18 * predictor.history_length, np.nan))
+        self._sampled_at = self.DeclareDiscreteState([-predictor.sample_period])
         self.DeclareVectorInputPort("joint_position", 18)
-        self.DeclareVectorOutputPort("predicted_joint_position", 18 * (horizon + 1), self._calc)
+        self.DeclareVectorOutputPort("predicted_joint_position", 18 * (steps + 1), self._calc)
+        self.DeclarePeriodicDiscreteUpdateEvent(predictor.sample_period, 0.0, self._sample)
+
+    def _sample(self, context: Context, discrete: DiscreteValues) -> None:
+        samples = context.get_discrete_state(self._samples).value()
+        now = self.get_input_port(0).Eval(context)
+        discrete.set_value(self._samples, np.concatenate([samples[18:], now]))
+        discrete.set_value(self._sampled_at, [context.get_time()])
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(np.tile(self.get_input_port(0).Eval(context), self._horizon + 1))
+        samples = context.get_discrete_state(self._samples).value().reshape(-1, 6, 3)
+        sampled_at = float(context.get_discrete_state(self._sampled_at).value()[0])
+        now = self.get_input_port(0).Eval(context).reshape(6, 3)
+        age = (context.get_time() - sampled_at) / self._predictor.sample_period
+        history = resampled(samples, now, age)
+        predicted = self._predictor.predict(history, self._time_step, self._steps)
+        output.SetFromVector(predicted.ravel())

@@ -1,8 +1,10 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from drake_dress.diagrams.build import safety_limits
+from drake_dress.diagrams.behaviour import Behaviour
+from drake_dress.diagrams.build import behaviour, predictor, safety_limits
 from drake_dress.diagrams.scenario import (
     Arm,
     Scenario,
@@ -11,6 +13,10 @@ from drake_dress.diagrams.scenario import (
     load_scenario,
     resolved_yaml,
 )
+from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
+from drake_dress.models.human.prediction import ConstantVelocityPredictor, StillPredictor
+from drake_dress.models.human.tremor import TremorParameters
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.yaml"))
 
@@ -25,6 +31,17 @@ person:
   measures: {shoulder_width: 0.4}
   left_arm: {abduction_deg: 20.0}
   joints: {shoulder_stiffness: 3.0}
+  behaviour:
+    kind: active
+    following: {time_constant: 0.5, return_time_constant: 20.0}
+    motions:
+      - reach: {side: left, within: 0.3}
+      - reach: {side: right, start: 5.0}
+      - turn: {angle_deg: -20.0, duration: 2.0}
+      - withdraw: {distance: 0.2}
+      - wave: {side: left, frequency: 0.5}
+    max_hand_speed: 0.6
+    tremor: {amplitude: 0.01}
 plant:
   spacing: 0.03
   time_step: 0.005
@@ -35,6 +52,7 @@ controller:
   spacing: 0.04
   material: {stretch_stiffness: 80}
   global_mpc: {period: 1.0, delay: 0.3, horizon: 4, weights: {direction: 0.1}}
+  predictor: constant_velocity
   command_rate: 200.0
 safety:
   force_limit: 15.0
@@ -105,6 +123,37 @@ def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:
     assert first.variation == Variation()
     assert abs(first.person.left_arm.abduction_deg - Arm().abduction_deg) <= 10.0
     assert 0.95 <= first.garment.coat.scale <= 1.05
+
+
+def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None:
+    made = behaviour(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)))
+    assert made.kind == "active" and made.turns and made.seed == 4
+    assert made.active.following == FollowingParameters(0.5, 0.3, 20.0)
+    assert made.active.max_hand_speed == 0.6
+    assert made.tremor == TremorParameters(0.01, 5.0)
+    left, right, turn, withdraw, wave = made.motions
+    assert left == Reach(0.0, ("left",), within=0.3)
+    assert right == Reach(5.0, ("right",))
+    assert turn == Turn(15.0, angle=np.deg2rad(-20.0), duration=2.0)
+    assert withdraw == Withdraw(10.0, ("left", "right"), distance=0.2)
+    assert wave == Wave(10.0, ("left",), frequency=0.5)
+
+
+def test_who_is_said_nothing_of_is_a_dummy_that_is_believed_to_stay(tmp_path: Path) -> None:
+    scenario = load_scenario(write(tmp_path, "seed: 0"))
+    assert behaviour(scenario) == Behaviour()
+    assert isinstance(predictor(scenario), StillPredictor)
+    other = load_scenario(write(tmp_path, "controller: {predictor: constant_velocity}"))
+    assert isinstance(predictor(other), ConstantVelocityPredictor)
+
+
+def test_motions_can_be_given_on_the_command_line(tmp_path: Path) -> None:
+    scenario = load_scenario(
+        write(tmp_path, "seed: 0"),
+        ["person.behaviour.kind=active", "person.behaviour.motions=[{turn: {angle_deg: 10}}]"],
+    )
+    assert scenario.person.behaviour.motions[0].turn is not None
+    assert scenario.person.behaviour.motions[0].turn.angle_deg == 10.0
 
 
 def test_no_variation_changes_nothing(tmp_path: Path) -> None:

@@ -32,10 +32,8 @@ from drake_dress.models.dressing.stages import (
 )
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
+from drake_dress.models.human.heading import Heading, heading
 from drake_dress.models.sides import SIDES
-
-LEFTWARD = np.array([0.0, 1.0, 0.0])
-FRONT = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ class PersonModel:
     """What the controller knows of the person's shape.
 
     Attributes:
-        capsules: in body frames; those of the torso are used as they are.
+        capsules: in body frames; those of the torso go with the shoulders.
         shoulders: (2,3) of the shoulder joints in the torso's frame, left and right, m.
         radius: upper arm, forearm, hand, m.
     """
@@ -213,12 +211,13 @@ class DressingPolicy:
             [ArmAxis(hand=q[3 * i + 2], elbow=q[3 * i + 1], shoulder=q[3 * i]) for q in joints]
             for i in (0, 1)
         ]
+        headings = [heading(q) for q in joints]
         sleeves = [sleeve_state(x, self._loops[i], self._signs[i]) for i in (0, 1)]
         facts = (
-            self._facts(x, joints[0], axes[0][0], sleeves[0], 0),
-            self._facts(x, joints[0], axes[1][0], sleeves[1], 1),
+            self._facts(x, joints[0], axes[0][0], headings[0], sleeves[0], 0),
+            self._facts(x, joints[0], axes[1][0], headings[0], sleeves[1], 1),
         )
-        goals = [self._waypoint(axes[i][0], facts[i], i) for i in (0, 1)]
+        goals = [self._waypoint(axes[i][0], headings[0], facts[i], i) for i in (0, 1)]
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(state.stages, facts, p.stages, distance, time)
         targets = [
@@ -226,6 +225,7 @@ class DressingPolicy:
                 tasks,
                 i,
                 axes,
+                headings,
                 facts,
                 sleeves,
                 retreats(stages, i, p.stages, time),
@@ -244,26 +244,32 @@ class DressingPolicy:
         decision = Decision(plan, tasks, facts, np.stack([targets[i].position[-1] for i in (0, 1)]))
         return replace(state, stages=stages, velocity=plan.velocity), decision
 
-    def _approach_direction(self, axis: ArmAxis, side: int) -> FloatArray:
+    def _approach_direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector along which an armhole is drawn over the hand."""
-        return _between(_inward(side), axis.D(0.0), self.parameters.approach_share)
+        return _between(_inward(to, side), axis.D(0.0), self.parameters.approach_share)
 
-    def _waypoint(self, axis: ArmAxis, fact: SleeveFacts, side: int) -> FloatArray:
+    def _waypoint(self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int) -> FloatArray:
         """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + p.progress_step))
-        return axis.G(0.0) - p.approach_distance * self._approach_direction(axis, side)
+        return axis.G(0.0) - p.approach_distance * self._approach_direction(axis, to, side)
 
     def _facts(
-        self, x: FloatArray, joints: FloatArray, axis: ArmAxis, sleeve: SleeveState, side: int
+        self,
+        x: FloatArray,
+        joints: FloatArray,
+        axis: ArmAxis,
+        to: Heading,
+        sleeve: SleeveState,
+        side: int,
     ) -> SleeveFacts:
         shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
         interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
         linked = abs(arm_linking_number(x[self._loops[side]], shoulder, elbow, hand, interior)) == 1
         s, _, _ = axis.coordinates(sleeve.p_c)
         offset = hand - sleeve.p_c
-        aside = _aside(offset, self._approach_direction(axis, side))
+        aside = _aside(offset, self._approach_direction(axis, to, side))
         sight = free_sight(x, self.mesh.faces, self._loops[side], hand)
         return SleeveFacts(
             linked=linked,
@@ -272,12 +278,13 @@ class DressingPolicy:
             hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
-            opening=float(axis.D(0.0) @ _inward(side)),
+            opening=float(axis.D(0.0) @ _inward(to, side)),
         )
 
     def _prepared(
         self,
         axis: ArmAxis,
+        to: Heading,
         sleeve: SleeveState,
         side: int,
         tethered: bool,
@@ -296,7 +303,7 @@ class DressingPolicy:
         """
         p = self.parameters
         hand = axis.G(0.0)
-        direction = self._approach_direction(axis, side)
+        direction = self._approach_direction(axis, to, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
@@ -310,15 +317,15 @@ class DressingPolicy:
         if not in_sight:
             distance = cap
         if retreat:
-            return hand - cap * direction - p.retreat_distance * FRONT
+            return hand - cap * direction - p.retreat_distance * to.front
         onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
         if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
-            error = error - FRONT * (FRONT @ error)
+            error = error - to.front * (to.front @ error)
             wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
-            goal = hand - cap * direction - min(wait, behind) * FRONT
+            goal = hand - cap * direction - min(wait, behind) * to.front
         return goal
 
     def _target(
@@ -326,6 +333,7 @@ class DressingPolicy:
         tasks: tuple[Task, Task],
         side: int,
         axes: Sequence[Sequence[ArmAxis]],
+        headings: Sequence[Heading],
         facts: Sequence[SleeveFacts],
         sleeves: Sequence[SleeveState],
         retreat: bool,
@@ -337,10 +345,11 @@ class DressingPolicy:
         position, direction = np.empty((n, 3)), np.empty((n, 3))
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
-            axis = axes[side][j + 1]
+            axis, to = axes[side][j + 1], headings[j + 1]
             if entering:
                 position[j] = self._prepared(
                     axis,
+                    to,
                     sleeves[side],
                     side,
                     facts[1 - side].linked,
@@ -348,7 +357,7 @@ class DressingPolicy:
                     retreat,
                     attempts[side],
                 )
-                direction[j] = _between(_inward(side), axis.D(0.0), p.orientation_share)
+                direction[j] = _between(_inward(to, side), axis.D(0.0), p.orientation_share)
                 continue
             if task == Task.DRESS:
                 step = -p.progress_step if ease else p.progress_step
@@ -359,7 +368,7 @@ class DressingPolicy:
             else:
                 k = 1 - side
                 other = self._prepared(
-                    axes[k][j + 1], sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
+                    axes[k][j + 1], to, sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
                 )
                 s = self._waiting_progress(axis, other)
             s = min(p.final_progress, max(0.0, s))
@@ -393,9 +402,10 @@ class DressingPolicy:
         radius = np.array([c.radius for c in torso] + [upper, fore, hand] * 2)
         rows_a, rows_b = [], []
         for q in joints:
-            shift = 0.5 * (q[0] + q[3]) - person.shoulders.mean(axis=0)
-            a = [c.a_B + shift for c in torso]
-            b = [c.b_B + shift for c in torso]
+            turned = heading(q).rotation
+            shift = 0.5 * (q[0] + q[3]) - turned @ person.shoulders.mean(axis=0)
+            a = [turned @ c.a_B + shift for c in torso]
+            b = [turned @ c.b_B + shift for c in torso]
             for i in (0, 3):
                 a += [q[i], q[i + 1], q[i + 2]]
                 b += [q[i + 1], q[i + 2], q[i + 2]]
@@ -411,9 +421,9 @@ class DressingPolicy:
         return predicted
 
 
-def _inward(side: int) -> FloatArray:
+def _inward(to: Heading, side: int) -> FloatArray:
     """Returns the unit vector from a side of the person to the other."""
-    return LEFTWARD * (-1.0 if side == 0 else 1.0)
+    return to.leftward * (-1.0 if side == 0 else 1.0)
 
 
 def _aside(offset: FloatArray, direction: FloatArray) -> float:

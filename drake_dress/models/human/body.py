@@ -1,9 +1,9 @@
 """A person as capsules and spheres on articulated arms.
 
-Bodies: `torso` (with neck, head, pelvis and legs; it does not move), and `{side}_upper_arm` and
-`{side}_forearm` (with the hand). In a body's frame the arm hangs along −z: the upper arm from its
-shoulder joint at the origin, the forearm from its elbow joint at the origin. The torso's frame has
-its origin on the floor below the shoulders' midpoint.
+Bodies: `torso` (with neck, head, pelvis and legs; it moves only to turn), and `{side}_upper_arm`
+and `{side}_forearm` (with the hand). In a body's frame the arm hangs along −z: the upper arm from
+its shoulder joint at the origin, the forearm from its elbow joint at the origin. The torso's frame
+has its origin on the floor below the shoulders' midpoint.
 
 Angles of an arm, zero when it hangs straight down: abduction opens it sideways, extension moves
 the hand backward, rotation turns it about its own axis (outward positive: the hand of a bent arm

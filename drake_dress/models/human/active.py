@@ -1,0 +1,284 @@
+"""An arm with a will: what it wants next, and its set-point on the way there.
+
+An arm that wants nothing follows the garment (`following.py`). What it wants moves its hand along a
+smooth path (`hand_tracking.py`), in the torso's frame, so that it goes on while the body turns:
+
+    follow ──armhole near──▶ reach ──hand through it──▶ follow
+                               └──armhole gone──▶ return ──▶ follow
+    any ──its time──▶ withdraw ──time over──▶ return;   a wave is added to wherever the hand is
+
+While it reaches, a hand that the garment holds off its path pushes a little harder, within limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.human.arm import Arm
+from drake_dress.models.human.armhole import Armhole
+from drake_dress.models.human.following import FollowingParameters, following_rate
+from drake_dress.models.human.hand_tracking import (
+    HandPath,
+    eased,
+    planned_time,
+    rate_bounds,
+    tracking_rate,
+)
+from drake_dress.models.human.motions import Motion, Reach, Wave, Withdraw
+
+FloatArray = npt.NDArray[np.float64]
+
+# A reach is given up with the armhole this much further from where the hand was than it began.
+_LOST = 1.4
+_REACHABLE = 1.1  # times the arm's length from the shoulder
+# A hand this far beside the armhole's axis goes for a point before the opening, one nearer goes in.
+_BESIDE, _IN_LINE = 0.10, 0.05  # m
+_BEFORE = 0.08  # that point's distance before the opening, m
+_ENTERED = 0.6  # share of the push after which the hand is in
+_HARDER = 1.0  # 1/s, growth of the target's shift with how far the hand is off its path
+_HARDEST = 0.10  # m, of that shift
+_ARRIVED, _STILL = 0.003, 0.01  # m, m/s
+_UNPLANNED = -1.0
+_LEFTWARD = np.array([0.0, 1.0, 0.0])
+
+
+class Want(IntEnum):
+    """What an arm wants."""
+
+    FOLLOW = 0
+    REACH = 1
+    WITHDRAW = 2
+    RETURN = 3
+
+
+@dataclass(frozen=True)
+class ActiveParameters:
+    """Limits of an active person's arms.
+
+    Attributes:
+        following: when nothing is wanted.
+        max_hand_speed: m/s; people reach at 0.5 to 1 m/s at most when not in a hurry.
+        max_joint_speed: rad/s.
+    """
+
+    following: FollowingParameters = field(default_factory=FollowingParameters)
+    max_hand_speed: float = 0.5
+    max_joint_speed: float = 2.5
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """Where an arm is with what it wants.
+
+    Attributes:
+        set_point: (4,), rad. rate: (4,), rad/s.
+        path: of the hand.
+        shift: (3,) of the target, to push harder, m.
+        anchor: (3,) where the hand goes back to, m.
+        want: what it does.
+        through: whether a reach has been through the armhole.
+    """
+
+    set_point: FloatArray
+    rate: FloatArray
+    path: HandPath
+    shift: FloatArray
+    anchor: FloatArray
+    want: Want = Want.FOLLOW
+    through: bool = False
+
+    SIZE = 26
+
+    def flat(self) -> FloatArray:
+        """Returns the state as (26,) numbers."""
+        path = self.path
+        return np.concatenate(
+            [
+                self.set_point,
+                self.rate,
+                path.position,
+                path.velocity,
+                path.acceleration,
+                self.shift,
+                self.anchor,
+                [path.remaining, float(self.want), float(self.through)],
+            ]
+        )
+
+    @classmethod
+    def of(cls, flat: FloatArray) -> ArmState:
+        """Returns the state from `flat`'s numbers."""
+        vectors = flat[8:23].reshape(5, 3).copy()
+        return cls(
+            flat[:4].copy(),
+            flat[4:8].copy(),
+            HandPath(vectors[0], vectors[1], vectors[2], float(flat[23])),
+            vectors[3],
+            vectors[4],
+            Want(int(flat[24])),
+            bool(flat[25]),
+        )
+
+
+class ActiveArm:
+    """Steps one arm.
+
+    Args:
+        arm: its kinematics.
+        comfort: rest pose (4,), rad.
+        limits: (2,4) least and greatest angles, rad.
+        stiffness: of its joints (4,), N·m/rad.
+        motions: of the person; those of the other arm are ignored.
+        parameters: limits.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        comfort: FloatArray,
+        limits: FloatArray,
+        stiffness: FloatArray,
+        motions: Sequence[Motion],
+        parameters: ActiveParameters,
+    ) -> None:
+        mine = [m for m in motions if arm.side in m.sides]
+        self.arm, self._p = arm, parameters
+        self._comfort, self._limits, self._stiffness = comfort, limits, stiffness
+        self._reach = next((m for m in mine if isinstance(m, Reach)), None)
+        self._withdrawals = [m for m in mine if isinstance(m, Withdraw)]
+        self._waves = [m for m in mine if isinstance(m, Wave)]
+
+    def initial_state(self) -> ArmState:
+        """Returns the state at time 0: at rest in the comfortable pose."""
+        hand = self.arm.hand(self._comfort)
+        still = np.zeros(3)
+        path = HandPath(hand, still, still)
+        return ArmState(self._comfort, np.zeros(4), path, still, hand)
+
+    def step(
+        self, state: ArmState, angles: FloatArray, armhole: Armhole, time: float, step: float
+    ) -> ArmState:
+        """Returns the state one step later.
+
+        Args:
+            state: now.
+            angles: of the true arm (4,), rad.
+            armhole: of this side as it is now.
+            time: now, s.
+            step: s.
+        """
+        state = self._decide(state, armhole, time)
+        waving = sum((np.array(w.offset(time)) for w in self._waves), np.zeros(2))
+        if state.want is Want.FOLLOW:
+            rate = following_rate(
+                state.set_point,
+                angles,
+                self._comfort,
+                self._stiffness,
+                self.arm.gravity_stiffness(state.set_point),
+                self._p.following,
+            )
+        else:
+            shift = self._pushed_harder(state, armhole.joints[2], step)
+            target = self._target(state, armhole, time) + shift
+            path = state.path
+            if path.remaining == _UNPLANNED:
+                way = float(np.linalg.norm(target - path.position))
+                path = replace(path, remaining=planned_time(way, self._p.max_hand_speed))
+            path = path.toward(target, self._p.max_hand_speed, step)
+            state = replace(state, path=path, shift=shift)
+            rate = tracking_rate(
+                self.arm,
+                state.set_point,
+                path.position + waving[0] * _LEFTWARD,
+                path.velocity + waving[1] * _LEFTWARD,
+                self._comfort,
+                rate_bounds(state.set_point, self._limits, self._p.max_joint_speed),
+                self._p.max_hand_speed,
+            )
+        rate = eased(rate, state.rate, step)
+        set_point = np.clip(state.set_point + step * rate, *self._limits)
+        return replace(state, set_point=set_point, rate=(set_point - state.set_point) / step)
+
+    def _decide(self, state: ArmState, armhole: Armhole, time: float) -> ArmState:
+        want = state.want
+        if self._withdrawal(time) is not None:
+            return state if want is Want.WITHDRAW else self._begin(state, Want.WITHDRAW)
+        if want is Want.WITHDRAW:
+            return self._begin(state, Want.RETURN, state.anchor)
+        if want is Want.REACH:
+            if armhole.depth >= self._push * _ENTERED and armhole.is_entered:
+                return replace(state, want=Want.FOLLOW, through=True, shift=np.zeros(3))
+            if not self._is_near(armhole, state.anchor, _LOST):
+                return self._begin(state, Want.RETURN, state.anchor)
+            return state
+        waving = any(w.is_on(time) for w in self._waves)
+        reaches = self._reach is not None and not state.through and time >= self._reach.start
+        place = state.anchor if want is Want.RETURN else armhole.joints[2]
+        if reaches and self._is_near(armhole, place, 1.0):
+            # a hand that was on its way back goes back there if it fails again
+            return self._begin(state, Want.REACH, state.anchor if want is Want.RETURN else None)
+        if want is Want.RETURN and not waving:
+            way = float(np.linalg.norm(state.anchor - self.arm.hand(state.set_point)))
+            if way < _ARRIVED and float(np.linalg.norm(state.path.velocity)) < _STILL:
+                return replace(state, want=Want.FOLLOW)
+        if want is Want.FOLLOW and waving:
+            return self._begin(state, Want.RETURN)
+        return state
+
+    def _begin(self, state: ArmState, want: Want, anchor: FloatArray | None = None) -> ArmState:
+        """Returns the state with a new want; its path goes on from where the set-point is."""
+        path = state.path
+        if state.want is Want.FOLLOW:
+            here = self.arm.hand(state.set_point)
+            speed = self.arm.jacobian(state.set_point) @ state.rate
+            path = HandPath(here, speed, np.zeros(3))
+        anchor = path.position if anchor is None else anchor
+        return replace(
+            state,
+            want=want,
+            anchor=anchor,
+            path=replace(path, remaining=_UNPLANNED),
+            shift=np.zeros(3),
+        )
+
+    def _target(self, state: ArmState, armhole: Armhole, time: float) -> FloatArray:
+        if state.want is Want.REACH:
+            aside = min(1.0, max(0.0, (armhole.beside - _IN_LINE) / (_BESIDE - _IN_LINE)))
+            along = (1.0 - aside) * self._push - aside * _BEFORE
+            target: FloatArray = armhole.center + along * armhole.into
+            return target
+        withdrawal = self._withdrawal(time)
+        if state.want is not Want.WITHDRAW or withdrawal is None:
+            return state.anchor
+        way = (self.arm.shoulder - state.anchor) * [1.0, 1.0, 0.0]
+        length = max(float(np.linalg.norm(way)), 1e-9)
+        drawn: FloatArray = state.anchor + min(withdrawal.distance / length, 1.0) * way
+        return drawn
+
+    def _withdrawal(self, time: float) -> Withdraw | None:
+        return next((w for w in self._withdrawals if w.is_on(time)), None)
+
+    def _pushed_harder(self, state: ArmState, hand: FloatArray, step: float) -> FloatArray:
+        if state.want is not Want.REACH:
+            return np.zeros(3)
+        shift = state.shift + step * _HARDER * (state.path.position - state.shift - hand)
+        size = float(np.linalg.norm(shift))
+        limited: FloatArray = shift * min(1.0, _HARDEST / size) if size > 0.0 else shift
+        return limited
+
+    @property
+    def _push(self) -> float:
+        return self._reach.push if self._reach is not None else 0.0
+
+    def _is_near(self, armhole: Armhole, place: FloatArray, slack: float) -> bool:
+        if self._reach is None:
+            return False
+        away = float(np.linalg.norm(armhole.center - place))
+        reach = float(np.linalg.norm(armhole.center - self.arm.shoulder))
+        return away <= slack * self._reach.within and reach <= _REACHABLE * self.arm.length

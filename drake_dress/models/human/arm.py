@@ -1,0 +1,135 @@
+"""An arm's four hinges: where the hand goes with them, and what gravity asks of them.
+
+Angles (4,) are abduction, extension, rotation, elbow flexion, rad, as in `body.py`; all vectors are
+in the torso's frame, z up. An upright torso may stand and be turned anywhere: gravity's torques on
+the arms do not change with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    Posture,
+    Side,
+    arm_rotations,
+    shoulder_joint,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+JOINT_NAMES = ("abduction", "extension", "rotation", "elbow")
+GRAVITY = 9.81  # m/s², as the plant's
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Kinematics and gravity of one arm: two limbs of even mass on a fixed shoulder.
+
+    Attributes:
+        measures: sizes and masses.
+        posture: standing or sitting.
+        side: left or right.
+    """
+
+    measures: BodyMeasures
+    posture: Posture
+    side: Side
+
+    @property
+    def shoulder(self) -> FloatArray:
+        """Returns the shoulder joint (3,), m."""
+        return shoulder_joint(self.measures, self.posture, self.side)
+
+    @property
+    def length(self) -> float:
+        """Returns how far the hand reaches from the shoulder, m."""
+        return self.measures.upper_arm_length + self.measures.forearm_length
+
+    def points(self, angles: FloatArray) -> FloatArray:
+        """Returns shoulder, elbow, hand (3,3), m."""
+        _, upper, fore = self._chain(angles)
+        shoulder = self.shoulder
+        return np.stack([shoulder, shoulder + upper, shoulder + upper + fore])
+
+    def hand(self, angles: FloatArray) -> FloatArray:
+        """Returns the hand (3,), m."""
+        _, upper, fore = self._chain(angles)
+        hand: FloatArray = self.shoulder + upper + fore
+        return hand
+
+    def jacobian(self, angles: FloatArray) -> FloatArray:
+        """Returns (3,4) the derivative of the hand by the angles, m/rad: axis × lever."""
+        axes, upper, fore = self._chain(angles)
+        levers = np.stack([upper + fore] * 3 + [fore])
+        return np.cross(axes, levers).T
+
+    def gravity_torque(self, angles: FloatArray) -> FloatArray:
+        """Returns (4,) −∂U/∂q, what gravity does to each hinge, N·m.
+
+        U = Σ m g z over both limbs' middles.
+        """
+        axes, carried = self._weights(angles)
+        torque: FloatArray = axes[:, 1] * carried[:, 0] - axes[:, 0] * carried[:, 1]
+        return torque
+
+    def gravity_stiffness(self, angles: FloatArray) -> FloatArray:
+        """Returns (4,4) ∂²U/∂q², N·m/rad: positive where gravity draws the arm back.
+
+        A vector d that hinges i ≤ j both carry, i the nearer to the torso, has
+        ∂²d/∂q_i∂q_j = a_i × (a_j × d) = a_j (a_i·d) − d (a_i·a_j).
+        """
+        axes, carried = self._weights(angles)
+        nearer = np.triu((axes @ carried.T) * axes[:, 2] - (axes @ axes.T) * carried[:, 2])
+        stiffness: FloatArray = nearer + np.triu(nearer, 1).T
+        return stiffness
+
+    def _weights(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns axes (4,3), and what each hinge carries (4,3): weight times lever, N·m.
+
+        U changes as the height of what is carried.
+        """
+        m = self.measures
+        axes, upper, fore = self._chain(angles)
+        of_fore = 0.5 * GRAVITY * m.forearm_mass * fore
+        of_both = GRAVITY * (0.5 * m.upper_arm_mass + m.forearm_mass) * upper + of_fore
+        return axes, np.stack([of_both, of_both, of_both, of_fore])
+
+    def _chain(self, angles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Returns the hinges' axes (4,3), shoulder → elbow and elbow → hand (3,), m."""
+        pose = ArmPose(*(float(a) for a in angles))
+        upper, fore = arm_rotations(self.side, pose)
+        sign = 1.0 if self.side == "left" else -1.0
+        c, s = np.cos(pose.abduction), np.sin(sign * pose.abduction)
+        # abduction is about the torso's x; what it turns carries the axis of extension along
+        axes = np.array([[sign, 0.0, 0.0], [0.0, c, s], sign * upper[:, 2], -upper[:, 1]])
+        return (
+            axes,
+            upper @ _DOWN * self.measures.upper_arm_length,
+            fore @ _DOWN * self.measures.forearm_length,
+        )
+
+
+@dataclass(frozen=True)
+class Arms:
+    """Both arms with their joints, left then right.
+
+    Attributes:
+        arms: kinematics and masses.
+        rest: (2,4) angles about which the plant's springs act, rad.
+        limits: (2,2,4) least and greatest angles of each arm, rad.
+        stiffness: (4,) of an arm's joints, N·m/rad.
+        damping: (4,) N·m·s/rad.
+    """
+
+    arms: tuple[Arm, Arm]
+    rest: FloatArray
+    limits: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray

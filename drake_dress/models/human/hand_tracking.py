@@ -1,0 +1,140 @@
+"""How a hand is moved: a smooth path to where it shall be, and the joints that follow the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.human.arm import Arm
+
+FloatArray = npt.NDArray[np.float64]
+
+# Shortest time that is planned ahead, s: how fast a small correction is.
+_SHORTEST = 0.3
+_DAMPING = 0.04  # of the inverse kinematics, m/rad
+_FEEDBACK = 8.0  # 1/s, with which a set-point off its path comes back to it
+_COMFORT = 0.5  # 1/s, with which the free fourth hinge goes to the comfortable pose
+_MAX_ACCELERATION = 30.0  # of a joint's set-point, rad/s²
+
+_BRAKING = 6.0  # of that, what is counted on before a limit, rad/s²
+_SETTLING = 20.0  # 1/s, with which the last of the way to a limit is gone
+
+
+@dataclass(frozen=True)
+class HandPath:
+    """Where a hand is asked to be: position, velocity, acceleration (3,) in the torso's frame.
+
+    Attributes:
+        position: m. velocity: m/s. acceleration: m/s².
+        remaining: time until it arrives, s.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    remaining: float = 0.0
+
+    def toward(self, target: FloatArray, max_speed: float, step: float) -> HandPath:
+        """Returns the path `step` s later on its way to `target` (3,), m, which may move.
+
+        The minimum-jerk law in feedback form, jerk = 60 e/T³ − 36 v/T² − 9 a/T for the time T that
+        remains (Hoff and Arbib 1993): a target at rest is reached on the minimum-jerk path.
+        T is stretched where the mean speed would exceed `max_speed`, m/s; so is the speed itself.
+        """
+        error = target - self.position
+        least = float(np.linalg.norm(error)) / max_speed
+        left = max(self.remaining - step, least, _SHORTEST)
+        jerk = (
+            60.0 * error / left**3 - 36.0 * self.velocity / left**2 - 9.0 * self.acceleration / left
+        )
+        acceleration = self.acceleration + step * jerk
+        velocity = self.velocity + step * acceleration
+        speed = float(np.linalg.norm(velocity))
+        if speed > max_speed:
+            velocity = velocity * (max_speed / speed)
+        return HandPath(self.position + step * velocity, velocity, acceleration, left)
+
+
+def planned_time(distance: float, max_speed: float) -> float:
+    """Returns the duration, s, of a minimum-jerk movement that peaks at `max_speed`, m/s."""
+    return max(_SHORTEST, 15.0 / 8.0 * distance / max_speed)
+
+
+def tracking_rate(
+    arm: Arm,
+    angles: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    comfort: FloatArray,
+    bounds: FloatArray,
+    max_speed: float,
+) -> FloatArray:
+    """Returns joint rates (4,), rad/s, that keep the hand on its path; damped least squares.
+
+    A hinge that would leave its bounds goes as fast as they allow, and the others do what is left.
+    The hinge that is over draws toward the comfortable pose.
+
+    Args:
+        arm: its kinematics.
+        angles: set-point (4,), rad.
+        position: of the path (3,), m.
+        velocity: of the path (3,), m/s.
+        comfort: (4,), rad.
+        bounds: (2,4) least and greatest rates, rad/s, zero among them; see `rate_bounds`.
+        max_speed: of the hand, m/s.
+    """
+    wanted = velocity + _FEEDBACK * (position - arm.hand(angles))
+    speed = float(np.linalg.norm(wanted))
+    if speed > max_speed:
+        wanted = wanted * (max_speed / speed)
+    jacobian = arm.jacobian(angles)
+    free, rate = np.ones(4, dtype=bool), np.zeros(4)
+    for _ in range(4):
+        J = jacobian[:, free]  # noqa: N806
+        inverse = J.T @ np.linalg.inv(J @ J.T + _DAMPING**2 * np.eye(3))
+        rate[free] = inverse @ (wanted - jacobian[:, ~free] @ rate[~free])
+        if free.all():
+            rate += _at_no_cost(J, _COMFORT * (comfort - angles))
+        bounded = np.clip(rate, *bounds)
+        beyond = free & (bounded != rate)
+        rate = bounded
+        if not beyond.any():
+            break
+        free &= ~beyond
+    speed = float(np.linalg.norm(jacobian @ rate))
+    return rate * min(1.0, max_speed / speed) if speed > 0.0 else rate
+
+
+def _at_no_cost(jacobian: FloatArray, rate: FloatArray) -> FloatArray:
+    """Returns the part of rates (4,) that leaves the hand where it is."""
+    idle = np.linalg.svd(jacobian)[2][3]
+    part: FloatArray = idle * (idle @ rate)
+    return part
+
+
+def rate_bounds(angles: FloatArray, limits: FloatArray, max_joint_speed: float) -> FloatArray:
+    """Returns (2,4) least and greatest rates, rad/s, from which each joint still stops in time.
+
+    Args:
+        angles: set-point (4,), rad.
+        limits: (2,4) least and greatest angles, rad.
+        max_joint_speed: rad/s.
+    """
+    room = np.maximum([angles - limits[0], limits[1] - angles], 0.0)
+    stopping = np.minimum(np.sqrt(2.0 * _BRAKING * room), _SETTLING * room)
+    fastest = np.minimum(stopping, max_joint_speed)
+    return np.stack([-fastest[0], fastest[1]])
+
+
+def eased(wanted: FloatArray, before: FloatArray, step: float) -> FloatArray:
+    """Returns rates (4,), rad/s, from `before` toward `wanted` within a joint's acceleration.
+
+    All joints change in proportion, so that the hand is never faster than in both.
+    """
+    change = wanted - before
+    largest = float(np.max(np.abs(change)))
+    limit = _MAX_ACCELERATION * step
+    rate: FloatArray = before + change * (limit / largest) if largest > limit else wanted
+    return rate

@@ -1,0 +1,47 @@
+"""Which way a person faces, as the line of the shoulders tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+# A sine up to here is rounding: a person who does not turn is taken to face +x to the last bit.
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Heading:
+    """Directions of a person who may have turned about the vertical.
+
+    Attributes:
+        rotation: R (3,3) about z from a person who faces +x.
+    """
+
+    rotation: FloatArray
+
+    @property
+    def front(self) -> FloatArray:
+        """Returns the unit vector (3,) the person faces along (v_f)."""
+        return self.rotation[:, 0]
+
+    @property
+    def leftward(self) -> FloatArray:
+        """Returns the unit vector (3,) from right to left."""
+        return self.rotation[:, 1]
+
+
+def heading(joints: FloatArray) -> Heading:
+    """Returns the heading of shoulder, elbow, hand of left, then right arm (6,3), m.
+
+    Shoulders above each other tell nothing; the person is then taken to face +x.
+    """
+    line = joints[0] - joints[3]
+    length = float(np.hypot(line[0], line[1]))
+    if length == 0.0 or abs(line[0]) <= _ROUNDING * length and line[1] > 0.0:
+        return Heading(np.eye(3))
+    c, s = line[1] / length, -line[0] / length
+    return Heading(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))

@@ -1,0 +1,124 @@
+"""Tremor: a shaking of the arms that nobody wants.
+
+Frequencies: Parkinsonian rest tremor 4 to 6 Hz, essential tremor 4 to 12 Hz (Deuschl, Bain, Brin,
+"Consensus statement of the Movement Disorder Society on tremor", 1998). Amplitudes at the hand:
+under 0.5 cm is slight, to 1 cm moderate, to 2 cm marked (rating scale of Fahn, Tolosa and Marín,
+1993). It is driven by torques at the elbow and about the upper arm's axis, as large as the arm's
+inertia, damping and stiffness ask for at that frequency, and is no pure sine: amplitude and
+frequency wander slowly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.errors import UserError
+
+FloatArray = npt.NDArray[np.float64]
+
+# What drives: abduction, extension, rotation, elbow.
+_DRIVE = np.array([0.0, 0.0, 1.0, 1.0])
+_WANDERING_AMPLITUDE = 0.15  # standard deviation, relative
+_WANDERING_FREQUENCY = 0.02  # likewise
+_SLOWEST, _FASTEST = 0.1, 0.5  # of the wandering, Hz
+_TONES = 8
+
+
+@dataclass(frozen=True)
+class TremorParameters:
+    """How the hands tremble.
+
+    Attributes:
+        amplitude: of the hand, half of the way to and fro, m, in the rest pose.
+        frequency: Hz.
+
+    Raises:
+        UserError: a value is not a finite number, the amplitude negative or the frequency not
+            positive.
+    """
+
+    amplitude: float = 0.005
+    frequency: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.amplitude) and self.amplitude >= 0.0):
+            raise UserError(
+                "person.tremor", "amplitude", f"is {self.amplitude} m, expected 0 or more"
+            )
+        if not (np.isfinite(self.frequency) and self.frequency > 0.0):
+            raise UserError(
+                "person.tremor", "frequency", f"is {self.frequency} Hz, expected more than 0"
+            )
+
+
+class Wandering:
+    """A smooth random function of time with mean 0 and variance 1: tones of random phase.
+
+    Source: Rice (1944), representation of Gaussian noise by tones. Its value at a time does not
+    depend on when it was asked before.
+
+    Args:
+        rng: draws frequencies and phases.
+    """
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._omega = 2.0 * np.pi * rng.uniform(_SLOWEST, _FASTEST, _TONES)
+        self._phase = rng.uniform(0.0, 2.0 * np.pi, _TONES)
+        self._size = np.sqrt(2.0 / _TONES)
+
+    def value(self, time: float) -> float:
+        """Returns the function at `time`, s."""
+        return float(self._size * np.sum(np.cos(self._omega * time + self._phase)))
+
+    def integral(self, time: float) -> float:
+        """Returns its integral from some fixed time to `time`, s."""
+        return float(self._size * np.sum(np.sin(self._omega * time + self._phase) / self._omega))
+
+
+class TremorWave:
+    """The shaking of one arm over time, of mean amplitude 1.
+
+    Args:
+        frequency: Hz, on average.
+        rng: draws phase and wandering.
+    """
+
+    def __init__(self, frequency: float, rng: np.random.Generator) -> None:
+        self._frequency = frequency
+        self._phase = rng.uniform(0.0, 2.0 * np.pi)
+        self._louder, self._faster = Wandering(rng), Wandering(rng)
+
+    def value(self, time: float) -> float:
+        """Returns the wave at `time`, s: (1 + 0.15 n₁) sin 2π(f t + 0.02 f ∫n₂)."""
+        cycles = time + _WANDERING_FREQUENCY * self._faster.integral(time)
+        amplitude = max(0.0, 1.0 + _WANDERING_AMPLITUDE * self._louder.value(time))
+        return float(amplitude * np.sin(2.0 * np.pi * self._frequency * cycles + self._phase))
+
+
+def tremor_torque(
+    p: TremorParameters,
+    mass: FloatArray,
+    damping: FloatArray,
+    stiffness: FloatArray,
+    jacobian: FloatArray,
+) -> FloatArray:
+    """Returns the amplitude (4,), N·m, of the torques that make a hand tremble as `p` says.
+
+    x = J (K − ω²M + iωD)⁻¹ τ is the hand's ellipse; its longer half axis is the amplitude.
+
+    Args:
+        p: amplitude and frequency.
+        mass: M (4,4) of the arm in its rest pose, kg·m².
+        damping: D (4,), N·m·s/rad.
+        stiffness: K (4,4), gravity's included, N·m/rad.
+        jacobian: J (3,4) of the hand, m/rad.
+    """
+    omega = 2.0 * np.pi * p.frequency
+    dynamic = stiffness - omega**2 * mass + 1j * omega * np.diag(damping)
+    hand = jacobian @ np.linalg.solve(dynamic, _DRIVE)
+    longest = np.linalg.svd(np.stack([hand.real, hand.imag]), compute_uv=False)[0]
+    torque: FloatArray = p.amplitude / longest * _DRIVE
+    return torque

@@ -1,0 +1,345 @@
+"""Persons in the plant: who is led stays led, who wants moves as said, and a dummy is as it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
+from drake_dress.diagrams.person import (
+    JointParameters,
+    Person,
+    add_person,
+    joint_positions,
+    person_arms,
+)
+from drake_dress.diagrams.station import StationParameters, make_simulated_station
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.active import ActiveParameters
+from drake_dress.models.human.body import ArmPose, BodyMeasures
+from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
+from drake_dress.models.human.tremor import TremorParameters
+from drake_dress.models.sides import Side
+
+M = BodyMeasures()
+JOINTS = JointParameters(6.0, 3.0, 3.6, 1.2)
+POSE = ArmPose(*np.deg2rad([13.0, 46.0, 0.0, 10.0]))
+ARMS: dict[Side, ArmPose] = {"left": POSE, "right": POSE}
+MESH = make_coat(CoatParameters(), 0.05)
+PERIOD = 0.004
+
+
+@dataclass
+class Scene:
+    """A person without a coat, or with one that hangs still."""
+
+    diagram: Diagram
+    plant: MultibodyPlant
+    person: Person
+    simulator: Simulator
+
+    @property
+    def context(self) -> Context:
+        return self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+
+    def pull(self, row: int, force: np.ndarray) -> None:
+        body, point = self.person.joint_points[row]
+        one = ExternallyAppliedSpatialForce()
+        one.body_index, one.p_BoBq_B = BodyIndex(body), point
+        one.F_Bq_W = SpatialForce(np.zeros(3), force)
+        self.plant.get_applied_spatial_force_input_port().FixValue(self.context, [one])
+
+    def joints(self) -> np.ndarray:
+        return joint_positions(self.plant, self.context, self.person)
+
+    def record(self, until: float, every: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+        """Returns times (n,), s, and joints (n,6,3), m, from now on."""
+        now = self.simulator.get_context().get_time()
+        times = now + every * np.arange(1, round((until - now) / every) + 1)
+        rows = []
+        for t in times:
+            self.simulator.AdvanceTo(t)
+            rows.append(self.joints())
+        return times, np.array(rows)
+
+
+def scene(behaviour: Behaviour, garment: np.ndarray | None = None) -> Scene:
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(PERIOD))
+    person = add_person(plant, M, "standing", ARMS, JOINTS, turns=behaviour.turns)
+    plant.Finalize()
+    x = MESH.rest_position + [-2.0, 0.0, 1.4] if garment is None else garment
+    nodes = builder.AddSystem(ConstantVectorSource(x.ravel()))
+    arms = person_arms(M, "standing", ARMS, JOINTS)
+    add_behaviour(builder, plant, person, arms, behaviour, MESH, nodes.get_output_port())
+    diagram = builder.Build()
+    return Scene(diagram, plant, person, Simulator(diagram))
+
+
+def passive(**following: float) -> Behaviour:
+    return Behaviour(
+        kind="passive", active=ActiveParameters(following=FollowingParameters(**following))
+    )
+
+
+def active(*motions: Motion, speed: float = 0.5) -> Behaviour:
+    return Behaviour(kind="active", motions=motions, active=ActiveParameters(max_hand_speed=speed))
+
+
+def names(diagram: Diagram) -> set[str]:
+    return {type(system).__name__ for system in diagram.GetSystems()}
+
+
+def state(s: Scene) -> np.ndarray:
+    return s.context.get_discrete_state_vector().CopyToVector()
+
+
+def test_dummy_has_nothing_but_its_constant_tone() -> None:
+    plain = scene(Behaviour())
+    assert names(plain.diagram) == {"MultibodyPlant", "ConstantVectorSource"}
+    tones = [
+        system
+        for system in plain.diagram.GetSystems()
+        if isinstance(system, ConstantVectorSource) and system.get_output_port().size() == 8
+    ]
+    value = tones[0].get_output_port().Eval(tones[0].CreateDefaultContext())
+    np.testing.assert_array_equal(value, plain.person.tone_torque(plain.plant))
+
+
+def test_dummy_moves_to_the_bit_as_a_plant_with_tone_alone() -> None:
+    """As dummies did before persons had behaviours."""
+    with_behaviour = scene(Behaviour())
+    plant = MultibodyPlant(PERIOD)
+    person = add_person(plant, M, "standing", ARMS, JOINTS)
+    plant.Finalize()
+    bare = Scene(plant, plant, person, Simulator(plant))
+    plant.get_applied_generalized_force_input_port().FixValue(
+        bare.context, person.tone_torque(plant)
+    )
+    for s in (with_behaviour, bare):
+        s.pull(2, np.array([1.0, 3.0, -0.5]))
+        s.simulator.AdvanceTo(0.5)
+    np.testing.assert_array_equal(state(with_behaviour), state(bare))
+    assert plant.num_positions() == 8
+
+
+def test_station_of_a_dummy_has_no_system_of_a_behaviour() -> None:
+    station = make_simulated_station(
+        StationParameters(
+            mesh=MESH,
+            material=Material(),
+            time_step=0.01,
+            measures=M,
+            posture="standing",
+            arms=ARMS,
+            joints=JOINTS,
+        )
+    )
+    assert names(station.diagram) == {
+        "MultibodyPlant",
+        "SceneGraph",
+        "ConstantVectorSource",
+        "ClothPlant",
+        "FloatingGripper",
+    }
+
+
+@pytest.mark.parametrize("kind", ["passive", "active"])
+def test_untouched_person_keeps_its_pose(kind: str) -> None:
+    s = scene(passive() if kind == "passive" else active())
+    start = s.joints()
+    s.simulator.AdvanceTo(2.0)
+    np.testing.assert_allclose(s.joints(), start, atol=1e-6)
+
+
+def test_arm_led_away_stays_near_where_it_was_led() -> None:
+    s, dummy = scene(passive(time_constant=0.5)), scene(Behaviour())
+    start, ends = s.joints()[2], []
+    for one in (s, dummy):
+        one.pull(2, np.array([0.0, 3.0, 0.0]))
+        one.simulator.AdvanceTo(3.0)
+        led = one.joints()[2]
+        one.pull(2, np.zeros(3))
+        one.simulator.AdvanceTo(6.0)
+        ends.append((led, one.joints()[2]))
+    led, stayed = ends[0]
+    assert np.linalg.norm(led - start) > 3.0 * np.linalg.norm(ends[1][0] - start)
+    assert np.linalg.norm(stayed - start) > 0.8 * np.linalg.norm(led - start)
+    assert np.linalg.norm(ends[1][1] - start) < 1e-3
+    # its weight is carried there: it does not sag any more
+    s.simulator.AdvanceTo(8.0)
+    assert np.linalg.norm(s.joints()[2] - stayed) < 1e-3
+    np.testing.assert_allclose(s.joints()[3:], scene(Behaviour()).joints()[3:], atol=1e-6)
+
+
+def test_arm_led_by_less_than_the_threshold_comes_back() -> None:
+    s = scene(passive(time_constant=0.5, threshold=0.5))
+    start = s.joints()[2]
+    s.pull(2, np.array([0.0, 0.6, 0.0]))
+    s.simulator.AdvanceTo(3.0)
+    assert np.linalg.norm(s.joints()[2] - start) > 0.008
+    s.pull(2, np.zeros(3))
+    s.simulator.AdvanceTo(6.0)
+    assert np.linalg.norm(s.joints()[2] - start) < 1e-4
+
+
+def test_led_round_and_let_go_the_person_has_only_taken_work() -> None:
+    """A hand drawn round by a force that turns: until it is let go, work flows in, never out."""
+    s = scene(passive(time_constant=0.3, threshold=0.2))
+    hand, work, least = s.joints()[2], 0.0, 0.0
+    for k in range(300):
+        phase = 2.0 * np.pi * k / 150
+        force = 4.0 * np.array([np.sin(phase), 1.0 - np.cos(phase), 0.3 * np.sin(phase)])
+        s.pull(2, force if k < 299 else np.zeros(3))
+        s.simulator.AdvanceTo(0.02 * (k + 1))
+        after = s.joints()[2]
+        work, hand = work + float(force @ (after - hand)), after
+        least = min(least, work)
+    assert work > 0.3
+    assert least > -0.01
+
+
+def test_turn_ends_at_its_angle_without_haste() -> None:
+    turn = Turn(start=0.5, angle=np.deg2rad(15.0), duration=2.0)
+    s = scene(active(turn))
+    assert s.plant.num_positions() == 9
+    start = s.joints()
+    _, joints = s.record(5.0)
+    line = joints[:, 0] - joints[:, 3]
+    yaw = np.arctan2(-line[:, 0], line[:, 1])
+    assert np.abs(yaw[:24]).max() < 1e-6
+    assert np.rad2deg(yaw[-1]) == pytest.approx(15.0, abs=0.05)
+    assert np.rad2deg(yaw.max()) < 15.5
+    assert np.abs(np.diff(yaw) / 0.02).max() < 1.1 * turn.speed
+    # the arms, which hang on it, come along
+    c, s_ = np.cos(yaw[-1]), np.sin(yaw[-1])
+    turned = start @ np.array([[c, -s_, 0.0], [s_, c, 0.0], [0.0, 0.0, 1.0]]).T
+    np.testing.assert_allclose(joints[-1], turned, atol=2e-3)
+
+
+def test_who_does_not_turn_is_welded_to_the_floor() -> None:
+    assert scene(active(Wave())).plant.num_positions() == 8
+    assert scene(Behaviour(kind="passive", motions=(Turn(),))).plant.num_positions() == 8
+
+
+def coat_near_the_hand(yaw: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a coat (n,3) of which the left armhole is a little out from the left hand, m.
+
+    Also that armhole's centre (3,). It is turned so that the hand comes in along its sleeve.
+    """
+    x, loop = np.array(MESH.rest_position), MESH.loops["left_armhole"]
+    center = x[loop].mean(axis=0)
+    into = x[MESH.loops["left_cuff"]].mean(axis=0) - center
+    into /= np.linalg.norm(into)
+    wanted = np.array([-0.3, 0.8, -0.5])
+    wanted /= np.linalg.norm(wanted)
+    axis = np.cross(into, wanted)
+    sine, cosine = np.linalg.norm(axis), into @ wanted
+    k = np.cross(np.eye(3), axis / sine)
+    rotation = np.eye(3) + sine * k + (1.0 - cosine) * (k @ k)
+    assert rotation @ into == pytest.approx(wanted, abs=1e-9)
+    goal = scene(Behaviour()).joints()[2] + [0.05, 0.12, 0.08]
+    moved = (x - center) @ rotation.T + goal
+    c, s = np.cos(yaw), np.sin(yaw)
+    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return moved @ turned.T, turned @ goal
+
+
+@pytest.mark.parametrize("yaw", [0.0, np.deg2rad(20.0)])
+def test_reach_brings_the_hand_into_the_armhole(yaw: float) -> None:
+    """Also after a turn, that the armhole has made too."""
+    garment, goal = coat_near_the_hand(yaw)
+    turns = (Turn(start=0.0, angle=yaw, duration=1.0),) if yaw else ()
+    s = scene(active(Reach(start=1.5, sides=("left",)), *turns), garment)
+    times, joints = s.record(5.0)
+    hand = joints[:, 2]
+    speed = np.linalg.norm(np.diff(hand, axis=0), axis=1) / 0.02
+    assert speed[times[1:] > 1.5].max() < 0.6
+    assert np.linalg.norm(hand - goal, axis=1).min() < 0.05
+    assert np.linalg.norm(hand[-1] - goal) < 0.08
+    assert np.linalg.norm(hand[-1] - hand[-25]) < 5e-3
+
+
+def test_hand_drawn_back_comes_back_and_a_waving_one_stays_near() -> None:
+    wave = Wave(start=4.5, duration=2.0, amplitude=0.05, frequency=1.0, sides=("left",))
+    s = scene(active(Withdraw(start=0.5, duration=1.5, sides=("left",)), wave))
+    start = s.joints()
+    times, joints = s.record(8.5)
+    away = np.linalg.norm(joints[:, 2] - start[2], axis=1)
+    drawn = (times > 1.5) & (times < 2.0)
+    assert away[drawn].min() > 0.08
+    assert away[times < 4.0].max() < 0.13
+    assert away[(times > 4.3) & (times < 4.5)].max() < 0.01
+    waving = (times > 4.5) & (times < 6.5)
+    assert 0.04 < away[waving].max() < 0.09
+    assert away[-1] < 0.01
+    np.testing.assert_allclose(joints[:, 5], np.tile(start[5], (len(joints), 1)), atol=1e-3)
+
+
+def tremble(seed: int, kind: str = "dummy", frequency: float = 5.0) -> np.ndarray:
+    """Returns the left hand (n,3), m, sampled each period, after a second."""
+    tremor = TremorParameters(amplitude=0.008, frequency=frequency)
+    s = scene(Behaviour(kind=kind, tremor=tremor, seed=seed))  # type: ignore[arg-type]
+    times, joints = s.record(17.0, PERIOD)
+    return joints[times > 1.0, 2]
+
+
+@pytest.mark.parametrize(("kind", "frequency"), [("dummy", 5.0), ("passive", 8.0)])
+def test_hand_trembles_at_its_frequency_by_its_amplitude(kind: str, frequency: float) -> None:
+    hand = tremble(1, kind, frequency)
+    hand = hand - hand.mean(axis=0)
+    main = hand @ np.linalg.svd(hand, full_matrices=False)[2][0]
+    power = np.abs(np.fft.rfft(main * np.hanning(len(main)))) ** 2
+    f = np.fft.rfftfreq(len(main), PERIOD)
+    assert abs(f[power.argmax()] - frequency) < 0.06 * frequency
+    assert np.sqrt(2.0 * np.mean(main**2)) == pytest.approx(0.008, rel=0.2)
+
+
+def test_tremor_is_the_same_for_the_same_seed_alone() -> None:
+    def end(seed: int) -> np.ndarray:
+        s = scene(Behaviour(tremor=TremorParameters(), seed=seed))
+        s.simulator.AdvanceTo(0.5)
+        return state(s)
+
+    np.testing.assert_array_equal(end(1), end(1))
+    assert np.abs(end(1) - end(2)).max() > 1e-3
+
+
+def test_active_person_does_the_same_again() -> None:
+    def end() -> np.ndarray:
+        garment, _ = coat_near_the_hand()
+        s = scene(active(Reach(), Turn(angle=0.2), Wave(start=0.5)), garment)
+        s.simulator.AdvanceTo(1.0)
+        return state(s)
+
+    np.testing.assert_array_equal(end(), end())
+
+
+def test_arms_model_is_that_of_the_plant() -> None:
+    """Gravity's torques in closed form are those of the plant, wherever it has turned."""
+    plant = MultibodyPlant(PERIOD)
+    person = add_person(plant, M, "standing", ARMS, JOINTS, turns=True)
+    plant.Finalize()
+    arms, dofs = person_arms(M, "standing", ARMS, JOINTS), person.arm_dofs(plant)
+    np.testing.assert_allclose(arms.limits[0, 0], plant.GetPositionLowerLimits()[dofs[:4]])
+    np.testing.assert_allclose(arms.limits[1, 1], plant.GetPositionUpperLimits()[dofs[4:]])
+    context = plant.CreateDefaultContext()
+    np.testing.assert_allclose(plant.GetPositions(context)[dofs], arms.rest.ravel())
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q = rng.uniform(-1.5, 1.5, 9)
+        plant.SetPositions(context, q)
+        gravity = plant.CalcGravityGeneralizedForces(context)[dofs]
+        angles = q[dofs].reshape(2, 4)
+        expected = [a.gravity_torque(b) for a, b in zip(arms.arms, angles, strict=True)]
+        np.testing.assert_allclose(gravity, np.concatenate(expected), atol=1e-9)
