@@ -12,8 +12,10 @@ from drake_dress.diagrams.person import JointParameters, Person
 from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
-from drake_dress.models.control.policy import DressingPolicy, PersonModel, PolicyParameters
+from drake_dress.models.control.person_model import PersonModel
+from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
+from drake_dress.models.control.tasks import TaskParameters
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
@@ -80,9 +82,11 @@ def controller_policy(
         committed_steps=round(g.delay / g.time_step),
         max_speed=g.max_speed,
         weights=Weights(**vars(g.weights)),
-        progress_step=g.progress_step,
-        approach_distance=g.approach_distance,
-        stages=StageParameters(waiting_progress=g.waiting_progress),
+        tasks=TaskParameters(
+            progress_rate=g.progress_step / g.time_step,
+            approach_distance=g.approach_distance,
+            stages=StageParameters(waiting_progress=g.waiting_progress),
+        ),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
 

@@ -1,0 +1,366 @@
+"""What each sleeve is asked to do, and where it shall be for it: facts, stages, targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.control.global_mpc import SleeveTarget
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.sight import free_sight
+from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
+from drake_dress.models.dressing.stages import (
+    SleeveFacts,
+    StageParameters,
+    StageState,
+    Task,
+    advance_stages,
+    eases,
+    retreats,
+)
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.heading import Heading, heading
+
+# How much further up its arm the next place of a sleeve that is on it is, as s.
+_NEXT = 0.04
+
+
+@dataclass(frozen=True)
+class TaskParameters:
+    """Where sleeves are asked to go.
+
+    Attributes:
+        progress_rate: advance of s asked for, 1/s (k in a step of the prediction).
+        approach_distance: cap of l_h, m.
+        tethered_approach_distance: the same with the other sleeve on, m.
+        approach_slope: l_h per distance beside the line of approach; 1 as printed.
+        approach_share: direction in which an armhole is drawn over the hand, between inward across
+            the body (0) and the forearm (1).
+        orientation_share: direction from the armhole to the garment's entry, likewise.
+        behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
+        tethered_behind_distance: the same with the other sleeve on, m.
+        retreat_distance: how much further back a sleeve goes that missed the hand, m.
+        widening: growth of the cap of l_h with each attempt that missed the hand.
+        least_sight: share of an opening that the hand has to see for it to be drawn over.
+        aside_free: distance beside that does not count, m.
+        overshoot: how far past the hand an armhole in line is asked to go, m.
+        inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
+        dressing_direction: factor on Q while a sleeve is drawn up its arm.
+        waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
+            lets the other one use.
+        final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
+            armpit, and both sleeves would pull against each other.
+        largest_lead: advance of s that one of two sleeves on their arms may have on the other.
+        stages: thresholds of the switching.
+    """
+
+    progress_rate: float = 0.4
+    approach_distance: float = 0.20
+    tethered_approach_distance: float = 0.15
+    approach_slope: float = 3.0
+    approach_share: float = 0.25
+    orientation_share: float = 0.6
+    behind_distance: float = 0.30
+    tethered_behind_distance: float = 0.15
+    retreat_distance: float = 0.15
+    widening: float = 0.1
+    least_sight: float = 0.5
+    aside_free: float = 0.02
+    overshoot: float = 0.12
+    inside_radius: float = 0.08
+    dressing_direction: float = 0.1
+    waiting_reach: float = 0.9
+    final_progress: float = 1.99
+    largest_lead: float = 0.6
+    stages: StageParameters = field(default_factory=StageParameters)
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What both sleeves are asked to do, left, then right, and what that was decided from.
+
+    Attributes:
+        tasks: of each. facts: of each. retreat: whether it keeps away from the hand. ease: whether
+            it gives way. attempts: how often it has missed the hand.
+    """
+
+    tasks: tuple[Task, Task]
+    facts: tuple[SleeveFacts, SleeveFacts]
+    retreat: tuple[bool, bool] = (False, False)
+    ease: tuple[bool, bool] = (False, False)
+    attempts: tuple[int, int] = (0, 0)
+
+
+def arm_axes(joints: FloatArray) -> tuple[ArmAxis, ArmAxis]:
+    """Returns the axes of left and right arm; joints (6,3), m: shoulder, elbow, hand of each."""
+    q = joints
+    return (
+        ArmAxis(hand=q[2], elbow=q[1], shoulder=q[0]),
+        ArmAxis(hand=q[5], elbow=q[4], shoulder=q[3]),
+    )
+
+
+class TaskPlanner:
+    """Assigns tasks, and tells where they lead.
+
+    Args:
+        mesh: the controller's garment.
+        parameters: settings.
+    """
+
+    def __init__(self, mesh: GarmentMesh, parameters: TaskParameters) -> None:
+        self.mesh = mesh
+        self.parameters = parameters
+        self.armholes = (
+            np.asarray(mesh.loops["left_armhole"]),
+            np.asarray(mesh.loops["right_armhole"]),
+        )
+        self.signs = (float(loop_orientation(mesh, "left")), float(loop_orientation(mesh, "right")))
+        centers = [mesh.rest_position[loop].mean(axis=0) for loop in self.armholes]
+        self._reach = float(np.linalg.norm(centers[0] - centers[1]))
+
+    def sleeves(self, x: FloatArray) -> tuple[SleeveState, SleeveState]:
+        """Returns the states of left and right sleeve of the garment at `x` (n,3), m."""
+        return (
+            sleeve_state(x, self.armholes[0], self.signs[0]),
+            sleeve_state(x, self.armholes[1], self.signs[1]),
+        )
+
+    def assign(
+        self, stages: StageState, x: FloatArray, joints: FloatArray, time: float
+    ) -> tuple[StageState, Assignment]:
+        """Returns the stages now, and what follows from them.
+
+        Args:
+            stages: so far.
+            x: (n,3) the garment now, m.
+            joints: (6,3) shoulder, elbow, hand of left, then right arm now, m.
+            time: now, s.
+        """
+        p = self.parameters
+        axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
+        facts = (
+            self._facts(x, joints, axes[0], to, sleeves[0], 0),
+            self._facts(x, joints, axes[1], to, sleeves[1], 1),
+        )
+        goals = [self._waypoint(axes[i], to, facts[i], i) for i in (0, 1)]
+        distance = float(np.linalg.norm(goals[0] - goals[1]))
+        stages, tasks = advance_stages(stages, facts, p.stages, distance, time)
+        return stages, Assignment(
+            tasks,
+            facts,
+            (retreats(stages, 0, p.stages, time), retreats(stages, 1, p.stages, time)),
+            (eases(stages, 0, p.stages, time), eases(stages, 1, p.stages, time)),
+            stages.attempts,
+        )
+
+    def renewed(
+        self, given: Assignment, sleeves: Sequence[SleeveState], joints: FloatArray
+    ) -> Assignment:
+        """Returns an assignment with the progress that sleeves have made on joints (6,3), m, now.
+
+        Who is on which arm, and who sees whom, is as it was.
+        """
+        s = [
+            float(axis.coordinates(sleeve.p_c).s) if fact.linked else 0.0
+            for axis, sleeve, fact in zip(arm_axes(joints), sleeves, given.facts, strict=True)
+        ]
+        left, right = (replace(f, s=value) for f, value in zip(given.facts, s, strict=True))
+        return replace(given, facts=(left, right))
+
+    def targets(
+        self,
+        assignment: Assignment,
+        sleeves: Sequence[SleeveState],
+        joints: FloatArray,
+        time_step: float,
+    ) -> tuple[SleeveTarget, SleeveTarget]:
+        """Returns where both sleeves shall be at each of N steps.
+
+        Args:
+            assignment: what they are to do.
+            sleeves: where they are now.
+            joints: (N+1,6,3) predicted, m; row 0 is now.
+            time_step: between rows, s.
+        """
+        axes = [arm_axes(q) for q in joints]
+        headings = [heading(q) for q in joints]
+        return (
+            self._target(assignment, 0, axes, headings, sleeves, time_step),
+            self._target(assignment, 1, axes, headings, sleeves, time_step),
+        )
+
+    def _approach_direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
+        """Returns the unit vector along which an armhole is drawn over the hand."""
+        return _between(_inward(to, side), axis.D(0.0), self.parameters.approach_share)
+
+    def _waypoint(self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int) -> FloatArray:
+        """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
+        p = self.parameters
+        if fact.linked:
+            return axis.G(min(2.0, fact.s + _NEXT))
+        return axis.G(0.0) - p.approach_distance * self._approach_direction(axis, to, side)
+
+    def _facts(
+        self,
+        x: FloatArray,
+        joints: FloatArray,
+        axis: ArmAxis,
+        to: Heading,
+        sleeve: SleeveState,
+        side: int,
+    ) -> SleeveFacts:
+        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
+        interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
+        linked = (
+            abs(arm_linking_number(x[self.armholes[side]], shoulder, elbow, hand, interior)) == 1
+        )
+        s, _, _ = axis.coordinates(sleeve.p_c)
+        offset = hand - sleeve.p_c
+        aside = _aside(offset, self._approach_direction(axis, to, side))
+        sight = free_sight(x, self.mesh.faces, self.armholes[side], hand)
+        return SleeveFacts(
+            linked=linked,
+            in_sight=sight >= self.parameters.least_sight,
+            s=float(s) if linked else 0.0,
+            hand_distance=float(np.linalg.norm(offset)),
+            prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
+            passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
+            opening=float(axis.D(0.0) @ _inward(to, side)),
+        )
+
+    def _prepared(
+        self,
+        axis: ArmAxis,
+        to: Heading,
+        sleeve: SleeveState,
+        side: int,
+        tethered: bool,
+        in_sight: bool,
+        retreat: bool = False,
+        attempts: int = 0,
+    ) -> FloatArray:
+        """Returns where a sleeve is prepared (Eq. Jpi).
+
+        The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
+        outside the hand, and further back (against v_f) until it is in line: so the hand comes in
+        by the open front. An arm that comes from anywhere else meets the outside of the front
+        panel, with the armhole's centre at the hand and the hand not in it; so an opening that the
+        hand does not see stays outside. One that faces the hand is drawn along its own normal, and
+        along the forearm once the hand is in it: further inward it would be pulled past the hand.
+        """
+        p = self.parameters
+        hand = axis.G(0.0)
+        direction = self._approach_direction(axis, to, side)
+        offset = hand - sleeve.p_c
+        # Depth of the hand behind the opening, and how far it is beside the opening's normal.
+        depth = float(offset @ -sleeve.v_c)
+        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
+        facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if in_sight else 0.0
+        inside = facing * _ramp(depth, -0.02, 0.02)
+        aside = (1.0 - facing) * _aside(offset, direction)
+        cap = p.tethered_approach_distance if tethered else p.approach_distance
+        cap *= 1.0 + p.widening * min(attempts, 3)
+        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
+        if not in_sight:
+            distance = cap
+        if retreat:
+            return hand - cap * direction - p.retreat_distance * to.front
+        onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
+        goal = hand - distance * direction + p.overshoot * onward
+        behind = p.tethered_behind_distance if tethered else p.behind_distance
+        if distance == cap:
+            error = sleeve.p_c - (hand - cap * direction)
+            error = error - to.front * (to.front @ error)
+            wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
+            goal = hand - cap * direction - min(wait, behind) * to.front
+        return goal
+
+    def _target(
+        self,
+        given: Assignment,
+        side: int,
+        axes: Sequence[tuple[ArmAxis, ArmAxis]],
+        headings: Sequence[Heading],
+        sleeves: Sequence[SleeveState],
+        time_step: float,
+    ) -> SleeveTarget:
+        p, n = self.parameters, len(axes) - 1
+        facts, attempts = given.facts, given.attempts
+        task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
+        position, direction = np.empty((n, 3)), np.empty((n, 3))
+        entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
+        for j in range(n):
+            axis, to = axes[j + 1][side], headings[j + 1]
+            if entering:
+                position[j] = self._prepared(
+                    axis,
+                    to,
+                    sleeves[side],
+                    side,
+                    facts[1 - side].linked,
+                    facts[side].in_sight,
+                    given.retreat[side],
+                    attempts[side],
+                )
+                direction[j] = _between(_inward(to, side), axis.D(0.0), p.orientation_share)
+                continue
+            if task == Task.DRESS:
+                s = facts[side].s + (j + 1) * time_step * step
+                other_fact = facts[1 - side]
+                if other_fact.linked:
+                    s = min(s, max(facts[side].s, other_fact.s + p.largest_lead))
+            else:
+                k = 1 - side
+                other = self._prepared(
+                    axes[j + 1][k], to, sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
+                )
+                s = self._waiting_progress(axis, other)
+            s = min(p.final_progress, max(0.0, s))
+            position[j], direction[j] = axis.G(s), axis.D(s)
+        if task == Task.REST:
+            return SleeveTarget(position, direction, 0.0, 0.0)
+        if entering:
+            return SleeveTarget(position, direction, entering=True)
+        return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
+
+    def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
+        """Returns the largest s from which the garment reaches `other` (3,), m (J_w).
+
+        Higher up than that the garment holds the other sleeve back; lower down it could slip off.
+        """
+        least = self.parameters.stages.waiting_progress
+        steps = np.linspace(2.0, least, 41)
+        for s in steps:
+            if (
+                np.linalg.norm(axis.G(float(s)) - other)
+                < self.parameters.waiting_reach * self._reach
+            ):
+                return float(s)
+        return least
+
+
+def _inward(to: Heading, side: int) -> FloatArray:
+    """Returns the unit vector from a side of the person to the other."""
+    return to.leftward * (-1.0 if side == 0 else 1.0)
+
+
+def _aside(offset: FloatArray, direction: FloatArray) -> float:
+    """Returns the length of `offset` across the unit vector `direction`."""
+    return float(np.linalg.norm(offset - direction * (direction @ offset)))
+
+
+def _ramp(value: float, zero: float, one: float) -> float:
+    """Returns 0 beyond `zero`, 1 beyond `one`, linear between."""
+    return min(1.0, max(0.0, (value - zero) / (one - zero)))
+
+
+def _between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
+    """Returns the unit vector between unit vectors `a` (share 0) and `b` (share 1)."""
+    mixed = (1.0 - share) * a + share * b
+    unit: FloatArray = mixed / np.linalg.norm(mixed)
+    return unit

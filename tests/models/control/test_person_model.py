@@ -1,0 +1,68 @@
+"""The controller's person goes with the shoulders, wherever they have turned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drake_dress.models.control.person_model import PersonModel, person_obstacles
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    arm_points,
+    body_capsules,
+    shoulder_joint,
+)
+from drake_dress.models.sides import SIDES
+
+M = BodyMeasures()
+POSE = ArmPose(0.25, 0.8, 0.0, 0.2)
+HORIZON = 3
+STEP = 0.1
+PERSON = PersonModel(
+    body_capsules(M, "sitting"),
+    np.stack([shoulder_joint(M, "sitting", side) for side in SIDES]),
+    (M.upper_arm_radius, M.forearm_radius, M.hand_radius),
+)
+
+
+def frame(yaw: float, place: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([*place, 0.0])
+
+
+def joints(yaw: float = 0.0, place: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    where = frame(yaw, place)
+    return np.vstack([arm_points(M, "sitting", side, POSE, where) for side in SIDES])
+
+
+def test_person_who_faces_forward_is_where_the_capsules_say() -> None:
+    torso = [c for c in body_capsules(M, "sitting") if c.body == "torso"]
+    seen = person_obstacles(PERSON, np.stack([joints()] * (HORIZON + 1)), STEP)
+    for obstacles in seen:
+        np.testing.assert_allclose(obstacles.a[: len(torso)], [c.a_B for c in torso], atol=1e-12)
+        np.testing.assert_allclose(obstacles.b[: len(torso)], [c.b_B for c in torso], atol=1e-12)
+        np.testing.assert_array_equal(obstacles.velocity, 0.0)
+
+
+@pytest.mark.parametrize("yaw", [-0.5, 0.26, 2.0])
+def test_torso_turns_with_the_shoulders(yaw: float) -> None:
+    """Knees of a person who sits are in front of the hips, wherever front is."""
+    place = (0.3, -0.2)
+    rotation, origin = frame(yaw, place)
+    ahead = person_obstacles(PERSON, np.stack([joints()] * (HORIZON + 1)), STEP)[0]
+    turned = person_obstacles(PERSON, np.stack([joints(yaw, place)] * (HORIZON + 1)), STEP)[0]
+    np.testing.assert_allclose(turned.a, ahead.a @ rotation.T + origin, atol=1e-12)
+    np.testing.assert_allclose(turned.b, ahead.b @ rotation.T + origin, atol=1e-12)
+
+
+def test_torso_that_is_predicted_to_turn_moves_as_it_does() -> None:
+    """Over a step, ends of capsules go where their velocity and rotation carry them."""
+    rows = [joints(0.05 * j) for j in range(HORIZON + 1)]
+    predicted = person_obstacles(PERSON, np.stack(rows), STEP)
+    for now, then in zip(predicted[:-1], predicted[1:], strict=True):
+        np.testing.assert_allclose(now.a + STEP * now.velocity, then.a, atol=1e-12)
+    knee = int(np.argmax(predicted[0].a[:, 0]))
+    assert np.linalg.norm(predicted[0].velocity[knee]) == pytest.approx(
+        0.5 * np.linalg.norm(predicted[0].a[knee, :2]), rel=0.01
+    )

@@ -1,0 +1,88 @@
+"""What sleeves are asked to do goes with the person, and with what they have done since."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drake_dress.models.control.global_mpc import SleeveTarget
+from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner, arm_axes
+from drake_dress.models.dressing.sleeve import SleeveState
+from drake_dress.models.dressing.stages import SleeveFacts, StageState, Task
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
+from drake_dress.models.sides import SIDES
+
+M = BodyMeasures()
+POSE = ArmPose(0.25, 0.8, 0.0, 0.2)
+HORIZON = 3
+STEP = 0.1
+
+
+@pytest.fixture(scope="module")
+def planner() -> TaskPlanner:
+    return TaskPlanner(make_coat(CoatParameters(), 0.06), TaskParameters())
+
+
+def frame(yaw: float, place: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([*place, 0.0])
+
+
+def joints(yaw: float = 0.0, place: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    where = frame(yaw, place)
+    return np.vstack([arm_points(M, "sitting", side, POSE, where) for side in SIDES])
+
+
+@pytest.mark.parametrize("yaw", [-0.5, 0.26, 2.0])
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("task", [Task.PREPARE, Task.DRESS])
+@pytest.mark.parametrize("retreat", [False, True])
+def test_targets_turn_with_the_person(
+    planner: TaskPlanner, yaw: float, side: int, task: Task, retreat: bool
+) -> None:
+    """Person, sleeves and all turned alike: what is asked for is the same, turned."""
+    place = (0.3, -0.2)
+    rotation, origin = frame(yaw, place)
+    rng = np.random.default_rng(0)
+    spots = [joints()[3 * i + 2] + rng.normal(0.0, 0.1, 3) for i in (0, 1)]
+    normals = [rng.normal(size=3) for _ in (0, 1)]
+    sleeves = [SleeveState(p, n / np.linalg.norm(n)) for p, n in zip(spots, normals, strict=True)]
+
+    def target(q: np.ndarray, x: np.ndarray, sleeves: list[SleeveState]) -> SleeveTarget:
+        _, seen = planner.assign(StageState(), x, q, 0.0)
+        given = Assignment((task, task), seen.facts, (retreat, retreat), attempts=(1, 1))
+        return planner.targets(given, sleeves, np.stack([q] * (HORIZON + 1)), STEP)[side]
+
+    x = planner.mesh.rest_position + [-0.4, 0.0, 0.9]
+    straight = target(joints(), x, sleeves)
+    turned = target(
+        joints(yaw, place),
+        x @ rotation.T + origin,
+        [SleeveState(rotation @ s.p_c + origin, rotation @ s.v_c) for s in sleeves],
+    )
+    np.testing.assert_allclose(turned.position, straight.position @ rotation.T + origin, atol=1e-9)
+    np.testing.assert_allclose(turned.direction, straight.direction @ rotation.T, atol=1e-9)
+
+
+def test_a_sleeve_on_its_arm_is_asked_to_go_on_at_its_rate(planner: TaskPlanner) -> None:
+    axes = arm_axes(joints())
+    on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+    given = Assignment((Task.DRESS, Task.DRESS), (on, on))
+    sleeves = [SleeveState(axis.G(0.7), axis.D(0.7)) for axis in axes]
+    renewed = planner.renewed(given, sleeves, joints())
+    assert renewed.facts[0].s == pytest.approx(0.7)
+    rate = planner.parameters.progress_rate
+    for step, count in ((0.1, 3), (0.05, 6)):
+        rows = np.stack([joints()] * (count + 1))
+        for axis, target in zip(axes, planner.targets(renewed, sleeves, rows, step), strict=True):
+            s = 0.7 + rate * step * np.arange(1, count + 1)
+            np.testing.assert_allclose(target.position, [axis.G(v) for v in s], atol=1e-12)
+            np.testing.assert_allclose(target.direction, [axis.D(v) for v in s], atol=1e-12)
+
+
+def test_a_sleeve_that_is_on_no_arm_makes_no_progress(planner: TaskPlanner) -> None:
+    off = SleeveFacts(linked=False, s=0.0, hand_distance=0.2, prepared_error=0.2, passed=0.1)
+    given = Assignment((Task.PREPARE, Task.PREPARE), (off, off))
+    sleeves = [SleeveState(axis.G(0.7), axis.D(0.7)) for axis in arm_axes(joints())]
+    assert planner.renewed(given, sleeves, joints()).facts == (off, off)
