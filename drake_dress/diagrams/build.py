@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydrake.geometry import Meshcat
 
 from drake_dress.diagrams import scenario as schema
 from drake_dress.diagrams.behaviour import Behaviour, Kind
-from drake_dress.diagrams.dressing import Rates
+from drake_dress.diagrams.dressing import LocalSetup, Rates
 from drake_dress.diagrams.person import JointParameters, Person
 from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
+from drake_dress.models.control.local_control import LocalController, constrained_ddp
+from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
@@ -31,6 +35,7 @@ from drake_dress.models.human.prediction import (
 )
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES
+from drake_dress.solvers.cone_programme import cone_programme
 
 
 def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat | None) -> Station:
@@ -81,6 +86,7 @@ def controller_policy(
         inner_iterations=g.inner_iterations,
         committed_steps=round(g.delay / g.time_step),
         max_speed=g.max_speed,
+        plans=c.method != "local",
         weights=Weights(**vars(g.weights)),
         tasks=TaskParameters(
             progress_rate=g.progress_step / g.time_step,
@@ -89,6 +95,35 @@ def controller_policy(
         ),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
+
+
+# Between the joints that are predicted for the local controller, s.
+_JOINTS_STEP = 0.2
+
+
+def local_setup(scenario: schema.Scenario, policy: DressingPolicy) -> LocalSetup | None:
+    """Returns the local controller; None where the global plan is followed as it is."""
+    if scenario.controller.method == "global":
+        return None
+    values = scenario.controller.local
+    parameters = LocalParameters(
+        time_step=values.time_step,
+        horizon=values.horizon,
+        position=values.position,
+        speed=values.speed,
+        max_speed=values.max_speed,
+        beside=values.beside,
+        beside_speed=values.beside_speed,
+    )
+    solvers = {"constrained_ddp": constrained_ddp, "cone": cone_programme}
+    return LocalSetup(
+        LocalController(policy.planner, parameters, solvers[values.solver]),
+        values.period,
+        values.delay,
+        values.feedback,
+        _JOINTS_STEP,
+        math.ceil(values.horizon * values.time_step / _JOINTS_STEP),
+    )
 
 
 def behaviour(scenario: schema.Scenario) -> Behaviour:

@@ -12,6 +12,8 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.station import Station
+from drake_dress.models.control.local_control import LocalController
+from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.effects.composition import true_times
@@ -27,6 +29,7 @@ from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
 from drake_dress.systems.human_predictor import HumanPredictor
 from drake_dress.systems.joint_oracle import JointOracle
+from drake_dress.systems.local_controller import LocalCompensation
 from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.safety_governor import SafetyGovernor
@@ -40,6 +43,39 @@ class Rates:
     global_delay: float = 0.2
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
+
+
+@dataclass(frozen=True)
+class LocalSetup:
+    """The local controller, and how often it is asked.
+
+    Attributes:
+        controller: does the work.
+        period: between solves, s. delay: of their use, s.
+        feedback: whether it corrects between solves.
+        joints_step: between the joints predicted for it, s; joints_count: how many beyond now.
+        record: takes each problem that it solves, if given.
+    """
+
+    controller: LocalController
+    period: float
+    delay: float
+    feedback: bool
+    joints_step: float
+    joints_count: int
+    record: list[LocalProblem] | None = None
+
+    def system(self) -> LocalCompensation:
+        """Returns it as a system."""
+        return LocalCompensation(
+            self.controller,
+            self.period,
+            self.delay,
+            self.joints_step,
+            self.joints_count,
+            self.feedback,
+            self.record,
+        )
 
 
 @dataclass(frozen=True)
@@ -62,6 +98,7 @@ def make_dressing(
     meshcat: Meshcat | None = None,
     effects: Sequence[Effect] = (),
     predictor: MotionPredictor | None = None,
+    local: LocalSetup | None = None,
 ) -> Dressing:
     """Returns station and controllers wired together.
 
@@ -77,6 +114,7 @@ def make_dressing(
         effects: those on cameras and their clock, which lie between truth and controllers. A clock
             that is behind changes nothing for controllers that do not look at stamps.
         predictor: what is believed of how the arms move on; that they stay, when None.
+        local: the local controller between plan and governor; the plan is followed when None.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
@@ -84,11 +122,18 @@ def make_dressing(
     joints = builder.AddNamedSystem(
         "joint_oracle", JointOracle(station.person.joint_points, effects)
     )
-    predictor = builder.AddNamedSystem("human_predictor", _predictor(policy, predictor))
+    believed = predictor or StillPredictor()
+    p = policy.parameters
+    predicted = builder.AddNamedSystem(
+        "human_predictor", HumanPredictor(believed, p.time_step, p.horizon)
+    )
     mpc = builder.AddNamedSystem(
         "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
     )
-    follower = builder.AddNamedSystem("plan_follower", PlanFollower())
+    if local is None:
+        asking = builder.AddNamedSystem("plan_follower", PlanFollower())
+    else:
+        asking = builder.AddNamedSystem("local_controller", local.system())
     governor = builder.AddNamedSystem(
         "safety_governor", SafetyGovernor(station.start_grippers, rates.command_period, limits)
     )
@@ -99,7 +144,7 @@ def make_dressing(
     connect(lab, "cheat_garment_position", garment, "garment_position")
     connect(lab, "cheat_garment_velocity", garment, "garment_velocity")
     connect(lab, "cheat_body_poses", joints, "body_poses")
-    connect(joints, "joint_position", predictor, "joint_position")
+    connect(joints, "joint_position", predicted, "joint_position")
     late = -float(true_times(np.zeros(1), effects, TimeOffset.NAME)[0])
     for quantity in ("position", "velocity"):
         port = garment.GetOutputPort(f"estimated_{quantity}")
@@ -108,15 +153,25 @@ def make_dressing(
             still = np.asarray(transfer @ station.cloth.start_position).ravel()
         port = delayed(builder, port, still, rates.command_period, late)
         builder.Connect(port, mpc.GetInputPort(f"garment_{quantity}"))
-    connect(predictor, "predicted_joint_position", mpc, "predicted_joint_position")
-    connect(mpc, "plan", follower, "plan")
-    connect(follower, "request_time", governor, "request_time")
+        if quantity == "position" and local is not None:
+            builder.Connect(port, asking.GetInputPort("garment_position"))
+    connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
+    if local is not None:
+        soon = builder.AddNamedSystem(
+            "near_human_predictor", HumanPredictor(believed, local.joints_step, local.joints_count)
+        )
+        connect(joints, "joint_position", soon, "joint_position")
+        connect(soon, "predicted_joint_position", asking, "predicted_joint_position")
+        for side in SIDES:
+            connect(lab, f"{side}_gripper.position_measured", asking, f"{side}_gripper_position")
+    connect(mpc, "plan", asking, "plan")
+    connect(asking, "request_time", governor, "request_time")
     for side in SIDES:
         for quantity in ("position", "force"):
             connect(
                 lab, f"{side}_gripper.{quantity}_measured", governor, f"{side}_gripper_{quantity}"
             )
-        connect(follower, f"{side}_velocity_request", governor, f"{side}_velocity_request")
+        connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
         connect(governor, f"{side}_position_command", lab, f"{side}_gripper.position_command")
 
     if writer is not None:
@@ -130,8 +185,11 @@ def make_dressing(
                 capsules,
                 rates.log_period,
                 rates.command_period,
+                local is not None,
             ),
         )
+        if local is not None:
+            connect(asking, "solve_time", recorder, "local_solve_time")
         connect(lab, "cheat_garment_position", recorder, "garment_position")
         connect(lab, "cheat_contact", recorder, "contact")
         connect(lab, "cheat_contact_force", recorder, "contact_force")
@@ -166,12 +224,6 @@ def make_dressing(
     diagram = builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, mpc)
-
-
-def _predictor(policy: DressingPolicy, predictor: MotionPredictor | None) -> HumanPredictor:
-    """Returns what predicts the joints at the steps of the global controller."""
-    p = policy.parameters
-    return HumanPredictor(predictor or StillPredictor(), p.time_step, p.horizon)
 
 
 def is_finished(stage: np.ndarray) -> bool:

@@ -16,6 +16,7 @@ from drake_dress import __version__
 from drake_dress.diagrams.build import (
     controller_policy,
     effects,
+    local_setup,
     plant_station,
     predictor,
     rates,
@@ -94,6 +95,7 @@ def run_scenario(
             page,
             effects(scenario),
             predictor(scenario),
+            local_setup(scenario, policy),
         )
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)
     wall_time = clock.perf_counter() - begin

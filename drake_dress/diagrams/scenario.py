@@ -259,12 +259,31 @@ class GlobalMpc:
 
 
 @dataclass
+class Local:
+    """The local controller; see models/control/local_model.py."""
+
+    period: float = 0.02  # between solves, s
+    delay: float = 0.002  # from what is seen to the use of the solution, s
+    time_step: float = 0.05  # of the problem, s
+    horizon: int = 20  # steps
+    position: float = 1.0  # weight of sleeves
+    speed: float = 0.1  # weight of the grippers' speed, s²/m² of a step
+    max_speed: float = 0.12  # of a gripper, m/s
+    beside: float = 0.04  # that a dressed sleeve may be beside its target, m
+    beside_speed: float = 0.05  # that it may move beside its arm, m/s
+    feedback: bool = True  # corrects between solves by the solution's gains
+    solver: str = "constrained_ddp"  # or cone: Clarabel, exact and slower
+
+
+@dataclass
 class Controller:
     """What the controllers believe and how they act."""
 
     spacing: float = 0.028  # of the believed garment's mesh, m
     material: Material = field(default_factory=Material)
+    method: str = "global"  # global plan alone, local compensation alone, or full: both
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
+    local: Local = field(default_factory=Local)
     # how the arms are believed to move on: still, or constant_velocity
     predictor: str = "still"
     command_rate: float = 100.0  # Hz
@@ -391,6 +410,8 @@ _CHOICES = {
     },
     "controller.predictor": ("still", "constant_velocity"),
     "plant.integrator": ("implicit", "projective_dynamics"),
+    "controller.method": ("full", "global", "local"),
+    "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated",),
 }
 
@@ -450,6 +471,15 @@ _RANGES: dict[str, tuple[float, float]] = {
     "global_mpc.approach_distance": (0.0, 1.0),
     "global_mpc.waiting_progress": (0.05, 2.0),
     "global_mpc.force_limit": (1.0, 200.0),
+    "local.period": (0.001, 1.0),
+    "local.delay": (1e-4, 1.0),
+    "local.time_step": (0.005, 1.0),
+    "local.horizon": (1, 200),
+    "local.position": (0.0, 1e6),
+    "local.speed": (1e-6, 1e6),
+    "local.max_speed": (0.001, 1.0),
+    "local.beside": (0.001, 1.0),
+    "local.beside_speed": (0.001, 10.0),
     "weights.position": (0.0, 1e6),
     "weights.direction": (0.0, 1e6),
     "weights.speed": (0.0, 1e6),
@@ -527,6 +557,13 @@ def load_scenario(
             source,
             "controller.global_mpc.delay",
             f"is {mpc.delay} s, expected less than the period, {mpc.period} s",
+        )
+    local = scenario.controller.local
+    if local.delay >= local.period:
+        raise UserError(
+            source,
+            "controller.local.delay",
+            f"is {local.delay} s, expected less than the period, {local.period} s",
         )
     steps = mpc.delay / mpc.time_step
     if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:

@@ -58,6 +58,11 @@ def solve_cone_programme(
     return solution, float(details.solve_time)
 
 
+def cone_programme(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
+    """Solves a local problem as a cone programme; Clarabel starts anew each time."""
+    return solve_cone_programme(problem)[0]
+
+
 def _add_cost(program, weight, target, z) -> None:  # type: ignore[no-untyped-def]
     if np.any(weight > 0.0):
         program.AddQuadraticCost(

@@ -10,17 +10,9 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
+from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
 from drake_dress.models.dressing.stages import Stage
-
-
-@dataclass(frozen=True)
-class TimedPlan:
-    """Gripper velocities (N,2,3), m/s, each for `time_step` s, the first from `start` s on."""
-
-    start: float
-    time_step: float
-    velocity: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ class GlobalMpc(LeafSystem):
         - target
         - solve_time
 
-    garment_*: (3m,) of the controller's garment, m, m/s. plan: TimedPlan. stage: (2,) 0 prepare,
+    garment_*: (3m,) of the controller's garment, m, m/s. plan: GlobalPlan. stage: (2,) 0 prepare,
     1 dress, 2 done. target: (6,) where left and right armhole shall be next, m. solve_time: (2,)
     wall time of the last solve that ended, s, and the count of solves ended.
 
@@ -76,7 +68,9 @@ class GlobalMpc(LeafSystem):
         self._pending: Future[_Finished] | None = None
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
-        idle = TimedPlan(0.0, policy.parameters.time_step, np.zeros((n, 2, 3)))
+        idle = GlobalPlan(
+            0.0, policy.parameters.time_step, np.zeros((n, 2, 3)), np.zeros((n + 1, 2, 3))
+        )
         self._plan = self.DeclareAbstractState(Value(idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
         self._shown = self.DeclareDiscreteState(np.zeros(10))
@@ -125,8 +119,13 @@ class GlobalMpc(LeafSystem):
         self._pending = None
         decision = finished.decision
         p = self._policy.parameters
-        plan = TimedPlan(
-            context.get_time(), p.time_step, decision.plan.velocity[p.committed_steps :]
+        first = p.committed_steps
+        plan = GlobalPlan(
+            context.get_time(),
+            p.time_step,
+            decision.plan.velocity[first:],
+            decision.plan.armhole[first - 1 :],
+            decision.assignment,
         )
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)

@@ -6,8 +6,8 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.sides import SIDES
-from drake_dress.systems.global_mpc import TimedPlan
 
 
 class PlanFollower(LeafSystem):
@@ -30,7 +30,7 @@ class PlanFollower(LeafSystem):
 
     def __init__(self) -> None:
         super().__init__()
-        idle = TimedPlan(0.0, 1.0, np.zeros((1, 2, 3)))
+        idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
         plan = self.DeclareAbstractInputPort("plan", Value(idle))
         ticket = {self.input_port_ticket(plan.get_index()), self.time_ticket()}
         for i, side in enumerate(SIDES):
@@ -39,7 +39,7 @@ class PlanFollower(LeafSystem):
 
     def _calc(self, side: int):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
-            plan: TimedPlan = self.get_input_port(0).Eval(context)
+            plan: GlobalPlan = self.get_input_port(0).Eval(context)
             step = int(np.floor((context.get_time() - plan.start + 1e-9) / plan.time_step))
             running = 0 <= step < len(plan.velocity)
             output.SetFromVector(plan.velocity[step, side] if running else np.zeros(3))

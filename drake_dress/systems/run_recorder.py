@@ -39,9 +39,11 @@ class RunRecorder(LeafSystem):
         - estimated_position
         - estimated_joint_position
         - verdict
+        - local_solve_time
 
     Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
-    samples nothing is lost: a sample holds all their flags.
+    samples nothing is lost: a sample holds all their flags. The last port is there where there is a
+    local controller; of what it solves between two samples the last is kept.
 
     Args:
         writer: the open log.
@@ -50,6 +52,7 @@ class RunRecorder(LeafSystem):
         capsules: of the person, with the index of the body each is fixed in.
         period: between samples, s.
         verdict_period: between verdicts, s.
+        has_local: whether there is a local controller.
     """
 
     def __init__(
@@ -60,13 +63,15 @@ class RunRecorder(LeafSystem):
         capsules: Sequence[tuple[int, Capsule]],
         period: float,
         verdict_period: float,
+        has_local: bool = False,
     ) -> None:
         super().__init__()
         self._writer = writer
         self._mesh = mesh
         self._capsules = list(capsules)
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
-        self._solves = 0.0
+        self._solves = {"solve_time": 0.0, "local_solve_time": 0.0}
+        self._has_local = has_local
         self._verdict = np.zeros(2, dtype=int)
         n = len(mesh.rest_position)
         self.DeclareVectorInputPort("garment_position", 3 * n)
@@ -79,6 +84,8 @@ class RunRecorder(LeafSystem):
             self.DeclareVectorInputPort(f"{side}_gripper_force", 3)
         self.DeclareVectorInputPort("stage", 2)
         self.DeclareVectorInputPort("solve_time", 2)
+        if has_local:
+            self.DeclareVectorInputPort("local_solve_time", 2)
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
         self.DeclareVectorInputPort("verdict", 2)
@@ -110,9 +117,6 @@ class RunRecorder(LeafSystem):
             )
             # a sleeve that does not cover its arm has no progress, wherever its centre is
             dressing[side] = (s if inside else 0.0, l, theta)
-        solve_time, solves = value("solve_time")
-        ended = solves > self._solves
-        self._solves = float(solves)
         self._collect(context)
         verdict, self._verdict = self._verdict, np.zeros(2, dtype=int)
         self._writer.append(
@@ -127,10 +131,20 @@ class RunRecorder(LeafSystem):
                 dressing=dressing,
                 stage=value("stage"),
                 safety=verdict,
-                global_solve_time=float(solve_time) if ended else np.nan,
+                global_solve_time=self._ended(context, "solve_time"),
+                local_solve_time=self._ended(context, "local_solve_time"),
                 estimate_garment_position=value("estimated_position").reshape(-1, 3),
                 estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
                 capsule_a=np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
                 capsule_b=np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
             )
         )
+
+    def _ended(self, context: Context, name: str) -> float:
+        """Returns the time of the last solve, s; NaN if none ended since the sample before."""
+        if name == "local_solve_time" and not self._has_local:
+            return np.nan
+        spent, count = self.GetInputPort(name).Eval(context)
+        ended = count > self._solves[name]
+        self._solves[name] = float(count)
+        return float(spent) if ended else np.nan

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from pydrake.common.value import Value
 
-from drake_dress.systems.global_mpc import TimedPlan
+from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.systems.plan_follower import PlanFollower
 
-PLAN = TimedPlan(1.0, 0.1, np.arange(18.0).reshape(3, 2, 3))
+PLAN = GlobalPlan(1.0, 0.1, np.arange(18.0).reshape(3, 2, 3), np.zeros((4, 2, 3)))
 
 
 def asked_at(time: float) -> np.ndarray:

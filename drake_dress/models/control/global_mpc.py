@@ -85,7 +85,8 @@ class Plan:
         velocity: (N,2,3) of left and right gripper, m/s, world.
         cost: reached; initial_cost: of the start.
         iterations: accepted gradient steps; evaluations: rollouts.
-        reason: why the descent stopped: "small_step", "no_descent" or "iterations".
+        reason: why the descent stopped: "small_step", "no_descent" or "iterations"; "no_plan" if
+            none was asked for.
         armhole: (N,2,3) predicted armhole centres, m.
         force: (N,2) predicted gripper force, N.
     """

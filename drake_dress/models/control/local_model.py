@@ -37,7 +37,8 @@ class LocalParameters:
 
     Attributes:
         time_step: s. horizon: N.
-        position: W, 1/m². speed: R on the gripper displacement of a step, 1/m².
+        position: W, 1/m².
+        speed: R on the grippers' speed, s²/m².
         max_speed: of a gripper, m/s.
         beside: how far the armhole of a dressed sleeve may be beside its target, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
@@ -49,7 +50,7 @@ class LocalParameters:
     time_step: float = 0.05
     horizon: int = 20
     position: float = 1.0
-    speed: float = 0.5
+    speed: float = 0.1
     max_speed: float = 0.12
     beside: float = 0.04
     beside_speed: float = 0.05
@@ -173,7 +174,7 @@ def local_problem(
         input_matrix=b,
         state_weight=weight,
         state_target=target,
-        input_weight=np.full((n, 6), p.speed * h * h),
+        input_weight=np.full((n, 6), p.speed),
         input_target=-velocity,
         state_bounds=NormBounds(matrix, offset, radius),
         input_bounds=NormBounds(moving, moved, limit),

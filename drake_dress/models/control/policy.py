@@ -29,6 +29,8 @@ class PolicyParameters:
         max_speed: of a gripper, m/s.
         weights: of the costs.
         tasks: where sleeves are asked to go.
+        plans: whether the garment is asked at all; if not, plans are to rest, and the local
+            controller is left to itself.
     """
 
     time_step: float = 0.1
@@ -39,6 +41,7 @@ class PolicyParameters:
     max_speed: float = 0.12
     weights: Weights = field(default_factory=Weights)
     tasks: TaskParameters = field(default_factory=TaskParameters)
+    plans: bool = True
 
 
 @dataclass(frozen=True)
@@ -132,12 +135,29 @@ class DressingPolicy:
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
         targets = self.planner.targets(assignment, self.planner.sleeves(x), joints, p.time_step)
+        target = np.stack([t.position[-1] for t in targets])
+        if not p.plans:
+            return replace(state, stages=stages), Decision(self._rest(x), assignment, target)
         obstacles = person_obstacles(self._person, joints, p.time_step)
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
         plan = self.controller.solve(x, v, targets, obstacles, guess, p.committed_steps)
-        target = np.stack([t.position[-1] for t in targets])
         return replace(state, stages=stages, velocity=plan.velocity), Decision(
             plan, assignment, target
+        )
+
+    def _rest(self, x: FloatArray) -> Plan:
+        """Returns the plan that leaves the grippers where they are, and the garment with them."""
+        n = self.parameters.horizon
+        centers = np.stack([sleeve.p_c for sleeve in self.planner.sleeves(x)])
+        return Plan(
+            velocity=np.zeros((n, 2, 3)),
+            cost=0.0,
+            initial_cost=0.0,
+            iterations=0,
+            evaluations=0,
+            reason="no_plan",
+            armhole=np.tile(centers, (n, 1, 1)),
+            force=np.zeros((n, 2)),
         )

@@ -1,0 +1,157 @@
+"""The local controller as a Drake system."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+
+from drake_dress.models.control.local_control import (
+    GlobalPlan,
+    LocalController,
+    LocalPlan,
+    LocalState,
+)
+from drake_dress.models.sides import SIDES
+
+
+@dataclass(frozen=True)
+class _Memory:
+    """What was solved last: of it the newest plan is handed out once its delay has passed."""
+
+    state: LocalState
+    plan: LocalPlan
+    solve_time: float = np.nan
+
+
+class LocalCompensation(LeafSystem):
+    """Solves local problems at a fixed rate, and corrects between two solves by their gains.
+
+    .. pydrake_system::
+
+        name: LocalCompensation
+        input_ports:
+        - plan
+        - garment_position
+        - predicted_joint_position
+        - left_gripper_position
+        - right_gripper_position
+        output_ports:
+        - left_velocity_request
+        - right_velocity_request
+        - request_time
+        - solve_time
+
+    plan: GlobalPlan. garment_position: (3m,) of the controller's garment, m.
+    predicted_joint_position: ((M+1)·18,), m, row 0 now, then every `joints_step`. Gripper positions
+    and requests: (3,) m and m/s. request_time: (1,) when was seen what the requests answer, s: a
+    solver that hangs makes them stale. solve_time: (2,) wall time of the last solve that ended, s,
+    and the count of solves ended.
+
+    A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
+    however long it really took: the run is the same on any machine.
+
+    Args:
+        controller: does the work.
+        period: between solves, s.
+        delay: from what is seen to the use of a plan, s, less than the period.
+        joints_step: between predicted joints, s.
+        joints_count: M, how many there are beyond now.
+        feedback: whether to correct between solves.
+        record: takes each problem solved, if given.
+    """
+
+    def __init__(
+        self,
+        controller: LocalController,
+        period: float,
+        delay: float,
+        joints_step: float,
+        joints_count: int,
+        feedback: bool = True,
+        record: list | None = None,
+    ) -> None:
+        super().__init__()
+        if not 0.0 < delay < period:
+            raise ValueError(f"delay is {delay} s, expected between 0 and the period, {period} s")
+        self._controller = controller
+        self._joints_step = joints_step
+        self._feedback = feedback
+        self._record = record
+        idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
+        resting = controller.resting(0.0)
+        self._memory = self.DeclareAbstractState(Value(_Memory(LocalState(), resting)))
+        self._plan = self.DeclareAbstractState(Value(resting))
+        self._shown = self.DeclareDiscreteState([np.nan, 0.0])
+        self.DeclareAbstractInputPort("plan", Value(idle))
+        count = len(controller.planner.mesh.rest_position)
+        self.DeclareVectorInputPort("garment_position", 3 * count)
+        self.DeclareVectorInputPort("predicted_joint_position", 18 * (joints_count + 1))
+        for side in SIDES:
+            self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
+        for i, side in enumerate(SIDES):
+            self.DeclareVectorOutputPort(f"{side}_velocity_request", 3, self._request(i))
+        ticket = {self.abstract_state_ticket(self._plan)}
+        self.DeclareVectorOutputPort("request_time", 1, self._calc_time, ticket)
+        self.DeclareVectorOutputPort(
+            "solve_time", 2, self._calc_solve_time, {self.discrete_state_ticket(self._shown)}
+        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._solve)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._adopt)
+
+    def _grippers(self, context: Context) -> np.ndarray:
+        return np.stack(
+            [self.GetInputPort(f"{side}_gripper_position").Eval(context) for side in SIDES]
+        )
+
+    def _garment(self, context: Context) -> np.ndarray:
+        return self.GetInputPort("garment_position").Eval(context).reshape(-1, 3)
+
+    def _solve(self, context: Context, state: State) -> None:
+        begin = clock.perf_counter()
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        joints = self.GetInputPort("predicted_joint_position").Eval(context).reshape(-1, 6, 3)
+        outcome = self._controller.solve(
+            memory.state,
+            self.GetInputPort("plan").Eval(context),
+            self._garment(context),
+            self._grippers(context),
+            joints,
+            self._joints_step,
+            context.get_time(),
+        )
+        if self._record is not None and outcome.problem is not None:
+            self._record.append(outcome.problem)
+        spent = np.nan if outcome.problem is None else clock.perf_counter() - begin
+        state.get_mutable_abstract_state(self._memory).set_value(
+            _Memory(outcome.state, outcome.plan, spent)
+        )
+
+    def _adopt(self, context: Context, state: State) -> None:
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        state.get_mutable_abstract_state(self._plan).set_value(memory.plan)
+        if np.isfinite(memory.solve_time):
+            ended = context.get_discrete_state(self._shown).value()[1] + 1.0
+            state.get_mutable_discrete_state(self._shown).SetFromVector([memory.solve_time, ended])
+
+    def _request(self, side: int):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            plan: LocalPlan = context.get_abstract_state(self._plan).get_value()
+            seen = None
+            if self._feedback and len(plan.velocity):
+                sleeves = self._controller.planner.sleeves(self._garment(context))
+                centers = [sleeve.p_c for sleeve in sleeves]
+                seen = np.concatenate([*centers, *self._grippers(context)])
+            output.SetFromVector(plan.velocity_at(context.get_time(), seen)[side])
+
+        return calc
+
+    def _calc_time(self, context: Context, output: BasicVector) -> None:
+        plan: LocalPlan = context.get_abstract_state(self._plan).get_value()
+        output.SetFromVector([plan.start])
+
+    def _calc_solve_time(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state(self._shown).value())
