@@ -42,7 +42,7 @@ _BEFORE = 0.08  # that point's distance before the opening, m
 _ENTERED = 0.6  # share of the push after which the hand is in
 _HARDER = 1.0  # 1/s, growth of the target's shift with how far the hand is off its path
 _HARDEST = 0.10  # m, of that shift
-_ARRIVED, _STILL = 0.003, 0.01  # m, m/s
+_ARRIVED, _STILL, _STUCK = 0.003, 0.01, 0.02  # m, m/s, rad/s
 _UNPLANNED = -1.0
 _LEFTWARD = np.array([0.0, 1.0, 0.0])
 
@@ -210,42 +210,47 @@ class ActiveArm:
         if self._withdrawal(time) is not None:
             return state if want is Want.WITHDRAW else self._begin(state, Want.WITHDRAW)
         if want is Want.WITHDRAW:
-            return self._begin(state, Want.RETURN, state.anchor)
+            return self._begin(state, Want.RETURN)
         if want is Want.REACH:
             if armhole.depth >= self._push * _ENTERED and armhole.is_entered:
                 return replace(state, want=Want.FOLLOW, through=True, shift=np.zeros(3))
             if not self._is_near(armhole, state.anchor, _LOST):
-                return self._begin(state, Want.RETURN, state.anchor)
+                return self._begin(state, Want.RETURN)
             return state
         waving = any(w.is_on(time) for w in self._waves)
         reaches = self._reach is not None and not state.through and time >= self._reach.start
         place = state.anchor if want is Want.RETURN else armhole.joints[2]
         if reaches and self._is_near(armhole, place, 1.0):
-            # a hand that was on its way back goes back there if it fails again
-            return self._begin(state, Want.REACH, state.anchor if want is Want.RETURN else None)
-        if want is Want.RETURN and not waving:
-            way = float(np.linalg.norm(state.anchor - self.arm.hand(state.set_point)))
-            if way < _ARRIVED and float(np.linalg.norm(state.path.velocity)) < _STILL:
-                return replace(state, want=Want.FOLLOW)
+            return self._begin(state, Want.REACH)
+        if want is Want.RETURN and not waving and self._has_returned(state):
+            return replace(state, want=Want.FOLLOW)
         if want is Want.FOLLOW and waving:
             return self._begin(state, Want.RETURN)
         return state
 
-    def _begin(self, state: ArmState, want: Want, anchor: FloatArray | None = None) -> ArmState:
-        """Returns the state with a new want; its path goes on from where the set-point is."""
-        path = state.path
+    def _begin(self, state: ArmState, want: Want) -> ArmState:
+        """Returns the state with a new want; its path goes on from where the set-point is.
+
+        A hand that leaves where it followed will come back there, whatever it does meanwhile.
+        """
+        path, anchor = state.path, state.anchor
         if state.want is Want.FOLLOW:
-            here = self.arm.hand(state.set_point)
-            speed = self.arm.jacobian(state.set_point) @ state.rate
-            path = HandPath(here, speed, np.zeros(3))
-        anchor = path.position if anchor is None else anchor
-        return replace(
-            state,
-            want=want,
-            anchor=anchor,
-            path=replace(path, remaining=_UNPLANNED),
-            shift=np.zeros(3),
-        )
+            anchor = self.arm.hand(state.set_point)
+            velocity = self.arm.jacobian(state.set_point) @ state.rate
+            path = HandPath(anchor, velocity, np.zeros(3))
+        path = replace(path, remaining=_UNPLANNED)
+        return replace(state, want=want, anchor=anchor, path=path, shift=np.zeros(3))
+
+    def _has_returned(self, state: ArmState) -> bool:
+        """Returns whether the hand is back, or as near as the joints let it come."""
+
+        def near(point: FloatArray) -> bool:
+            return float(np.linalg.norm(state.anchor - point)) < _ARRIVED
+
+        still = float(np.linalg.norm(state.path.velocity)) < _STILL
+        stuck = float(np.max(np.abs(state.rate))) < _STUCK
+        there = near(self.arm.hand(state.set_point)) or stuck
+        return near(state.path.position) and still and there
 
     def _target(self, state: ArmState, armhole: Armhole, time: float) -> FloatArray:
         if state.want is Want.REACH:

@@ -151,6 +151,14 @@ def test_withdrawn_hand_comes_as_far_as_said_and_returns() -> None:
     assert np.linalg.norm(hand[-1] - rest) < 0.005
 
 
+def test_hand_drawn_back_again_on_its_way_still_comes_back() -> None:
+    motions: list[Motion] = [Withdraw(start=t, duration=0.6) for t in (0.2, 1.1, 2.0)]
+    states, hand = play(motions, 6.0)
+    check_smooth(states, hand)
+    assert np.linalg.norm(hand[-1] - ARM.hand(REST)) < 0.005
+    assert states[-1].want is Want.FOLLOW
+
+
 def test_waving_hand_stays_within_its_amplitude_and_ends_where_it_was() -> None:
     motion = Wave(start=0.5, duration=3.0, amplitude=0.05, frequency=1.0)
     states, hand = play([motion], 6.0)
