@@ -126,6 +126,7 @@ class GlobalMpc(LeafSystem):
             decision.plan.velocity[first:],
             decision.plan.armhole[first - 1 :],
             decision.assignment,
+            decision.target[first - 1 :] if p.plans else None,
         )
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)
@@ -135,7 +136,7 @@ class GlobalMpc(LeafSystem):
             np.concatenate(
                 [
                     [float(s) for s in stages],
-                    decision.target.ravel(),
+                    decision.target[-1].ravel(),
                     [finished.solve_time, shown[9] + 1.0],
                 ]
             )

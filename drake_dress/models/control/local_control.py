@@ -39,6 +39,8 @@ class GlobalPlan:
         velocity: (N,2,3) of left and right gripper, m/s.
         armhole: (N+1,2,3) armhole centres as foreseen, m; row 0 is at `start`.
         assignment: what the sleeves are to do; None before anything is planned.
+        target: (N+1,2,3) where the sleeves were asked to be when it was planned, m; None if the
+            plan is to rest, and the local controller to go for the targets by itself.
     """
 
     start: float
@@ -46,6 +48,7 @@ class GlobalPlan:
     velocity: FloatArray
     armhole: FloatArray
     assignment: Assignment | None = None
+    target: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,7 @@ class LocalController:
             return LocalOutcome(LocalState(), self.resting(time), None)
         sleeves = self.planner.sleeves(x)
         centers = np.stack([sleeve.p_c for sleeve in sleeves])
-        nominal = continued(plan, centers, gripper, time, p)
+        nominal, foreseen, planned = continued(plan, centers, gripper, time, p)
         coupled = is_coupled(
             state.coupled, float(np.linalg.norm(centers[0] - centers[1])), self.reach, p
         )
@@ -173,6 +176,9 @@ class LocalController:
             # between the times of the predicted joints targets go straight
             first = self._first_target(assignment, i, target.position, sleeve.p_c)
             position = _resampled(np.vstack([first, target.position]), joints_step, p)
+            if planned is not None:
+                # where the plan saw the sleeve, moved as its target has moved since
+                position = foreseen[:, i] + position - planned[:, i]
             axis = _resampled(np.vstack([target.direction[:1], target.direction]), joints_step, p)
             axis /= np.linalg.norm(axis, axis=1, keepdims=True)
             on_arm = assignment.facts[i].linked and assignment.tasks[i] in (Task.DRESS, Task.WAIT)
@@ -180,12 +186,12 @@ class LocalController:
         problem = local_problem(nominal, (goals[0], goals[1]), coupled, self.reach, p)
         found = self.solver(problem, _shifted(state, time, p))
         velocity = nominal.velocity + found.v.reshape(-1, 2, 3)
-        foreseen = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
+        base = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
         local = LocalPlan(
             time,
             p.time_step,
             velocity,
-            foreseen + found.x,
+            base + found.x,
             feedback_gains(problem, found),
             p.max_speed,
         )
@@ -204,7 +210,7 @@ def continued(
     gripper: FloatArray,
     time: float,
     parameters: LocalParameters,
-) -> Nominal:
+) -> tuple[Nominal, FloatArray, FloatArray | None]:
     """Returns a global plan from a time on, at the local steps; where it ends it goes on as it was.
 
     Args:
@@ -213,6 +219,10 @@ def continued(
         gripper: (2,3) now, m.
         time: now, s.
         parameters: horizon and time step.
+
+    Returns:
+        Where it leads from here, where it foresaw the sleeves (N+1,2,3), m, and where they were
+        asked to be then, (N+1,2,3) or None.
     """
     n, h = parameters.horizon, parameters.time_step
     now = (time - plan.start) / plan.time_step
@@ -224,12 +234,17 @@ def continued(
     inside = np.clip(at, 0.0, last)
     row = np.minimum(np.floor(inside).astype(int), len(plan.velocity) - 1)
     share = (inside - row)[:, None, None]
-    foreseen = (1.0 - share) * plan.armhole[row] + share * plan.armhole[row + 1]
     # beyond the end sleeves go on with their grippers
-    beyond = (np.maximum(at - last, 0.0) * plan.time_step)[:, None, None]
-    foreseen = foreseen + beyond * plan.velocity[-1]
+    beyond = (np.maximum(at - last, 0.0) * plan.time_step)[:, None, None] * plan.velocity[-1]
+
+    def between(rows: FloatArray) -> FloatArray:
+        found: FloatArray = (1.0 - share) * rows[row] + share * rows[row + 1]
+        return found
+
+    foreseen = between(plan.armhole) + beyond
     moved = np.concatenate([np.zeros((1, 2, 3)), h * np.cumsum(velocity, axis=0)])
-    return Nominal(sleeve + foreseen - foreseen[0], gripper + moved, velocity)
+    nominal = Nominal(sleeve + foreseen - foreseen[0], gripper + moved, velocity)
+    return nominal, foreseen, None if plan.target is None else between(plan.target)
 
 
 def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:

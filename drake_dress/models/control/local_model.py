@@ -5,10 +5,12 @@ those of the grippers' velocities. While the sleeves are near each other each on
 gripper. Further apart the garment between them is taut and a sleeve follows both, the far one the
 more the further away it is, up to one half.
 
-Two things differ from the print. k grows with the distance to the far gripper from a share of φ_f
+Three things differ from the print. k grows with the distance to the far gripper from a share of φ_f
 on, not from φ_c: on a coat that is held at its shoulders the sleeves are further from each other
 than from the far gripper (0.59 m against 0.54 m), and the print's quotient has the wrong sign. And
-the distance of the grippers has a bound like the others.
+the distance of the grippers has a bound like the others. And the price of speed is on the
+compensation, not on its sum with the plan: a gripper that the plan moves to turn or stretch the
+garment, of which the local model knows nothing, would be stopped.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ class LocalParameters:
     Attributes:
         time_step: s. horizon: N.
         position: W, 1/m².
-        speed: R on the grippers' speed, s²/m².
+        speed: R on the compensation of the grippers' speed, s²/m².
         max_speed: of a gripper, m/s.
         beside: how far the armhole of a dressed sleeve may be beside its target, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
@@ -175,7 +177,7 @@ def local_problem(
         state_weight=weight,
         state_target=target,
         input_weight=np.full((n, 6), p.speed),
-        input_target=-velocity,
+        input_target=np.zeros((n, 6)),
         state_bounds=NormBounds(matrix, offset, radius),
         input_bounds=NormBounds(moving, moved, limit),
     )

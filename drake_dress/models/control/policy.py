@@ -54,7 +54,7 @@ class PolicyState:
 
 @dataclass(frozen=True)
 class Decision:
-    """A plan and what led to it; `target` (2,3) is where the armholes shall be next, m."""
+    """A plan and what led to it; `target` (N,2,3) is where the armholes shall be, m."""
 
     plan: Plan
     assignment: Assignment
@@ -135,7 +135,7 @@ class DressingPolicy:
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
         targets = self.planner.targets(assignment, self.planner.sleeves(x), joints, p.time_step)
-        target = np.stack([t.position[-1] for t in targets])
+        target = np.stack([t.position for t in targets], axis=1)
         if not p.plans:
             return replace(state, stages=stages), Decision(self._rest(x), assignment, target)
         obstacles = person_obstacles(self._person, joints, p.time_step)

@@ -79,12 +79,18 @@ def test_coupling_has_hysteresis() -> None:
     assert not is_coupled(True, 0.5 * REACH.between_sleeves, REACH, P)
 
 
-def test_a_sleeve_goes_where_it_is_asked_as_fast_as_it_may() -> None:
+def test_a_sleeve_goes_where_it_is_asked() -> None:
     nominal = still()
     way = np.array([0.0, 0.0, 0.05])
-    s, sleeve, _ = solved(nominal, (goal(nominal, 0, way), goal(nominal, 1, 0.0 * way)))
-    np.testing.assert_allclose(sleeve[-1, 0], nominal.sleeve[-1, 0] + way, atol=2e-3)
-    np.testing.assert_allclose(sleeve[:, 1], nominal.sleeve[:, 1], atol=1e-3)
+    _, sleeve, _ = solved(nominal, (goal(nominal, 0, way), goal(nominal, 1, 0.0 * way)))
+    np.testing.assert_allclose(sleeve[-1, 0], nominal.sleeve[-1, 0] + way, atol=6e-3)
+    np.testing.assert_allclose(sleeve[:, 1], nominal.sleeve[:, 1], atol=1e-6)
+
+
+def test_a_target_far_away_is_gone_for_as_fast_as_a_gripper_may() -> None:
+    nominal = still()
+    way = np.array([0.0, 0.0, 0.4])
+    s, _, _ = solved(nominal, (goal(nominal, 0, way), goal(nominal, 1, 0.0 * way)))
     assert np.linalg.norm(s.v[0, :3]) == pytest.approx(P.max_speed)
 
 
@@ -124,6 +130,5 @@ def test_a_plan_that_is_right_is_left_alone() -> None:
     velocity[:, :, 0] = 0.05
     moved = np.concatenate([np.zeros((1, 2, 3)), h * np.cumsum(velocity, axis=0)])
     nominal = Nominal(nominal.sleeve + moved, nominal.gripper + moved, velocity)
-    # the speed has its price; the target is ahead by what balances it at the end
     s, _, _ = solved(nominal, (goal(nominal, 0, np.zeros(3)), goal(nominal, 1, np.zeros(3))))
-    assert np.abs(s.x).max() < 5e-3
+    np.testing.assert_allclose(s.x, 0.0, atol=1e-9)

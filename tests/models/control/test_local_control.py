@@ -1,0 +1,145 @@
+"""The local controller: how it takes up a plan, what it leaves alone, and what it follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drake_dress.models.control.local_control import (
+    GlobalPlan,
+    LocalController,
+    LocalState,
+    continued,
+)
+from drake_dress.models.control.local_model import LocalParameters
+from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner
+from drake_dress.models.dressing.stages import SleeveFacts, Task
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
+from drake_dress.models.sides import SIDES
+
+M = BodyMeasures()
+P = LocalParameters()
+JOINTS = np.vstack([arm_points(M, "standing", side, ArmPose(0.3, 0.8, 0.0, 0.2)) for side in SIDES])
+STILL = np.stack([JOINTS] * 6)
+OFF = SleeveFacts(linked=False, s=0.0, hand_distance=0.5, prepared_error=0.5, passed=0.0)
+
+
+@pytest.fixture(scope="module")
+def controller() -> LocalController:
+    return LocalController(TaskPlanner(make_coat(CoatParameters(), 0.06), TaskParameters()), P)
+
+
+def seen(controller: LocalController) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns garment, grippers and armholes of a coat that hangs behind the person."""
+    mesh = controller.planner.mesh
+    x = mesh.rest_position + [-0.5, 0.0, 1.4]
+    grippers = np.stack([x[mesh.grasp[side]].mean(axis=0) for side in SIDES])
+    armholes = np.stack([sleeve.p_c for sleeve in controller.planner.sleeves(x)])
+    return x, grippers, armholes
+
+
+def plan_of(controller: LocalController, velocity: np.ndarray, armholes: np.ndarray) -> GlobalPlan:
+    """Returns a plan in which sleeves go with their grippers to where they are asked."""
+    n = 8
+    moved = 0.1 * np.arange(n + 1)[:, None, None] * velocity
+    given = Assignment((Task.PREPARE, Task.PREPARE), (OFF, OFF))
+    x, _, _ = seen(controller)
+    asked = controller.planner.targets(
+        given, controller.planner.sleeves(x), np.stack([JOINTS] * (n + 1)), 0.1
+    )
+    target = np.stack([t.position for t in asked], axis=1)
+    target = np.concatenate([target[:1], target])
+    return GlobalPlan(0.0, 0.1, np.tile(velocity, (n, 1, 1)), armholes + moved, given, target)
+
+
+def solve(controller: LocalController, plan: GlobalPlan, joints=STILL, shift=0.0):  # type: ignore[no-untyped-def]
+    x, grippers, _ = seen(controller)
+    return controller.solve(LocalState(), plan, x + shift, grippers + shift, joints, 0.2, 0.0)
+
+
+def test_a_plan_that_comes_true_is_followed_as_it_is(controller: LocalController) -> None:
+    velocity = np.array([[0.05, 0.01, 0.0], [0.03, 0.0, -0.02]])
+    plan = plan_of(controller, velocity, seen(controller)[2])
+    local = solve(controller, plan).plan
+    np.testing.assert_allclose(local.velocity, np.tile(velocity, (P.horizon, 1, 1)), atol=1e-6)
+
+
+def test_a_sleeve_that_is_not_where_it_was_foreseen_is_brought_back(
+    controller: LocalController,
+) -> None:
+    velocity = np.zeros((2, 3))
+    plan = plan_of(controller, velocity, seen(controller)[2])
+    ahead = np.array([0.0, 0.0, 0.02])
+    outcome = solve(controller, plan, shift=ahead)
+    first = outcome.plan.velocity[0]
+    assert np.all(first[:, 2] < -0.01)
+    np.testing.assert_allclose(first[:, :2], 0.0, atol=2e-3)
+    np.testing.assert_allclose(
+        outcome.plan.state[-1, :6].reshape(2, 3), plan.armhole[-1], atol=3e-3
+    )
+
+
+def test_it_goes_where_the_person_goes(controller: LocalController) -> None:
+    """A person who has stepped aside since the plan was made is followed."""
+    aside = np.array([0.0, 0.03, 0.0])
+    plan = plan_of(controller, np.zeros((2, 3)), seen(controller)[2])
+    moved = solve(controller, plan, joints=STILL + aside).plan
+    assert np.all(moved.velocity[0][:, 1] > 0.01)
+
+
+def test_a_plan_is_cut_off_at_its_front_and_goes_on_at_its_end() -> None:
+    rng = np.random.default_rng(0)
+    velocity = rng.normal(0.0, 0.05, (8, 2, 3))
+    armhole = np.concatenate([np.zeros((1, 2, 3)), np.cumsum(0.1 * velocity, axis=0)])
+    plan = GlobalPlan(2.0, 0.1, velocity, armhole)
+    here = np.ones((2, 3))
+    nominal, foreseen, planned = continued(plan, here, 2.0 * here, 2.3, P)
+    assert planned is None
+    np.testing.assert_allclose(nominal.velocity[:2], np.tile(velocity[3], (2, 1, 1)))
+    np.testing.assert_allclose(nominal.velocity[-1], velocity[-1])
+    np.testing.assert_allclose(nominal.sleeve[0], here)
+    np.testing.assert_allclose(nominal.gripper[0], 2.0 * here)
+    np.testing.assert_allclose(foreseen[0], armhole[3])
+    # sleeves of this plan go with their grippers, to its end and beyond
+    np.testing.assert_allclose(
+        nominal.sleeve - nominal.sleeve[0], nominal.gripper - nominal.gripper[0], atol=1e-12
+    )
+
+
+def test_without_anything_planned_it_rests(controller: LocalController) -> None:
+    plan = GlobalPlan(0.0, 0.1, np.zeros((8, 2, 3)), np.zeros((9, 2, 3)))
+    outcome = solve(controller, plan)
+    assert outcome.problem is None
+    np.testing.assert_array_equal(outcome.plan.velocity_at(0.0), 0.0)
+
+
+def test_left_to_itself_it_goes_for_the_targets(controller: LocalController) -> None:
+    x, _, armholes = seen(controller)
+    given = Assignment((Task.PREPARE, Task.REST), (OFF, OFF))
+    plan = GlobalPlan(0.0, 0.1, np.zeros((8, 2, 3)), np.tile(armholes, (9, 1, 1)), given)
+    local = solve(controller, plan).plan
+    asked = controller.planner.targets(given, controller.planner.sleeves(x), STILL, 0.2)[0]
+    way = asked.position[0] - armholes[0]
+    along = local.velocity[0, 0] @ way / np.linalg.norm(way)
+    assert along == pytest.approx(P.max_speed, rel=1e-3)
+    # the other gripper rests, but for what the garment between them needs
+    apart = np.linalg.norm(local.state[:, 6:9] - local.state[:, 9:], axis=1)
+    assert apart.max() <= max(controller.reach.between_grippers, apart[0]) + 1e-6
+    assert np.linalg.norm(local.velocity[0, 1]) < 0.5 * P.max_speed
+
+
+def test_between_solves_the_gains_correct_and_speed_stays_bounded(
+    controller: LocalController,
+) -> None:
+    plan = plan_of(controller, np.zeros((2, 3)), seen(controller)[2])
+    local = solve(controller, plan).plan
+    foreseen = local.state[0]
+    np.testing.assert_allclose(local.velocity_at(0.0, foreseen), local.velocity[0])
+    off = foreseen.copy()
+    off[2] += 0.01
+    changed = local.velocity_at(0.0, off) - local.velocity[0]
+    assert changed[0, 2] < 0.0
+    off[2] += 10.0
+    assert np.linalg.norm(local.velocity_at(0.0, off), axis=1).max() <= P.max_speed * (1 + 1e-12)
+    np.testing.assert_array_equal(local.velocity_at(100.0, foreseen), 0.0)
