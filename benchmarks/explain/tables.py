@@ -38,9 +38,10 @@ def right(result: dict[str, Any]) -> bool:
 def parameter_error(result: dict[str, Any]) -> float | None:
     """Returns how far the parameters of a cause that was named right are off, relative.
 
-    Of vectors the length of the difference over the length; a place on the garment does not count.
+    Of vectors the length of the difference over the length; a place on the garment does not count,
+    and a kin that is named for what the list lacks has no parameters to compare.
     """
-    if len(result["hidden"]) != 1 or not right(result):
+    if result["case"]["group"] != "effect" or not right(result):
         return None
     (name, true), found = next(iter(result["hidden"].items())), result["causes"][0]["values"]
     keys = ["mass"] if name == "local_mass" else ["rate"] if name == "gripper_slip" else list(true)

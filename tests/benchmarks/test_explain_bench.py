@@ -68,6 +68,16 @@ def test_what_no_list_has_is_right_where_it_is_not_believed():
     assert not right(result(group="outside", hide="snag", named=(), verdict="nothing"))
 
 
+def test_a_kin_of_what_no_list_has_has_no_parameters_to_compare():
+    cuff = result(
+        group="outside", hide="magnetised_cuff", named=("local_mass",), verdict="unexplained"
+    )
+    cuff["hidden"] = {"magnetised_cuff": {"strength": 1.0}}
+    assert right(cuff)
+    assert parameter_error(cuff) is None
+    assert tables([cuff])
+
+
 def test_tables_tell_centre_and_what_is_beside_it_apart():
     found = [result(), result(named=("adhesion",)), result(marker_noise=3e-3, named=())]
     by_title = {t.title: t for t in tables(found)}
