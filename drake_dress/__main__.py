@@ -15,7 +15,7 @@ from drake_dress import __version__
 from drake_dress.errors import UserError
 
 UNUSABLE, INTERRUPTED = 2, 130
-BENCHMARKS = ("cloth", "explain", "local")
+BENCHMARKS = ("cloth", "dressing", "explain", "local")
 
 _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.statistics import wilson
 from drake_dress.discrepancy.explanation import DISCRETISATION
 from drake_dress.report.page import chart, svg
 
@@ -165,13 +166,9 @@ def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
         if not hits:
             continue
         share, count = float(np.mean(hits)), len(hits)
-        # Wilson's interval, 90 %
-        z = 1.645
-        middle = (share + z * z / (2 * count)) / (1 + z * z / count)
-        spread = z / (1 + z * z / count)
-        spread *= np.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        least, most = wilson(sum(hits), count)
         at = 0.5 * (low + high)
-        ax.plot([at, at], [middle - spread, middle + spread], color="#0b7a5e")
+        ax.plot([at, at], [least, most], color="#0b7a5e")
         ax.plot(at, share, "o", color="#0b7a5e")
         ax.annotate(str(count), (at, share), (5, -10), textcoords="offset points", fontsize=8)
     ax.set_xlabel("confidence given")

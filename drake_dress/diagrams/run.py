@@ -13,23 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
-from drake_dress.diagrams.build import (
-    controller_policy,
-    effects,
-    local_setup,
-    plant_station,
-    predictor,
-    rates,
-    safety_limits,
-    station_parameters,
-)
-from drake_dress.diagrams.dressing import Dressing, is_finished, make_dressing
-from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.assemble import garments, parts, wired
+from drake_dress.diagrams.dressing import Dressing, is_finished
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
-from drake_dress.diagrams.station import start_grippers
-from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
-from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog, RunLogWriter
 from drake_dress.report.measures import measure
 from drake_dress.report.replay_html import write_replay_html
@@ -62,41 +49,23 @@ def run_scenario(
         UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
     """
     scenario = apply_variation(scenario)
-    mesh = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
-    belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
-    limits = safety_limits(scenario)
-    broken = limits.broken_at(start_grippers(station_parameters(scenario, mesh)))
-    if broken is not None:
-        raise UserError(str(source), "safety", f"{broken} at the start")
+    meshes, limits = garments(scenario, source)
     out.mkdir(parents=True, exist_ok=True)
     page = _open_meshcat() if meshcat else None
 
     begin = clock.perf_counter()
-    station = plant_station(scenario, mesh, page)
-    policy = controller_policy(scenario, belief, station.person)
+    p = parts(scenario, meshes, limits, page)
     with RunLogWriter(
         out / "run.h5",
-        garment=mesh,
+        garment=p.garments.plant,
         scenario_text=resolved_yaml(scenario),
         version=__version__,
         seed=scenario.seed,
-        radius=station.person.radius,
-        capsule_radius=[c.radius for c in station.person.capsules],
-        estimate_garment=belief,
+        radius=p.station.person.radius,
+        capsule_radius=[c.radius for c in p.station.person.capsules],
+        estimate_garment=p.garments.belief,
     ) as writer:
-        dressing = make_dressing(
-            station,
-            mesh,
-            policy,
-            barycentric_transfer(mesh, belief),
-            rates(scenario),
-            limits,
-            writer,
-            page,
-            effects(scenario),
-            predictor(scenario),
-            local_setup(scenario, policy),
-        )
+        dressing = wired(p, writer)
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)
     wall_time = clock.perf_counter() - begin
 

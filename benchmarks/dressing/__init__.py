@@ -1,0 +1,1 @@
+"""The dressing experiments: methods, persons, coats and seeds against each other."""

@@ -1,0 +1,116 @@
+"""`python -m benchmarks.dressing`: dresses persons in coats by each method, under many seeds.
+
+Every run is a `drake-dress run` of its own, with the pose, the coat's size, the plant's fabric and
+the start drawn by the seed. What was run stays in the file of `--json` and is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
+from benchmarks.dressing.tables import figure, tables
+from benchmarks.parser import INTERRUPTED, OneLineParser
+from drake_dress.discrepancy.results import write_text
+from drake_dress.errors import UserError
+from drake_dress.interrupt import caught_interrupt
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    chosen = cases(options.methods, options.persons, options.coats, options.seeds)
+    kept = {} if options.json is None else _read(options.json)
+    new = [] if options.kept else [case for case in chosen if case.name not in kept]
+    print(f"{len(chosen)} runs, {len(new)} of them not run yet", flush=True)
+    with caught_interrupt() as stop, ThreadPoolExecutor(options.jobs) as pool:
+        pending = {pool.submit(run, case, options.keep, options.set): case for case in new}
+        for number, future in enumerate(as_completed(pending), 1):
+            result = future.result()
+            kept[pending[future].name] = result
+            if options.json is not None:
+                _write(options.json, kept)
+            print(f"{number}/{len(new)} {pending[future].name}: {_told(result)}", flush=True)
+            if stop.is_set():
+                pool.shutdown(wait=False, cancel_futures=True)
+                break
+    results = [kept[case.name] for case in chosen if case.name in kept]
+    print("\n" + "\n\n".join(t.text() for t in tables(results) if t.rows), flush=True)
+    if options.plot:
+        write_text(options.plot, figure(results))
+    if stop.is_set():
+        return INTERRUPTED
+    return int(any("problem" in result for result in results))
+
+
+def _told(result: dict[str, Any]) -> str:
+    if "problem" in result:
+        return str(result["problem"])
+    return result["summary"]["reason"] or f"on in {result['summary']['dressing_time_s']:.0f} s"
+
+
+def _read(path: Path) -> dict[str, dict[str, Any]]:
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {Case(**result["case"]).name: result for result in found}
+    except OSError as error:
+        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError, KeyError):
+        raise UserError(str(path), "", "expected results of drake-dress bench dressing") from None
+
+
+def _write(path: Path, kept: dict[str, dict[str, Any]]) -> None:
+    """Writes results, a line each, in the order of their names; what failed to run is left out."""
+    done = [kept[name] for name in sorted(kept) if "summary" in kept[name]]
+    write_text(path, "[\n" + ",\n".join(json.dumps(r) for r in done) + "\n]\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(prog="drake-dress bench dressing", description=__doc__)
+    for name, known in (("methods", METHODS), ("persons", PERSONS), ("coats", COATS)):
+        parser.add_argument(
+            f"--{name}",
+            type=_some_of(tuple(known)),
+            default=list(known),
+            metavar="NAME,…",
+            help=", ".join(known),
+        )
+    parser.add_argument("--seeds", type=_seeds, default=range(13), metavar="A-B")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
+    parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="s, l and force over time, SVG")
+    return parser
+
+
+def _some_of(known: Sequence[str]):  # type: ignore[no-untyped-def]
+    def parse(text: str) -> list[str]:
+        names = text.split(",")
+        for name in names:
+            if name not in known:
+                raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(known)}")
+        return names
+
+    return parse
+
+
+def _seeds(text: str) -> range:
+    first, _, last = text.partition("-")
+    try:
+        return range(int(first), int(last or first) + 1)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

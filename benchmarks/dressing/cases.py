@@ -1,0 +1,110 @@
+"""Which runs there are, and what is kept of each."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.scenario_run import run_scenario
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
+
+_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+METHODS = ("full", "global", "local")
+# Who is dressed, and the scenario that has that person.
+PERSONS = {
+    "dummy": "dummy_standing.yaml",
+    "passive_standing": "passive_standing.yaml",
+    "passive_sitting": "passive_sitting.yaml",
+    "active": "active_standing.yaml",
+}
+COATS = {
+    "jacket": "{preset: jacket, body_length: 0.70, chest: 1.28, shoulder_width: 0.52, "
+    "armhole_girth: 0.60, cuff_girth: 0.36, front_opening: 0.34}",
+    "overcoat": "{preset: overcoat, shoulder_width: 0.52, front_opening: 0.34}",
+}
+# What the seed draws, as in scenarios/dummy_varied.yaml.
+VARIATION = (
+    "{arm_angle_deg: 10.0, coat_scale: 0.05, plant_stiffness: 0.3, plant_friction: 0.3, "
+    "start_offset: 0.03}"
+)
+# Of the series that are kept, s.
+_SERIES_STEP = 0.2
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: `method` of METHODS, `person` of PERSONS, `coat` of COATS."""
+
+    method: str
+    person: str
+    coat: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """For files and tables."""
+        return f"{self.method}-{self.person}-{self.coat}-{self.seed}"
+
+
+def cases(
+    methods: Sequence[str], persons: Sequence[str], coats: Sequence[str], seeds: Sequence[int]
+) -> list[Case]:
+    """Returns all of them, the seeds outermost: a part of them is a fair part of all groups."""
+    return [
+        Case(method, person, coat, seed)
+        for seed, person, coat, method in itertools.product(seeds, persons, coats, methods)
+    ]
+
+
+def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Returns what one run came to.
+
+    Args:
+        case: which.
+        keep: folder for its log, report and replay; None to keep none.
+        overrides: further KEY=VALUE for the scenario.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) if keep is None else keep / case.name
+        settings = [
+            f"controller.method={case.method}",
+            f"garment.coat={COATS[case.coat]}",
+            f"variation={VARIATION}",
+            *overrides,
+        ]
+        status, problem = run_scenario(
+            _SCENARIOS / PERSONS[case.person], out, settings, seed=case.seed
+        )
+        if problem:
+            return {"case": asdict(case), "problem": problem}
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        with RunLog.open(out / "run.h5") as log:
+            series, force = _series(log)
+    return {
+        "case": asdict(case),
+        "status": status,
+        "summary": summary,
+        "force_p99": force,
+        "series": series,
+    }
+
+
+def _series(log: RunLog) -> tuple[dict[str, list[Any]], float]:
+    """Returns s, l, force over time, and the force that 99 % of the samples stay below, N."""
+    at = np.arange(log.time[0], log.time[-1], _SERIES_STEP)
+    rows = np.searchsorted(log.time, at)
+    force = np.stack([np.linalg.norm(log.gripper_force[side], axis=1) for side in SIDES], axis=1)
+    series: dict[str, list[Any]] = {"time": np.round(at, 3).tolist()}
+    for k, side in enumerate(SIDES):
+        series[f"s_{side}"] = np.round(log.dressing[side][rows, 0], 3).tolist()
+        series[f"l_{side}"] = np.round(log.dressing[side][rows, 1], 4).tolist()
+        series[f"force_{side}"] = np.round(force[rows, k], 2).tolist()
+    return series, float(np.quantile(force, 0.99))

@@ -1,0 +1,104 @@
+"""The dressing experiments: which runs there are, and what is made of their results."""
+
+import json
+from dataclasses import asdict
+
+import pytest
+
+from benchmarks.dressing import __main__ as bench
+from benchmarks.dressing.cases import _SCENARIOS, COATS, METHODS, PERSONS, VARIATION, Case, cases
+from benchmarks.dressing.tables import figure, tables
+from benchmarks.statistics import wilson
+from drake_dress.diagrams.scenario import apply_variation, load_scenario
+from drake_dress.errors import UserError
+
+
+def result(method="full", seed=0, success=True, reason=None, time=20.0):
+    count = 5 if success else 9
+    series = {"time": [0.2 * k for k in range(count)]}
+    for side in ("left", "right"):
+        series |= {f"s_{side}": [0.1 * k for k in range(count)]}
+        series |= {f"l_{side}": [0.01] * count, f"force_{side}": [5.0] * count}
+    return {
+        "case": asdict(Case(method, "dummy", "jacket", seed)),
+        "status": int(not success),
+        "summary": {
+            "success": success,
+            "reason": reason,
+            "dressing_time_s": time if success else None,
+            "max_gripper_force_N": 15.0,
+            "max_penetration_m": 0.001,
+            "realtime_factor": 0.5,
+        },
+        "force_p99": 11.0,
+        "series": series,
+    }
+
+
+def test_a_part_of_the_runs_is_a_fair_part_of_all_groups():
+    found = cases(METHODS, list(PERSONS), list(COATS), range(3))
+    assert (
+        len({c.name for c in found}) == len(found) == 3 * len(METHODS) * len(PERSONS) * len(COATS)
+    )
+    first = found[: len(found) // 3]
+    assert {c.seed for c in first} == {0}
+    assert {(c.method, c.person, c.coat) for c in first} == {
+        (m, p, c) for m in METHODS for p in PERSONS for c in COATS
+    }
+
+
+@pytest.mark.parametrize("person", PERSONS)
+@pytest.mark.parametrize("coat", COATS)
+def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
+    settings = [f"garment.coat={COATS[coat]}", f"variation={VARIATION}", "controller.method=full"]
+    drawn = [
+        apply_variation(load_scenario(_SCENARIOS / PERSONS[person], settings, seed))
+        for seed in (0, 1)
+    ]
+    assert {s.garment.coat.preset for s in drawn} == {coat}
+    assert drawn[0].person.left_arm != drawn[1].person.left_arm
+    assert drawn[0].plant.material.friction != drawn[1].plant.material.friction
+
+
+def test_tables_count_what_was_dressed_and_say_why_not():
+    results = [result(seed=k, time=20.0 + k) for k in range(3)]
+    results += [result("local", 0, False, "left sleeve not on: s = 0.00 < 1.9")]
+    by_method, by_group, reasons = tables(results)
+    assert by_method.rows[0][:3] == ["full", 3, 3]
+    assert by_method.rows[0][4] == 21.0
+    assert by_method.rows[1][:3] == ["local", 1, 0]
+    assert [row[0] for row in by_group.rows] == ["full, dummy, jacket", "local, dummy, jacket"]
+    assert reasons.rows == [["local", "left sleeve not on", 1]]
+    assert figure(results).lstrip().startswith("<?xml")
+
+
+def test_runs_in_a_file_are_not_run_again(tmp_path, capsys, monkeypatch):
+    asked = []
+
+    def run(case, keep, overrides):
+        asked.append(case)
+        return result(case.method, case.seed)
+
+    monkeypatch.setattr(bench, "run", run)
+    file = tmp_path / "results.json"
+    words = ["--methods", "full", "--persons", "dummy", "--coats", "jacket", "--json", str(file)]
+    assert bench.main([*words, "--seeds", "0-1"]) == 0
+    assert bench.main([*words, "--seeds", "0-2"]) == 0
+    assert [c.seed for c in asked] == [0, 1, 2]
+    assert len(json.loads(file.read_text())) == 3
+    assert "| full |" in capsys.readouterr().out
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    file = tmp_path / "results.json"
+    file.write_text("{}x")
+    with pytest.raises(UserError, match="expected results"):
+        bench.main(["--json", str(file), "--kept"])
+
+
+@pytest.mark.parametrize(("right", "count"), [(0, 5), (5, 5), (3, 10), (90, 100)])
+def test_the_interval_holds_the_share_and_stays_within_all(right, count):
+    low, high = wilson(right, count)
+    assert -1e-12 <= low <= right / count <= high <= 1.0 + 1e-12
+    wider = wilson(right, count)[1] - wilson(right, count)[0]
+    assert wider > wilson(10 * right, 10 * count)[1] - wilson(10 * right, 10 * count)[0]
