@@ -9,13 +9,14 @@ from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
 
 
 def solve_cone_programme(
-    problem: LocalProblem, tolerance: float = 1e-8
+    problem: LocalProblem, tolerance: float = 1e-8, spills: bool = False
 ) -> tuple[LocalSolution, float]:
     """Returns the optimum of a local problem, without multipliers, and Clarabel's own time, s.
 
     Args:
-        problem: feasible.
+        problem: any; bounds that nothing keeps are exceeded at its price.
         tolerance: of Clarabel's gap and feasibility.
+        spills: whether bounds may be exceeded; else a problem may have no solution.
     """
     p = problem
     steps, m = p.input_weight.shape
@@ -36,8 +37,8 @@ def solve_cone_programme(
             )
         _add_cost(program, p.state_weight[j + 1], p.state_target[j + 1], x[j])
         _add_cost(program, p.input_weight[j], p.input_target[j], v[j])
-        _add_bounds(program, p.state_bounds, j + 1, x[j])
-        _add_bounds(program, p.input_bounds, j, v[j])
+        _add_bounds(program, p.state_bounds, j + 1, x[j], p.price if spills else None)
+        _add_bounds(program, p.input_bounds, j, v[j], p.price if spills else None)
     options = SolverOptions()
     for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
         options.SetOption(ClarabelSolver.id(), name, tolerance)
@@ -60,7 +61,7 @@ def solve_cone_programme(
 
 def cone_programme(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
     """Solves a local problem as a cone programme; Clarabel starts anew each time."""
-    return solve_cone_programme(problem)[0]
+    return solve_cone_programme(problem, spills=True)[0]
 
 
 def _add_cost(program, weight, target, z) -> None:  # type: ignore[no-untyped-def]
@@ -70,11 +71,23 @@ def _add_cost(program, weight, target, z) -> None:  # type: ignore[no-untyped-de
         )
 
 
-def _add_bounds(program, bounds: NormBounds, t: int, z) -> None:  # type: ignore[no-untyped-def]
+def _add_bounds(program, bounds: NormBounds, t: int, z, price: float | None) -> None:  # type: ignore[no-untyped-def]
     for matrix, offset, radius in zip(
         bounds.matrix[t], bounds.offset[t], bounds.radius[t], strict=True
     ):
-        if np.isfinite(radius):
-            used = np.any(matrix != 0.0, axis=0)
+        if not np.isfinite(radius):
+            continue
+        used = np.any(matrix != 0.0, axis=0)
+        if price is None:
             a = np.vstack([np.zeros((1, int(used.sum()))), matrix[:, used]])
             program.AddLorentzConeConstraint(a, np.concatenate([[radius], offset]), z[used])
+            continue
+        spilled = program.NewContinuousVariables(1, "t")
+        program.AddBoundingBoxConstraint(0.0, np.inf, spilled)
+        program.AddLinearCost(np.array([price]), 0.0, spilled)
+        # (φ² + 2 φ t) · 1 ≥ ‖·‖²
+        a = np.zeros((5, int(used.sum()) + 1))
+        a[0, -1], a[2:, :-1] = 2.0 * radius, matrix[:, used]
+        program.AddRotatedLorentzConeConstraint(
+            a, np.concatenate([[radius**2, 1.0], offset]), np.concatenate([z[used], spilled])
+        )

@@ -108,14 +108,14 @@ def solve_constrained_ddp(
         n_x, n_v = len(lx[0]), len(lv[0])
         multiplier, excess = np.empty((steps, n_x + n_v)), np.empty((steps, n_x + n_v))
         interior, near = start_inside(
-            *costs, *together, n_x, v, u, multiplier, excess,
+            *costs, *together, n_x, v, u, multiplier, excess, p.price,
             settings.max_interior_steps, settings.tolerance,
         )  # fmt: skip
         lx[1:], lv[:] = multiplier[:, :n_x], multiplier[:, n_x:]
         if near:
             # bounds that nothing keeps are widened by as little as can be
-            on_states[2][1:] += excess[:, :n_x]
-            on_inputs[2][:] += excess[:, n_x:]
+            _widen(on_states[2][1:], excess[:, :n_x])
+            _widen(on_inputs[2], excess[:, n_x:])
             inside = v.copy(), lx.copy(), lv.copy()
             more, converged = solve(
                 integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
@@ -128,6 +128,12 @@ def solve_constrained_ddp(
     return LocalSolution(
         v, p.states(v), lx, lv, p.cost(v), p.violation(v), sweeps, interior, bool(converged)
     )
+
+
+def _widen(radius: FloatArray, excess: FloatArray) -> None:
+    """Widens bounds (T,K) in place to √(φ² + 2 φ t), those with no excess t not at all."""
+    wide = excess > 0.0
+    radius[wide] = np.sqrt(radius[wide] * (radius[wide] + 2.0 * excess[wide]))
 
 
 def _contiguous(*arrays: FloatArray) -> list[FloatArray]:

@@ -19,8 +19,6 @@ _BORDER_SHARE = 0.995
 _FIRST_EXCESS = 0.3
 # Way from the optimum, m, that a start is taken to have at least.
 _FLATTEST = 1e-3
-# Price of excess, relative to the steepness of the cost.
-_PRICE = 100.0
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -37,6 +35,7 @@ def interior_point(  # type: ignore[no-untyped-def]
     x,
     multiplier,
     excess,
+    price,
     max_iterations,
     tolerance,
 ):
@@ -57,7 +56,8 @@ def interior_point(  # type: ignore[no-untyped-def]
         v: (N,m) inputs to start from, and on return.
         x: (N+1,m) on return.
         multiplier: (N,K+L) on return, of the norms; zero where not active.
-        excess: (N,K+L) on return, of bounds that nothing keeps; zero elsewhere.
+        excess: (N,K+L) t on return, of bounds that nothing keeps; zero elsewhere.
+        price: of the sum of excesses.
         max_iterations: at most.
         tolerance: of bounds, and of products of slack and multiplier relative to the first.
 
@@ -88,7 +88,6 @@ def interior_point(  # type: ignore[no-untyped-def]
             for e in range(m):
                 s += w[t + 1, a, e] * x[t + 1, e]
             steepness += abs(s) + _FLATTEST * w[t + 1, a, a]
-    price = _PRICE * (steepness + 1e-6)
     mu = 0.0
     for t in range(steps):
         for k in range(each):

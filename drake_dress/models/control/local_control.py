@@ -23,7 +23,7 @@ from drake_dress.models.control.local_model import (
     local_problem,
 )
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
-from drake_dress.models.control.tasks import Assignment, TaskPlanner
+from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.stages import Task
 from drake_dress.models.garment.geodesics import Reach, reach
 
@@ -172,17 +172,20 @@ class LocalController:
         assignment = self.planner.renewed(plan.assignment, sleeves, joints[0])
         targets = self.planner.targets(assignment, sleeves, joints, joints_step)
         goals = []
-        for i, (target, sleeve) in enumerate(zip(targets, sleeves, strict=True)):
+        axes = arm_axes(joints[0])
+        for i, target in enumerate(targets):
+            fact, task = assignment.facts[i], assignment.tasks[i]
+            on_arm = fact.linked and task in (Task.DRESS, Task.WAIT)
             # between the times of the predicted joints targets go straight
-            first = self._first_target(assignment, i, target.position, sleeve.p_c)
+            first = axes[i].G(fact.s) if on_arm else target.position[0]
             position = _resampled(np.vstack([first, target.position]), joints_step, p)
+            arm = position
             if planned is not None:
                 # where the plan saw the sleeve, moved as its target has moved since
                 position = foreseen[:, i] + position - planned[:, i]
             axis = _resampled(np.vstack([target.direction[:1], target.direction]), joints_step, p)
             axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-            on_arm = assignment.facts[i].linked and assignment.tasks[i] in (Task.DRESS, Task.WAIT)
-            goals.append(SleeveGoal(position, target.position_weight, on_arm, axis))
+            goals.append(SleeveGoal(position, target.position_weight, on_arm, arm, axis))
         problem = local_problem(nominal, (goals[0], goals[1]), coupled, self.reach, p)
         found = self.solver(problem, _shifted(state, time, p))
         velocity = nominal.velocity + found.v.reshape(-1, 2, 3)
@@ -196,12 +199,6 @@ class LocalController:
             p.max_speed,
         )
         return LocalOutcome(LocalState(found, time, coupled), local, problem)
-
-    def _first_target(
-        self, assignment: Assignment, side: int, target: FloatArray, center: FloatArray
-    ) -> FloatArray:
-        """Returns where a sleeve is asked to be now (3,), m: on its arm where it is along it."""
-        return center if assignment.facts[side].linked else target[0]
 
 
 def continued(

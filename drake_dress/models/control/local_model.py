@@ -42,8 +42,9 @@ class LocalParameters:
         position: W, 1/m².
         speed: R on the compensation of the grippers' speed, s²/m².
         max_speed: of a gripper, m/s.
-        beside: how far the armhole of a dressed sleeve may be beside its target, m (φ_x).
+        beside: how far the armhole of a dressed sleeve may be beside its arm, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
+        return_speed: at which bounds that are exceeded now come back, m/s.
         taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
         coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
             they are no longer.
@@ -56,6 +57,7 @@ class LocalParameters:
     max_speed: float = 0.12
     beside: float = 0.04
     beside_speed: float = 0.05
+    return_speed: float = 0.05
     taut_share: float = 0.8
     coupled_share: float = 0.85
     released_share: float = 0.8
@@ -82,12 +84,14 @@ class SleeveGoal:
     Attributes:
         target: (N+1,3) m. weight: factor on W; 0 leaves the sleeve alone.
         on_arm: whether contact with the arm bounds it.
-        axis: (N+1,3) unit direction of the arm at the target.
+        arm: (N+1,3) point of the arm's axis that the armhole of a dressed sleeve is at, m.
+        axis: (N+1,3) unit direction of the arm there.
     """
 
     target: FloatArray
     weight: float
     on_arm: bool
+    arm: FloatArray
     axis: FloatArray
 
 
@@ -164,13 +168,16 @@ def local_problem(
         if not goal.on_arm:
             continue
         across = _EYE - goal.axis[:, :, None] * goal.axis[:, None, :]
-        away = nominal.sleeve[:, i] - goal.target
+        away = nominal.sleeve[:, i] - goal.arm
         matrix[:, 4 + i, :, rows] = across
         offset[:, 4 + i] = np.einsum("tab,tb->ta", across, away)
         radius[:, 4 + i] = p.beside
         moving[:, i] = across[:-1] @ b[rows]
         moved[:, i] = np.einsum("tab,tb->ta", across[:-1], np.diff(away, axis=0))
         limit[:, i] = p.beside_speed * h
+    # what is exceeded already comes back in time; at once it could not
+    now = np.linalg.norm(offset[0], axis=1)
+    radius = np.maximum(radius, now - p.return_speed * h * np.arange(n + 1)[:, None])
     return LocalProblem(
         start=np.zeros(12),
         input_matrix=b,

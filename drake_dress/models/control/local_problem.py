@@ -41,6 +41,13 @@ class NormBounds:
         """Returns (T,K) by how much the norms at `z` (T,n) exceed their bounds; negative within."""
         return self.norms(z) - self.radius
 
+    def spilled(self, z: FloatArray) -> FloatArray:
+        """Returns (T,K) the least t with ‖·‖² ≤ φ² + 2 φ t at `z` (T,n); 0 where there is none."""
+        bounded = np.isfinite(self.radius)
+        phi = np.where(bounded, self.radius, 1.0)
+        t = np.maximum(0.0, 0.5 * (self.norms(z) ** 2 / phi - phi))
+        return np.where(bounded, t, 0.0)
+
 
 @dataclass(frozen=True)
 class LocalProblem:
@@ -53,6 +60,7 @@ class LocalProblem:
         input_weight: (N,m) diagonal of R, positive; input_target: (N,m) v̄.
         state_bounds: on x_0 … x_N; those on x_0 are not up to anyone and are passed over.
         input_bounds: on v_0 … v_{N−1}.
+        price: of the sum of all t, 1/m.
     """
 
     start: FloatArray
@@ -63,6 +71,7 @@ class LocalProblem:
     input_target: FloatArray
     state_bounds: NormBounds
     input_bounds: NormBounds
+    price: float = 1e3
 
     @property
     def horizon(self) -> int:
@@ -82,6 +91,11 @@ class LocalProblem:
             np.sum(self.state_weight * (x - self.state_target) ** 2)
             + np.sum(self.input_weight * (v - self.input_target) ** 2)
         )
+
+    def spilled(self, v: FloatArray) -> float:
+        """Returns the sum of t of all bounds at inputs `v` (N,m), m."""
+        of_states = self.state_bounds.spilled(self.states(v))[1:].sum()
+        return float(of_states + self.input_bounds.spilled(v).sum())
 
     def violation(self, v: FloatArray) -> float:
         """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""

@@ -34,7 +34,8 @@ def still(spread: float = 0.4) -> Nominal:
 def goal(nominal: Nominal, side: int, way: np.ndarray, on_arm: bool = False) -> SleeveGoal:
     """Asks a sleeve to go `way` (3,), m, at once; its arm points along x."""
     axis = np.tile([1.0, 0.0, 0.0], (P.horizon + 1, 1))
-    return SleeveGoal(nominal.sleeve[:, side] + way, 1.0, on_arm, axis)
+    target = nominal.sleeve[:, side] + way
+    return SleeveGoal(target, 1.0, on_arm, target, axis)
 
 
 def solved(nominal: Nominal, goals: tuple[SleeveGoal, SleeveGoal], coupled: bool = False):  # type: ignore[no-untyped-def]
