@@ -50,7 +50,13 @@ def test_ctrl_c_ends_at_once_and_leaves_nothing_half_written(tmp_path):
     words += ["--scenario", str(SCENARIO), *(w for value in QUICK for w in ("--set", value))]
     # a terminal sends the signal to all processes of the group
     process = subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        words,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # tests that run in the background inherit that the signal is passed over
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     for line in process.stderr:
         if "screening" in line:
