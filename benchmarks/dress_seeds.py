@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from kept import seed_range
 from scenario_run import run_scenario
 
 _COLUMNS = (
@@ -34,7 +35,7 @@ def main() -> int:
     """Runs the seeds; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", type=Path)
-    parser.add_argument("--seeds", type=_seeds, default=range(10), metavar="A-B")
+    parser.add_argument("--seeds", type=seed_range, default=range(10), metavar="A-B")
     parser.add_argument("--jobs", type=int, default=2, help="runs at once (default 2)")
     parser.add_argument("--out", type=Path, default=Path("out/seeds"))
     parser.add_argument("--json", type=Path, help="write all summaries here")
@@ -54,14 +55,6 @@ def main() -> int:
     if options.json:
         options.json.write_text(json.dumps(results, indent=2, sort_keys=True) + "\n")
     return int(any("success" not in result for result in results.values()))
-
-
-def _seeds(text: str) -> range:
-    first, _, last = text.partition("-")
-    try:
-        return range(int(first), int(last or first) + 1)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9") from None
 
 
 def _dress(options: argparse.Namespace, seed: int) -> dict[str, Any]:

@@ -7,7 +7,6 @@ the start drawn by the seed. What was run stays in the file of `--json` and is n
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -16,9 +15,9 @@ from typing import Any
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
+from benchmarks.kept import read_results, seed_range, write_results
 from benchmarks.parser import INTERRUPTED, OneLineParser
 from drake_dress.discrepancy.results import write_text
-from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 
 
@@ -26,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     chosen = cases(options.methods, options.persons, options.coats, options.seeds)
-    kept = {} if options.json is None else _read(options.json)
+    kept = {} if options.json is None else read_results(options.json, _name, "dressing")
     new = [] if options.kept else [case for case in chosen if case.name not in kept]
     print(f"{len(chosen)} runs, {len(new)} of them not run yet", flush=True)
     with caught_interrupt() as stop, ThreadPoolExecutor(options.jobs) as pool:
@@ -35,7 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             result = future.result()
             kept[pending[future].name] = result
             if options.json is not None:
-                _write(options.json, kept)
+                # what failed to run is run again
+                done = {name: r for name, r in kept.items() if "summary" in r}
+                write_results(options.json, done)
             print(f"{number}/{len(new)} {pending[future].name}: {_told(result)}", flush=True)
             if stop.is_set():
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -49,28 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(any("problem" in result for result in results))
 
 
+def _name(case: dict[str, Any]) -> str:
+    return Case(**case).name
+
+
 def _told(result: dict[str, Any]) -> str:
     if "problem" in result:
         return str(result["problem"])
     return result["summary"]["reason"] or f"on in {result['summary']['dressing_time_s']:.0f} s"
-
-
-def _read(path: Path) -> dict[str, dict[str, Any]]:
-    if not path.exists():
-        return {}
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        return {Case(**result["case"]).name: result for result in found}
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, TypeError, KeyError):
-        raise UserError(str(path), "", "expected results of drake-dress bench dressing") from None
-
-
-def _write(path: Path, kept: dict[str, dict[str, Any]]) -> None:
-    """Writes results, a line each, in the order of their names; what failed to run is left out."""
-    done = [kept[name] for name in sorted(kept) if "summary" in kept[name]]
-    write_text(path, "[\n" + ",\n".join(json.dumps(r) for r in done) + "\n]\n")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -83,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
             metavar="NAME,…",
             help=", ".join(known),
         )
-    parser.add_argument("--seeds", type=_seeds, default=range(13), metavar="A-B")
+    parser.add_argument("--seeds", type=seed_range, default=range(13), metavar="A-B")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
@@ -102,14 +89,6 @@ def _some_of(known: Sequence[str]):  # type: ignore[no-untyped-def]
         return names
 
     return parse
-
-
-def _seeds(text: str) -> range:
-    first, _, last = text.partition("-")
-    try:
-        return range(int(first), int(last or first) + 1)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9") from None
 
 
 if __name__ == "__main__":

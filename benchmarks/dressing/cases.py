@@ -36,7 +36,7 @@ VARIATION = (
     "start_offset: 0.03}"
 )
 # Of the series that are kept, s.
-_SERIES_STEP = 0.2
+SERIES_STEP = 0.2
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
 
 def _series(log: RunLog) -> tuple[dict[str, list[Any]], float]:
     """Returns s, l, force over time, and the force that 99 % of the samples stay below, N."""
-    at = np.arange(log.time[0], log.time[-1], _SERIES_STEP)
+    at = np.arange(log.time[0], log.time[-1], SERIES_STEP)
     rows = np.searchsorted(log.time, at)
     force = np.stack([np.linalg.norm(log.gripper_force[side], axis=1) for side in SIDES], axis=1)
     series: dict[str, list[Any]] = {"time": np.round(at, 3).tolist()}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.dressing.cases import METHODS
+from benchmarks.dressing.cases import METHODS, SERIES_STEP
 from benchmarks.statistics import wilson
 from drake_dress.models.sides import SIDES
 from drake_dress.report.page import chart, svg
@@ -74,8 +74,7 @@ def _bands(series: Iterable[dict[str, Any]], name: str):  # type: ignore[no-unty
     rows = [np.array(s[name], dtype=float) for s in series]
     longest = max(map(len, rows))
     padded = np.stack([np.concatenate([r, np.full(longest - len(r), r[-1])]) for r in rows])
-    step = 0.2
-    return step * np.arange(longest), *np.nanquantile(padded, [0.25, 0.5, 0.75], axis=0)
+    return SERIES_STEP * np.arange(longest), *np.nanquantile(padded, [0.25, 0.5, 0.75], axis=0)
 
 
 def _row(results: Sequence[dict[str, Any]]) -> list[Any]:

@@ -14,13 +14,14 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
+from benchmarks.kept import read_results, write_results
 from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
@@ -44,16 +45,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     draws = {g: options.draws or _DRAWS[g] for g in GROUPS}
     chosen = study(options.only, draws, options.seed, options.size, options.noise, options.beside)
     workers = max(1, (os.cpu_count() or 1) // options.jobs)
-    kept = {} if options.json is None else read_results(options.json)
+    kept = {} if options.json is None else read_results(options.json, name_of, "explain")
     new = [case for case in chosen if case.name not in kept]
     if options.kept:
         chosen, new = [case for case in chosen if case.name in kept], []
     print(f"seed {options.seed}, {len(chosen)} cases, {len(new)} of them not run yet", flush=True)
     with caught_interrupt() as stop:
         for number, result in enumerate(_all(new, options.cache, options.jobs, workers, stop), 1):
-            kept[Case(**result["case"]).name] = result
+            kept[name_of(result["case"])] = result
             if options.json is not None:
-                write_results(options.json, kept.values())
+                write_results(options.json, kept)
             print(f"{number}/{len(new)} {_line(result)}", flush=True)
     results = [kept[case.name] for case in chosen if case.name in kept]
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
@@ -65,27 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return INTERRUPTED if stop.is_set() else 0
 
 
-def read_results(path: Path) -> dict[str, dict[str, Any]]:
-    """Returns the results that a file holds by their case's name; none if there is no file.
-
-    Raises:
-        UserError: it cannot be read, or holds something else.
-    """
-    if not path.exists():
-        return {}
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        return {Case(**result["case"]).name: result for result in found}
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, TypeError, KeyError):
-        raise UserError(str(path), "", "expected results of drake-dress bench explain") from None
-
-
-def write_results(path: Path, results: Iterable[dict[str, Any]]) -> None:
-    """Writes results, a line each, in the order of their cases' names."""
-    lines = (json.dumps(r) for r in sorted(results, key=lambda r: Case(**r["case"]).name))
-    write_text(path, "[\n" + ",\n".join(lines) + "\n]\n")
+def name_of(case: dict[str, Any]) -> str:
+    """Returns the name of a case that was kept."""
+    return Case(**case).name
 
 
 def _all(

@@ -6,8 +6,8 @@ import time as clock
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State, ValueProducer
 
 from drake_dress.models.control.local_control import (
     GlobalPlan,
@@ -92,6 +92,11 @@ class LocalCompensation(LeafSystem):
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (joints_count + 1))
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
+        # of both grippers, (2,3): the garment is looked at once
+        self._velocity = self.DeclareCacheEntry(
+            "velocity",
+            ValueProducer(allocate=Value(np.zeros((2, 3))).Clone, calc=self._calc_velocity),
+        )
         for i, side in enumerate(SIDES):
             self.DeclareVectorOutputPort(f"{side}_velocity_request", 3, self._request(i))
         ticket = {self.abstract_state_ticket(self._plan)}
@@ -137,15 +142,18 @@ class LocalCompensation(LeafSystem):
             ended = context.get_discrete_state(self._shown).value()[1] + 1.0
             state.get_mutable_discrete_state(self._shown).SetFromVector([memory.solve_time, ended])
 
+    def _calc_velocity(self, context: Context, output: AbstractValue) -> None:
+        plan: LocalPlan = context.get_abstract_state(self._plan).get_value()
+        seen = None
+        if self._feedback and len(plan.velocity):
+            sleeves = self._controller.planner.sleeves(self._garment(context))
+            centers = [sleeve.p_c for sleeve in sleeves]
+            seen = np.concatenate([*centers, *self._grippers(context)])
+        output.set_value(plan.velocity_at(context.get_time(), seen))
+
     def _request(self, side: int):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
-            plan: LocalPlan = context.get_abstract_state(self._plan).get_value()
-            seen = None
-            if self._feedback and len(plan.velocity):
-                sleeves = self._controller.planner.sleeves(self._garment(context))
-                centers = [sleeve.p_c for sleeve in sleeves]
-                seen = np.concatenate([*centers, *self._grippers(context)])
-            output.SetFromVector(plan.velocity_at(context.get_time(), seen)[side])
+            output.SetFromVector(self._velocity.Eval(context)[side])
 
         return calc
 

@@ -8,12 +8,12 @@ from benchmarks.explain.__main__ import (
     BEGIN,
     END,
     main,
-    read_results,
+    name_of,
     write_between,
-    write_results,
 )
 from benchmarks.explain.cases import study
 from benchmarks.explain.tables import parameter_error, reliability, right, tables
+from benchmarks.kept import read_results, write_results
 from drake_dress.discrepancy.hidden import SIZES
 from drake_dress.errors import UserError
 
@@ -114,8 +114,8 @@ def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):
     made_up = [result(group="nothing", hide="nothing", named=(), verdict="nothing") for _ in cases]
     for one, case in zip(made_up, cases, strict=True):
         one["case"] = dataclasses.asdict(case)
-    write_results(path, made_up)
-    assert list(read_results(path)) == [case.name for case in cases]
+    write_results(path, {name_of(one["case"]): one for one in made_up})
+    assert list(read_results(path, name_of, "explain")) == [case.name for case in cases]
     words = ["--only", "nothing", "--draws", "2", "--seed", "5", "--json", str(path)]
     assert main([*words, "--cache", str(tmp_path)]) == 0
     said = capsys.readouterr().out
@@ -130,7 +130,7 @@ def test_a_file_of_something_else_is_refused(content, tmp_path):
     path = tmp_path / "results.json"
     path.write_text(content)
     with pytest.raises(UserError, match="expected results"):
-        read_results(path)
+        read_results(path, name_of, "explain")
     assert path.read_text() == content
 
 

@@ -41,8 +41,12 @@ class Settings:
     """When to give up.
 
     Attributes:
-        max_sweeps: backward and forward passes.
+        warm_sweeps: backward and forward passes from an earlier solution's multipliers, before the
+            interior point method is asked.
+        max_sweeps: such passes after it.
         max_halvings: of a step that does not lower cost and excess.
+        max_interior_steps: of the interior point method.
+        tolerance: at which that one ends, see `interior_point`.
     """
 
     warm_sweeps: int = 4
@@ -62,7 +66,7 @@ def solve_constrained_ddp(
     """Returns the optimum of a local problem.
 
     Args:
-        problem: at most; bounds on states may depend on each other.
+        problem: to solve; bounds on states may depend on each other.
         guess: (N,m) inputs to start from; zero if None.
         state_multiplier: (N+1,K) of an earlier solution; positive ones start as active.
         input_multiplier: (N,L) likewise.

@@ -58,7 +58,7 @@ def interior_point(  # type: ignore[no-untyped-def]
         multiplier: (N,K+L) on return, of the norms; zero where not active.
         excess: (N,K+L) t on return, of bounds that nothing keeps; zero elsewhere.
         price: of the sum of excesses.
-        max_iterations: at most.
+        max_iterations: after which it gives up.
         tolerance: of bounds, and of products of slack and multiplier relative to the first.
 
     Returns:

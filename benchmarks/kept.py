@@ -1,0 +1,53 @@
+"""Results of benchmarks that are kept in a file, from which a long study is resumed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from drake_dress.discrepancy.results import write_text
+from drake_dress.errors import UserError
+
+
+def read_results(
+    path: Path, name_of: Callable[[dict[str, Any]], str], benchmark: str
+) -> dict[str, dict[str, Any]]:
+    """Returns the results that a file holds by their case's name; none if there is no file.
+
+    Args:
+        path: of the file.
+        name_of: case's name, from the fields that a result has under "case".
+        benchmark: for errors.
+
+    Raises:
+        UserError: it cannot be read, or holds something else.
+    """
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {name_of(result["case"]): result for result in found}
+    except OSError as error:
+        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError, KeyError):
+        raise UserError(
+            str(path), "", f"expected results of drake-dress bench {benchmark}"
+        ) from None
+
+
+def write_results(path: Path, results: Mapping[str, dict[str, Any]]) -> None:
+    """Writes results, a line each, in the order of their cases' names."""
+    lines = ",\n".join(json.dumps(results[name]) for name in sorted(results))
+    write_text(path, f"[\n{lines}\n]\n")
+
+
+def seed_range(text: str) -> range:
+    """Returns the seeds that A-B or A means, for argparse."""
+    first, _, last = text.partition("-")
+    try:
+        return range(int(first), int(last or first) + 1)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9") from None
