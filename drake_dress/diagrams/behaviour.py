@@ -29,6 +29,8 @@ from drake_dress.systems.passive_person import PassivePerson
 
 FloatArray = np.ndarray
 Kind = Literal["dummy", "passive", "active"]
+# Steps of the plant from one decision of an active person to the next: no will is faster.
+_WILL_STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def _muscles(
             mesh,
             behaviour.motions,
             behaviour.active,
-            period,
+            _WILL_STEPS * period,
         )
     builder.AddNamedSystem(f"{behaviour.kind}_person", will)
     builder.Connect(plant.get_state_output_port(person.model), will.GetInputPort("person_state"))

@@ -130,19 +130,16 @@ class ClothPlant(LeafSystem):
 
     def obstacles(self, context: Context) -> Obstacles:
         """Returns the person's capsules in the world, as the body ports say."""
-        poses = self._poses.Eval(context)
-        velocities = self._velocities.Eval(context)
-        a, b = np.empty_like(self._a), np.empty_like(self._b)
-        velocity, omega = np.empty_like(self._a), np.empty_like(self._a)
-        for k, index in enumerate(self._index):
-            rows = self._body_of == k
-            rotation, origin = poses[index].rotation().matrix(), poses[index].translation()
-            a[rows] = self._a[rows] @ rotation.T + origin
-            b[rows] = self._b[rows] @ rotation.T + origin
-            w = velocities[index].rotational()
-            omega[rows] = w
-            velocity[rows] = velocities[index].translational() + np.cross(w, a[rows] - origin)
-        return Obstacles(a, b, self._radius, velocity, omega)
+        poses, velocities = self._poses.Eval(context), self._velocities.Eval(context)
+        body = self._body_of
+        rotation = np.array([poses[i].rotation().matrix() for i in self._index])[body]
+        origin = np.array([poses[i].translation() for i in self._index])[body]
+        twist = np.array([velocities[i].get_coeffs() for i in self._index])[body]
+        omega = np.ascontiguousarray(twist[:, :3])
+        to_a = np.einsum("kij,kj->ki", rotation, self._a)
+        to_b = np.einsum("kij,kj->ki", rotation, self._b)
+        velocity = twist[:, 3:] + np.cross(omega, to_a)
+        return Obstacles(origin + to_a, origin + to_b, self._radius, velocity, omega)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         n, h = self._n, self.cloth.time_step
@@ -183,17 +180,14 @@ class ClothPlant(LeafSystem):
 
     def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
-        poses = self._poses.Eval(context)
         wrench = np.zeros((len(self._names), 6))
         rows = np.flatnonzero(after.owner >= 0)
-        body = self._body_of[after.owner[rows]]
-        for k, index in enumerate(self._index):
-            mine = rows[body == k]
-            if len(mine):
-                force = -after.reaction[mine]
-                arm = x[mine] - poses[index].translation()
-                wrench[k, :3] = np.cross(arm, force).sum(axis=0)
-                wrench[k, 3:] = force.sum(axis=0)
+        if len(rows):
+            poses = self._poses.Eval(context)
+            origin = np.array([poses[i].translation() for i in self._index])
+            body = self._body_of[after.owner[rows]]
+            moment = np.cross(x[rows] - origin[body], -after.reaction[rows])
+            np.add.at(wrench, body, np.hstack([moment, -after.reaction[rows]]))
         return wrench
 
     def _calc(self, index):  # type: ignore[no-untyped-def]

@@ -14,7 +14,8 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
-from drake_dress.models.cloth.factor.masked import Factor, solve_into, solve_pair_into
+from drake_dress.models.cloth.factor.kernels import row_product
+from drake_dress.models.cloth.factor.masked import Factor, solve_pair_into, solve_rows
 from drake_dress.models.cloth.fibres import Fibres, no_fibres
 from drake_dress.models.cloth.fibres import filtered_product as fibre_product
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
@@ -22,6 +23,8 @@ from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
+# Weight of motion across the cloth beside P⁻¹ in the preconditioner: smooth motion is in both.
+_ACROSS = 0.3
 
 
 class SystemMatrix:
@@ -66,8 +69,15 @@ class SystemMatrix:
     def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
         """Returns A z (n,3); `block` is what `prepare_filtered` wrote for this state."""
         out = np.empty_like(z)
-        _apply(self._operator(block), z, out)
+        _product(self._operator(block), z, out)
         return out
+
+    def residual2(
+        self, z: FloatArray, block: FloatArray, rhs: FloatArray, mode: IntArray, normal: FloatArray
+    ) -> float:
+        """Returns ‖Π (rhs − A z)‖² for (n,3) `z` and `rhs`."""
+        size2: float = _residual2(self._operator(block), z, rhs, mode, normal)
+        return size2
 
     def solve(
         self,
@@ -80,13 +90,16 @@ class SystemMatrix:
         tolerance: float,
         max_iterations: int,
         resistance: FloatArray | None = None,
+        across: tuple[FloatArray, FloatArray] | None = None,
     ) -> tuple[int, float]:
         """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
 
         `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
         stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
         that `factor` leaves out and that are free here are preconditioned by the diagonal.
-        `resistance` (n,), kg, is added to the diagonal of A where nodes are free.
+        `resistance` (n,), kg, is added to the diagonal of A where nodes are free. `across` of
+        `normal_response` is added to the preconditioner, but not to the norm: a coat
+        on an arm took 16.5 iterations without, and 12.5 with it.
 
         Returns:
             Iterations done, and the last relative residual.
@@ -94,6 +107,8 @@ class SystemMatrix:
         f = factor
         if resistance is None:
             resistance = np.zeros(0)
+        if across is None:
+            across = np.zeros((0, 3)), np.zeros(0)
         return _filtered_cg(
             self._operator(block),
             (f.blocks, f.pattern.permutation),
@@ -106,6 +121,7 @@ class SystemMatrix:
             tolerance,
             max_iterations,
             resistance,
+            across,
         )
 
     def solve_pair(
@@ -137,12 +153,43 @@ class SystemMatrix:
 
 
 @nb.njit(cache=True, nogil=True)
-def _apply(operator, z, out):  # type: ignore[no-untyped-def]
+def _product(operator, z, out):  # type: ignore[no-untyped-def]
     """Writes A z (n,3) into `out`."""
+    rows = _rows(z)
+    product = np.empty_like(rows)
+    _apply(operator, rows, product)
+    out[:] = product[:, :3]
+
+
+@nb.njit(cache=True, nogil=True)
+def _residual2(operator, z, rhs, mode, normal):  # type: ignore[no-untyped-def]
+    rows, residual = _rows(z), _rows(rhs)
+    product = np.empty_like(rows)
+    _apply(operator, rows, product)
+    add(residual, -1.0, product)
+    project(residual, mode, normal)
+    return dot(residual, residual)
+
+
+@nb.njit(cache=True, nogil=True)
+def _rows(z):  # type: ignore[no-untyped-def]
+    """Returns (n,4): `z` (n,3) and nothing, so that each row is a vector of the processor."""
+    rows = np.empty((z.shape[0], 4))
+    for i in range(z.shape[0]):
+        rows[i, 0] = z[i, 0]
+        rows[i, 1] = z[i, 1]
+        rows[i, 2] = z[i, 2]
+        rows[i, 3] = 0.0
+    return rows
+
+
+@nb.njit(cache=True, nogil=True)
+def _apply(operator, z, out):  # type: ignore[no-untyped-def]
+    """Writes A z into `out`, both in rows of four (n,4)."""
     indptr, indices, data, triangle, gradient, corners, share, weight, fibres, block, scale = (
         operator
     )
-    matrix_product(indptr, indices, data, z, out)
+    row_product(indptr, indices, data, z, out)
     if scale != 0.0:
         filtered_product(z, triangle, gradient, block, scale, out)
         fibre_product(z, corners, share, weight, fibres, scale, out)
@@ -170,7 +217,7 @@ def matrix_product(
 
 @nb.njit(cache=True, nogil=True)
 def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
-    """Removes from `z` (n,3), in place, what the modes do not leave free."""
+    """Removes from the vectors in `z` (n,3 or more), in place, what the modes do not leave free."""
     for i in range(z.shape[0]):
         m = mode[i]
         if m == 1 or m == 3:
@@ -197,35 +244,43 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     tolerance,
     max_iterations,
     resistance,
+    across,
 ):
     n = rhs.shape[0]
     work = np.empty((n, 4))
-    direction = np.empty((n, 3))
-    product = np.empty((n, 3))
-    preconditioned = np.empty((n, 3))
+    direction = np.empty((n, 4))
+    product = np.empty((n, 4))
+    preconditioned = np.zeros((n, 4))
+    solution = _rows(z)
     # what resists is stiff by itself: D M⁻¹ D, D² = P_ii / (P_ii + c_i), takes care of it
     damped = np.empty(resistance.shape[0])
     for i in range(damped.shape[0]):
         damped[i] = 1.0 / np.sqrt(1.0 + resistance[i] * masked_scale[i])
-    scaled = np.empty((resistance.shape[0], 3))
+    scaled = np.zeros((resistance.shape[0], 4))
     preconditioner = (factor, masked, masked_scale, mode, normal, work, damped, scaled)
+    facing, light = across
+    give = np.empty(light.shape[0])
+    for i in range(give.shape[0]):
+        r = resistance[i] if damped.shape[0] > 0 else 0.0
+        give[i] = _ACROSS * light[i] / (1.0 + r * light[i])
 
-    residual = rhs.copy()
+    residual = _rows(rhs)
     project(residual, mode, normal)
     _precondition(preconditioner, residual, preconditioned)
     floor = max(dot(residual, preconditioned), 1e-300)
 
-    _apply(operator, z, residual)
-    _resist(resistance, z, residual)
+    _apply(operator, solution, residual)
+    _resist(resistance, solution, residual)
     for i in range(n):
         for c in range(3):
             residual[i, c] = rhs[i, c] - residual[i, c]
     project(residual, mode, normal)
     _precondition(preconditioner, residual, preconditioned)
-    rho = dot(residual, preconditioned)
+    left = dot(residual, preconditioned)
+    rho = left + _go_across(facing, give, mode, normal, residual, preconditioned)
     direction[:] = preconditioned
     iterations = 0
-    while iterations < max_iterations and rho > tolerance * tolerance * floor:
+    while iterations < max_iterations and left > tolerance * tolerance * floor:
         _apply(operator, direction, product)
         _resist(resistance, direction, product)
         project(product, mode, normal)
@@ -233,15 +288,17 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
         if curvature <= 0.0:
             break
         alpha = rho / curvature
-        add(z, alpha, direction)
+        add(solution, alpha, direction)
         add(residual, -alpha, product)
         _precondition(preconditioner, residual, preconditioned)
-        new = dot(residual, preconditioned)
+        left = dot(residual, preconditioned)
+        new = left + _go_across(facing, give, mode, normal, residual, preconditioned)
         beta = new / rho
         rho = new
         turn(direction, beta, preconditioned)
         iterations += 1
-    return iterations, np.sqrt(max(rho, 0.0) / floor)
+    z[:] = solution[:, :3]
+    return iterations, np.sqrt(max(left, 0.0) / floor)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -251,16 +308,16 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
     n = rhs.shape[0]
     blocks, permutation = factor
     sides = (rhs, other_rhs)
-    solutions = (z, other_z)
-    residual = np.empty((2, n, 3))
-    direction = np.empty((2, n, 3))
-    ahead = np.empty((2, n, 3))
-    product = np.empty((n, 3))
+    solutions = (_rows(z), _rows(other_z))
+    residual = np.empty((2, n, 4))
+    direction = np.empty((2, n, 4))
+    ahead = np.zeros((2, n, 4))
+    product = np.empty((n, 4))
     rho, goal = np.empty(2), np.empty(2)
     iterations = np.zeros(2, dtype=np.int64)
     for s in range(2):
         _apply(operator, solutions[s], product)
-        residual[s] = sides[s]
+        residual[s] = _rows(sides[s])
         add(residual[s], -1.0, product)
         _release(residual[s], masked)
     solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
@@ -285,6 +342,8 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
             iterations[s] += 1
             running = running or iterations[s] < most
         if not running:
+            z[:] = solutions[0][:, :3]
+            other_z[:] = solutions[1][:, :3]
             return iterations[0], iterations[1]
         solve_pair_into(blocks, permutation, residual[0], residual[1], ahead[0], ahead[1])
         for s in range(2):
@@ -295,7 +354,7 @@ def _filtered_cg_pair(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _release(z, masked):  # type: ignore[no-untyped-def]
-    """Sets rows of masked nodes of `z` (n,3) to zero."""
+    """Sets rows of masked nodes of `z` (n,3 or more) to zero."""
     for i in range(z.shape[0]):
         if masked[i]:
             z[i, 0] = 0.0
@@ -305,11 +364,37 @@ def _release(z, masked):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _resist(resistance, z, out):  # type: ignore[no-untyped-def]
-    """Adds c z to `out` (n,3); `resistance` c is (n,) or empty."""
+    """Adds c z to `out`; `resistance` c is (n,) or empty."""
     for i in range(resistance.shape[0]):
         if resistance[i] > 0.0:
             for c in range(3):
                 out[i, c] += resistance[i] * z[i, c]
+
+
+@nb.njit(cache=True, nogil=True)
+def _go_across(facing, give, mode, normal, residual, out):  # type: ignore[no-untyped-def]
+    """Adds Π f g fᵀ `residual` of each node to `out`; returns the product of that and `residual`.
+
+    f (n,3) is where cloth faces, g (n,) how it gives way there; `residual` is in the range of Π.
+    """
+    total = 0.0
+    for i in range(give.shape[0]):
+        m = mode[i]
+        if m == 1 or m == 3:
+            continue
+        f0, f1, f2 = facing[i, 0], facing[i, 1], facing[i, 2]
+        along = f0 * residual[i, 0] + f1 * residual[i, 1] + f2 * residual[i, 2]
+        if m == 2:
+            d = f0 * normal[i, 0] + f1 * normal[i, 1] + f2 * normal[i, 2]
+            f0 -= d * normal[i, 0]
+            f1 -= d * normal[i, 1]
+            f2 -= d * normal[i, 2]
+        step = give[i] * along
+        out[i, 0] += step * f0
+        out[i, 1] += step * f1
+        out[i, 2] += step * f2
+        total += step * along
+    return total
 
 
 @nb.njit(cache=True, nogil=True)
@@ -320,12 +405,12 @@ def _precondition(preconditioner, residual, out):  # type: ignore[no-untyped-def
         for i in range(residual.shape[0]):
             for c in range(3):
                 scaled[i, c] = damped[i] * residual[i, c]
-        solve_into(blocks, permutation, scaled, out, work)
+        solve_rows(blocks, permutation, scaled, out, work)
         for i in range(residual.shape[0]):
             for c in range(3):
                 out[i, c] *= damped[i]
     else:
-        solve_into(blocks, permutation, residual, out, work)
+        solve_rows(blocks, permutation, residual, out, work)
     for i in range(residual.shape[0]):
         if masked[i]:
             out[i, 0] = masked_scale[i] * residual[i, 0]

@@ -148,6 +148,63 @@ def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore
         scatter(tile, nodes, b, product)
 
 
+def normal_response(
+    elements: Elements, block: FloatArray, scale: float, diagonal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Returns normals (n,3) of the nodes and 1 / (nᵀ A_ii n) (n,), 1/kg.
+
+    A is `diagonal` ⊗ I₃ + scale · K₊ with its blocks A_ii. Across itself, cloth without tension has
+    mass and bending only, and P, which bounds stretch in all directions, is far too stiff there.
+
+    Args:
+        elements: the rest shape.
+        block: of `prepare_filtered`.
+        scale: factor.
+        diagonal: (n,) of the scalar part, kg.
+    """
+    normal = np.zeros((elements.node_count, 3))
+    across = diagonal.copy()
+    _across(block, elements.triangle_lanes, elements.gradient_lanes, scale, normal, across)
+    return normal, 1.0 / across
+
+
+@nb.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _across(block, nodes, gradient, scale, normal, across):  # type: ignore[no-untyped-def]
+    for b in range(block.shape[0]):
+        for l in range(LANES):
+            for corner in range(3):
+                i = nodes[b, corner, l]
+                for c in range(3):
+                    normal[i, c] += block[b, 13, l] * block[b, 6 + c, l]
+    for i in range(normal.shape[0]):
+        size2 = normal[i, 0] ** 2 + normal[i, 1] ** 2 + normal[i, 2] ** 2
+        if size2 > 0.0:
+            for c in range(3):
+                normal[i, c] /= np.sqrt(size2)
+    for b in range(block.shape[0]):
+        for l in range(LANES):
+            w = block[b, 13, l]
+            if w == 0.0:
+                continue
+            for corner in range(3):
+                if corner == 0:
+                    g0 = -gradient[b, 0, l] - gradient[b, 2, l]
+                    g1 = -gradient[b, 1, l] - gradient[b, 3, l]
+                else:
+                    g0, g1 = gradient[b, 2 * corner - 2, l], gradient[b, 2 * corner - 1, l]
+                i = nodes[b, corner, l]
+                along0, along1, up = 0.0, 0.0, 0.0
+                for c in range(3):
+                    along0 += normal[i, c] * block[b, 2 * c, l]
+                    along1 += normal[i, c] * block[b, 2 * c + 1, l]
+                    up += normal[i, c] * block[b, 6 + c, l]
+                turned = along1 * g0 - along0 * g1
+                cut = g0 * g0 * block[b, 9, l] + 2.0 * g0 * g1 * block[b, 10, l]
+                cut += g1 * g1 * block[b, 11, l]
+                stiff = w * (g0 * g0 + g1 * g1) - block[b, 12, l] * turned**2 - up**2 * cut
+                across[i] += scale * max(stiff, 0.0)
+
+
 def filtered_derivative(
     elements: Elements, stretch: float, x: FloatArray, w: FloatArray, z: FloatArray
 ) -> FloatArray:

@@ -20,8 +20,12 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK, SystemMatrix, project
-from drake_dress.models.cloth.filtered_stiffness import no_stretch, prepare_filtered
+from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK, SystemMatrix
+from drake_dress.models.cloth.filtered_stiffness import (
+    no_stretch,
+    normal_response,
+    prepare_filtered,
+)
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.implicit_contact import ImplicitContact
@@ -143,6 +147,7 @@ class ImplicitCloth:
         self._system = SystemMatrix(
             Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale, fibres
         )
+        self._scale, self._diagonal = scale, (mass + scale * bending).diagonal()
         self._block = no_stretch()
         self._factor: Factor | None = None
         self._steps_since_factor = 0
@@ -180,6 +185,7 @@ class ImplicitCloth:
         if influences.force is not None:
             force += influences.force
         rhs = self.mass[:, None] * v + h * force
+        across = normal_response(e, self._block, self._scale, self._diagonal)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
@@ -217,6 +223,8 @@ class ImplicitCloth:
                 tolerance,
                 self._max_iterations,
                 contact.resistance if contact.resistance.any() else None,
+                # alone, P keeps the momentum of what is free, however soon iterations end
+                across if mode.any() else None,
             )
             total += iterations
             impulse = self._system.product(velocity, self._block)
@@ -268,9 +276,7 @@ class ImplicitCloth:
         best, least = v, np.inf
         for start in (v.copy(), other):
             start[self.held] = held_velocity
-            residual = self._system.product(start, self._block) - rhs
-            project(residual, mode, normal)
-            size = float(np.sum(residual**2))
+            size = self._system.residual2(start, self._block, rhs, mode, normal)
             if size < least:
                 best, least = start, size
         return best

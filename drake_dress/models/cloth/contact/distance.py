@@ -15,6 +15,8 @@ from drake_dress.models.cloth.elements import FloatArray, IntArray
 
 # Farther than any garment is from anything, m.
 _FAR = 1e9
+# Of distances, m.
+_ROUNDING = 1e-9
 # A point this close on its way has touched, m; a grazing one is given up after so many marches.
 TOUCH = 1e-5
 MOST_MARCHES = 64
@@ -132,15 +134,36 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
     """
     a, b, radius, point, normal, solids = shapes
     m, k = radius.shape[0], point.shape[0]
+    # Neighbours have the same capsule next to them: it is tried first, and the others only where a
+    # ball around them comes as near.
+    ball = np.empty((m if x.shape[0] > m else 0, 4))
+    for j in range(ball.shape[0]):
+        half2 = 0.0
+        for c in range(3):
+            ball[j, c] = 0.5 * (a[j, c] + b[j, c])
+            half2 += 0.25 * (a[j, c] - b[j, c]) ** 2
+        ball[j, 3] = np.sqrt(half2) + radius[j] + _ROUNDING
+    last = 0
     for i in range(x.shape[0]):
         p0, p1, p2 = x[i, 0], x[i, 1], x[i, 2]
         best = _FAR
         who = -1
-        for j in range(m):
-            d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+        if ball.shape[0] > 0:
+            d, _ = _capsule(p0, p1, p2, a, b, radius, last)
             if d < best:
                 best = d
+                who = last
+        for j in range(m):
+            if ball.shape[0] > 0:
+                far = best + ball[j, 3]
+                way2 = (p0 - ball[j, 0]) ** 2 + (p1 - ball[j, 1]) ** 2 + (p2 - ball[j, 2]) ** 2
+                if j == last or (far > 0.0 and way2 > far * far):
+                    continue
+            d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+            if d < best or (d == best and j < who):
+                best = d
                 who = j
+        last = max(who, 0)
         for j in range(k):
             d = (
                 (p0 - point[j, 0]) * normal[j, 0]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.factor.lanes import FOUR, less, load, store, times
+from drake_dress.models.cloth.factor.lanes import FOUR, less, load, more, store, times
 from drake_dress.models.vectorised import vectorised
 
 _INDICES, _VALUES, _LANES = nb.int32[::1], nb.float64[::1], nb.float64[:, ::1]
@@ -111,6 +111,36 @@ def substitute(blocks, work, like):  # type: ignore[no-untyped-def]
             store(work, i + 3, z)
         store(work, i, less(w, value[begin], x))
         store(work, i + 1, x)
+
+
+@vectorised(nb.void(_INDICES, _LANES, _LANES))
+def take_rows(places, rows, out):  # type: ignore[no-untyped-def]
+    """Writes rows of four at `places` (n,) to `out` (n,4)."""
+    for i in range(places.shape[0]):
+        store(out, i, load(rows, places[i], FOUR))
+
+
+@vectorised(nb.void(_INDICES, _LANES, _LANES))
+def put_rows(places, rows, out):  # type: ignore[no-untyped-def]
+    """Writes rows of four, (n,4), to the rows of `out` at `places` (n,)."""
+    for i in range(places.shape[0]):
+        store(out, places[i], load(rows, i, FOUR))
+
+
+@vectorised(nb.void(_INDICES, _INDICES, _VALUES, _LANES, _LANES))
+def row_product(indptr, indices, data, z, out):  # type: ignore[no-untyped-def]
+    """Writes (matrix ⊗ I₄) z for a CSR matrix and rows of four, (n,4), to `out`."""
+    for i in range(z.shape[0]):
+        q, end = indptr[i], indptr[i + 1]
+        # two sums: one waits for itself
+        a, b = FOUR, FOUR
+        while q + 1 < end:
+            a = more(a, data[q], load(z, indices[q], FOUR))
+            b = more(b, data[q + 1], load(z, indices[q + 1], FOUR))
+            q += 2
+        if q < end:
+            a = more(a, data[q], load(z, indices[q], FOUR))
+        store(out, i, more(a, 1.0, b))
 
 
 @vectorised(nb.int32(BLOCKS, _INDICES, _INDICES, _INDICES, _INDICES, _VALUES, nb.boolean[::1]))

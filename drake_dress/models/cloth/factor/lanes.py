@@ -70,6 +70,24 @@ def less(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
     return a(a, s, b), generate
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def more(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
+    """Returns a + s b."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pairs = zip(
+            cgutils.unpack_tuple(builder, args[0]),
+            cgutils.unpack_tuple(builder, args[2]),
+            strict=True,
+        )
+        values = [
+            builder.fadd(p, builder.fmul(args[1], q, flags=_FUSED), flags=_FUSED) for p, q in pairs
+        ]
+        return context.make_tuple(builder, a, values)
+
+    return a(a, s, b), generate
+
+
 def _places(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
     """Returns pointers to the first numbers of a row: args[0] is the array, args[1] the row."""
     kind, index = signature.args[:2]

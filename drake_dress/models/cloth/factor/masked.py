@@ -19,7 +19,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
-from drake_dress.models.cloth.factor.kernels import eliminate, factorize, substitute
+from drake_dress.models.cloth.factor.kernels import (
+    eliminate,
+    factorize,
+    put_rows,
+    substitute,
+    take_rows,
+)
 from drake_dress.models.cloth.factor.lanes import EIGHT, FOUR
 from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern
 
@@ -122,6 +128,15 @@ def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-
         out[p, 0] = work[i, 0]
         out[p, 1] = work[i, 1]
         out[p, 2] = work[i, 2]
+
+
+@nb.njit(cache=True, nogil=True)
+def solve_rows(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-def]
+    """Does as `solve_into` with rows of four, (n,4)."""
+    take_rows(permutation, rhs, work)
+    eliminate(blocks, work, FOUR)
+    substitute(blocks, work, FOUR)
+    put_rows(permutation, work, out)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.models.cloth.contact.detection import find_proximity, out_of_reach
+from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 
 
@@ -23,3 +24,21 @@ def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
     if gap.min() <= distance:
         assert not out_of_reach(x, bodies, distance)
     assert out_of_reach(x, Obstacles.none(), distance)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 9))
+@settings(deadline=None)
+def test_nearest_capsule_is_the_nearest_of_all(seed, count):
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, count, 3))
+    b[::3] = a[::3]
+    radius = rng.uniform(0.01, 1.0, count)
+    x = rng.normal(size=(40, 3)).cumsum(axis=0) * 0.3
+    gap, owner = np.empty(40), np.empty(40, dtype=np.int32)
+    nearest_obstacle(x, Obstacles.resting(a, b, radius).packed, gap, owner)
+    way = b - a
+    along = np.einsum("ikc,kc->ik", x[:, None] - a, way)
+    t = np.clip(along / np.maximum((way**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    all_gaps = np.linalg.norm(x[:, None] - a - t[..., None] * way, axis=2) - radius
+    np.testing.assert_array_equal(owner, all_gaps.argmin(axis=1))
+    np.testing.assert_allclose(gap, all_gaps.min(axis=1), atol=1e-12)
