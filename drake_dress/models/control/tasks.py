@@ -30,6 +30,21 @@ _NEXT = 0.04
 
 
 @dataclass(frozen=True)
+class Approach:
+    """A way to go about a hand; shares are between inward across the body (0) and forearm (1).
+
+    Attributes:
+        share: of the direction in which an armhole is drawn over the hand.
+        orientation: of the direction from the armhole to the garment's entry.
+        emphasis: factor on Q.
+    """
+
+    share: float
+    orientation: float
+    emphasis: float = 1.0
+
+
+@dataclass(frozen=True)
 class TaskParameters:
     """Where sleeves are asked to go.
 
@@ -38,9 +53,7 @@ class TaskParameters:
         approach_distance: cap of l_h, m.
         tethered_approach_distance: the same with the other sleeve on, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
-        approach_share: direction in which an armhole is drawn over the hand, between inward across
-            the body (0) and the forearm (1).
-        orientation_share: direction from the armhole to the garment's entry, likewise.
+        approaches: how a hand is gone about; after each attempt that missed it the next, in turn.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
@@ -62,8 +75,12 @@ class TaskParameters:
     approach_distance: float = 0.20
     tethered_approach_distance: float = 0.15
     approach_slope: float = 3.0
-    approach_share: float = 0.25
-    orientation_share: float = 0.6
+    approaches: tuple[Approach, ...] = (
+        Approach(0.25, 0.6),
+        Approach(0.25, 0.75, 3.0),
+        Approach(0.25, 0.85, 3.0),
+        Approach(0.5, 0.85, 3.0),
+    )
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
@@ -143,11 +160,12 @@ class TaskPlanner:
         """
         p = self.parameters
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
+        missed = stages.attempts
         facts = (
-            self._facts(x, joints, axes[0], to, sleeves[0], 0),
-            self._facts(x, joints, axes[1], to, sleeves[1], 1),
+            self._facts(x, joints, axes[0], to, sleeves[0], 0, missed[0]),
+            self._facts(x, joints, axes[1], to, sleeves[1], 1, missed[1]),
         )
-        goals = [self._waypoint(axes[i], to, facts[i], i) for i in (0, 1)]
+        goals = [self._waypoint(axes[i], to, facts[i], i, missed[i]) for i in (0, 1)]
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(stages, facts, p.stages, distance, time)
         return stages, Assignment(
@@ -194,16 +212,29 @@ class TaskPlanner:
             self._target(assignment, 1, axes, headings, sleeves, time_step),
         )
 
-    def _approach_direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
-        """Returns the unit vector along which an armhole is drawn over the hand."""
-        return _between(_inward(to, side), axis.D(0.0), self.parameters.approach_share)
+    def _approach(self, attempts: int) -> Approach:
+        """Returns how to go about a hand that was missed so often.
 
-    def _waypoint(self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int) -> FloatArray:
+        What misses a hand once mostly misses it again: an arm that another approach suits gets it.
+        """
+        ways = self.parameters.approaches
+        return ways[attempts % len(ways)]
+
+    def _approach_direction(
+        self, axis: ArmAxis, to: Heading, side: int, attempts: int
+    ) -> FloatArray:
+        """Returns the unit vector along which an armhole is drawn over the hand."""
+        return _between(_inward(to, side), axis.D(0.0), self._approach(attempts).share)
+
+    def _waypoint(
+        self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int, attempts: int
+    ) -> FloatArray:
         """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + _NEXT))
-        return axis.G(0.0) - p.approach_distance * self._approach_direction(axis, to, side)
+        direction = self._approach_direction(axis, to, side, attempts)
+        return axis.G(0.0) - p.approach_distance * direction
 
     def _facts(
         self,
@@ -213,6 +244,7 @@ class TaskPlanner:
         to: Heading,
         sleeve: SleeveState,
         side: int,
+        attempts: int,
     ) -> SleeveFacts:
         shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
         interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
@@ -221,7 +253,7 @@ class TaskPlanner:
         )
         s, _, _ = axis.coordinates(sleeve.p_c)
         offset = hand - sleeve.p_c
-        aside = _aside(offset, self._approach_direction(axis, to, side))
+        aside = _aside(offset, self._approach_direction(axis, to, side, attempts))
         sight = free_sight(x, self.mesh.faces, self.armholes[side], hand)
         return SleeveFacts(
             linked=linked,
@@ -255,7 +287,7 @@ class TaskPlanner:
         """
         p = self.parameters
         hand = axis.G(0.0)
-        direction = self._approach_direction(axis, to, side)
+        direction = self._approach_direction(axis, to, side, attempts)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
@@ -293,6 +325,7 @@ class TaskPlanner:
         facts, attempts = given.facts, given.attempts
         task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
         position, direction = np.empty((n, 3)), np.empty((n, 3))
+        way = self._approach(attempts[side])
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
@@ -307,7 +340,7 @@ class TaskPlanner:
                     given.retreat[side],
                     attempts[side],
                 )
-                direction[j] = _between(_inward(to, side), axis.D(0.0), p.orientation_share)
+                direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * time_step * step
@@ -325,7 +358,7 @@ class TaskPlanner:
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
-            return SleeveTarget(position, direction, entering=True)
+            return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
         return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:

@@ -86,3 +86,33 @@ def test_a_sleeve_that_is_on_no_arm_makes_no_progress(planner: TaskPlanner) -> N
     given = Assignment((Task.PREPARE, Task.PREPARE), (off, off))
     sleeves = [SleeveState(axis.G(0.7), axis.D(0.7)) for axis in arm_axes(joints())]
     assert planner.renewed(given, sleeves, joints()).facts == (off, off)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_hand_that_was_missed_is_gone_about_in_other_ways(
+    planner: TaskPlanner, side: int
+) -> None:
+    ways = planner.parameters.approaches
+    x = planner.mesh.rest_position + [-0.4, 0.0, 0.9]
+    forearm = arm_axes(joints())[side].D(0.0)
+
+    def asked(attempts: int) -> tuple[SleeveFacts, SleeveTarget]:
+        missed = (attempts, 0) if side == 0 else (0, attempts)
+        _, seen = planner.assign(StageState(attempts=missed), x, joints(), 0.0)
+        given = Assignment((Task.PREPARE, Task.PREPARE), seen.facts, attempts=missed)
+        rows = np.stack([joints()] * (HORIZON + 1))
+        found = planner.targets(given, planner.sleeves(x), rows, STEP)
+        return seen.facts[side], found[side]
+
+    facts, targets = zip(*(asked(k) for k in range(len(ways) + 1)), strict=True)
+    along = [float(t.direction[0] @ forearm) for t in targets]
+    for k, (way, target) in enumerate(zip(ways, targets, strict=False)):
+        assert target.direction_weight == way.emphasis
+        for j, other in enumerate(ways):
+            assert (along[k] < along[j]) == (way.orientation < other.orientation)
+            # the line on which the hand is met is another one
+            if way.share != other.share:
+                assert abs(facts[k].prepared_error - facts[j].prepared_error) > 1e-3
+    # all were tried: the first again
+    np.testing.assert_array_equal(targets[-1].direction, targets[0].direction)
+    assert facts[-1] == facts[0]
