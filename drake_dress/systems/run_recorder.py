@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 
 from drake_dress.models.dressing.coordinates import ArmAxis
-from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
@@ -102,7 +102,7 @@ class RunRecorder(LeafSystem):
         x = value("garment_position").reshape(-1, 3)
         joints = value("joint_position").reshape(6, 3)
         poses = self.GetInputPort("body_poses").Eval(context)
-        interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
+        interior = torso_interior(joints[0], joints[3])
         dressing = {}
         for i, side in enumerate(SIDES):
             axis = ArmAxis(hand=joints[3 * i + 2], elbow=joints[3 * i + 1], shoulder=joints[3 * i])

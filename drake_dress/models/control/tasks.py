@@ -10,7 +10,7 @@ import numpy as np
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.dressing.coordinates import ArmAxis
-from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sight import free_sight
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.dressing.stages import (
@@ -247,7 +247,7 @@ class TaskPlanner:
         attempts: int,
     ) -> SleeveFacts:
         shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
-        interior = 0.5 * (joints[0] + joints[3]) - np.array([0.0, 0.0, 0.1])
+        interior = torso_interior(joints[0], joints[3])
         linked = (
             abs(arm_linking_number(x[self.armholes[side]], shoulder, elbow, hand, interior)) == 1
         )

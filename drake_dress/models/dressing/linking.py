@@ -81,6 +81,15 @@ def arm_linking_number(
     return sum(_passages(loop, apex, p, q) for p, q in zip(line[:-1], line[1:], strict=True))
 
 
+def torso_interior(left_shoulder: FloatArray, right_shoulder: FloatArray) -> FloatArray:
+    """Returns a point (3,) in the torso where both arms' centre lines may end, m.
+
+    It lies 10 cm below the middle of the shoulder joints (3,), m, of a person who stands or sits.
+    """
+    middle: FloatArray = 0.5 * (left_shoulder + right_shoulder) - np.array([0.0, 0.0, 0.1])
+    return middle
+
+
 def _apex(loop: FloatArray, line: FloatArray) -> FloatArray:
     """Returns the apex (3,) of the fan: the loop's centre, but not on the arm's line.
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.dressing.linking import arm_linking_number
+from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sleeve import sleeve_state
 from drake_dress.models.human.arm import Arm
 
 FloatArray = npt.NDArray[np.float64]
 
-
-# The arm's centre line ends this far below the middle of the shoulders, m.
-_INTERIOR = np.array([0.0, 0.0, -0.1])
+# From a point to its mirror image across the torso's middle plane.
+_MIRROR = np.array([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Armhole:
     def is_entered(self) -> bool:
         """Returns whether the arm is through it (linking number ±1)."""
         shoulder, elbow, hand = self.joints
-        interior = shoulder * np.array([1.0, 0.0, 1.0]) + _INTERIOR
+        interior = torso_interior(shoulder, _MIRROR * shoulder)
         return abs(arm_linking_number(self.loop, shoulder, elbow, hand, interior)) == 1
 
     @property
