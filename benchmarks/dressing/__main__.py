@@ -16,7 +16,7 @@ from typing import Any
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import read_results, seed_range, write_results
-from benchmarks.parser import INTERRUPTED, OneLineParser
+from benchmarks.parser import INTERRUPTED, OneLineParser, some_of
 from drake_dress.discrepancy.results import write_text
 from drake_dress.interrupt import caught_interrupt
 
@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, known in (("methods", METHODS), ("persons", PERSONS), ("coats", COATS)):
         parser.add_argument(
             f"--{name}",
-            type=_some_of(tuple(known)),
+            type=some_of(tuple(known)),
             default=list(known),
             metavar="NAME,…",
             help=", ".join(known),
@@ -78,17 +78,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="s, l and force over time, SVG")
     return parser
-
-
-def _some_of(known: Sequence[str]):  # type: ignore[no-untyped-def]
-    def parse(text: str) -> list[str]:
-        names = text.split(",")
-        for name in names:
-            if name not in known:
-                raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(known)}")
-        return names
-
-    return parse
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from typing import Any
 from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser
+from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
@@ -147,7 +147,11 @@ def _line(result: dict[str, Any]) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench explain", description=__doc__)
     parser.add_argument(
-        "--only", type=_groups, default=list(GROUPS), metavar="GROUP,…", help=", ".join(GROUPS)
+        "--only",
+        type=some_of(GROUPS),
+        default=list(GROUPS),
+        metavar="GROUP,…",
+        help=", ".join(GROUPS),
     )
     parser.add_argument("--draws", type=int, help="of each; default 4, 40, 20, 10 and 4")
     parser.add_argument("--seed", type=int, default=1000, help="of the first draw")
@@ -210,14 +214,6 @@ def _around(path: Path) -> tuple[str, str]:
     if content.count(BEGIN) != 1 or content.count(END) != 1 or END not in rest:
         raise UserError(str(path), "", f"expected one {BEGIN}, and one {END} after it")
     return before, after
-
-
-def _groups(text: str) -> list[str]:
-    names = text.split(",")
-    for name in names:
-        if name not in GROUPS:
-            raise argparse.ArgumentTypeError(f"{name} is no group, expected {', '.join(GROUPS)}")
-    return names
 
 
 if __name__ == "__main__":

@@ -55,24 +55,17 @@ def times(typing_context: Any, s: Any, a: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def less(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
     """Returns a − s b."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pairs = zip(
-            cgutils.unpack_tuple(builder, args[0]),
-            cgutils.unpack_tuple(builder, args[2]),
-            strict=True,
-        )
-        values = [
-            builder.fsub(p, builder.fmul(args[1], q, flags=_FUSED), flags=_FUSED) for p, q in pairs
-        ]
-        return context.make_tuple(builder, a, values)
-
-    return a(a, s, b), generate
+    return a(a, s, b), _fused("fsub")
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def more(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
     """Returns a + s b."""
+    return a(a, s, b), _fused("fadd")
+
+
+def _fused(operation: str) -> Any:
+    """Returns what generates `a` fsub or fadd `s b`, with one rounding."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         pairs = zip(
@@ -80,12 +73,13 @@ def more(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
             cgutils.unpack_tuple(builder, args[2]),
             strict=True,
         )
+        combined = getattr(builder, operation)
         values = [
-            builder.fadd(p, builder.fmul(args[1], q, flags=_FUSED), flags=_FUSED) for p, q in pairs
+            combined(p, builder.fmul(args[1], q, flags=_FUSED), flags=_FUSED) for p, q in pairs
         ]
-        return context.make_tuple(builder, a, values)
+        return context.make_tuple(builder, signature.args[0], values)
 
-    return a(a, s, b), generate
+    return generate
 
 
 def _places(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
