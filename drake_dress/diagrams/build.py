@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -107,13 +108,7 @@ def local_setup(scenario: schema.Scenario, policy: DressingPolicy) -> LocalSetup
         return None
     values = scenario.controller.local
     parameters = LocalParameters(
-        time_step=values.time_step,
-        horizon=values.horizon,
-        position=values.position,
-        speed=values.speed,
-        max_speed=values.max_speed,
-        beside=values.beside,
-        beside_speed=values.beside_speed,
+        **{f.name: getattr(values, f.name) for f in fields(LocalParameters) if f.name in vars(values)}
     )
     solvers = {"constrained_ddp": constrained_ddp, "cone": cone_programme}
     return LocalSetup(

@@ -269,6 +269,7 @@ class Local:
     position: float = 1.0  # weight of sleeves
     speed: float = 0.1  # weight of the grippers' speed, s²/m² of a step
     max_speed: float = 0.12  # of a gripper, m/s
+    stretch: float = 1.0  # share of the distances that the garment reaches, that is used
     beside: float = 0.04  # that a dressed sleeve may be beside its target, m
     beside_speed: float = 0.05  # that it may move beside its arm, m/s
     feedback: bool = True  # corrects between solves by the solution's gains
@@ -478,6 +479,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "local.position": (0.0, 1e6),
     "local.speed": (1e-6, 1e6),
     "local.max_speed": (0.001, 1.0),
+    "local.stretch": (0.1, 1.0),
     "local.beside": (0.001, 1.0),
     "local.beside_speed": (0.001, 10.0),
     "weights.position": (0.0, 1e6),

@@ -45,14 +45,14 @@ class Settings:
             interior point method is asked.
         max_sweeps: such passes after it.
         max_halvings: of a step that does not lower cost and excess.
-        max_interior_steps: of the interior point method.
+        max_interior_steps: of the interior point method; from a guess a third of them.
         tolerance: at which that one ends, see `interior_point`.
     """
 
     warm_sweeps: int = 4
     max_sweeps: int = 20
     max_halvings: int = 12
-    max_interior_steps: int = 60
+    max_interior_steps: int = 120
     tolerance: float = 1e-8
 
 
@@ -100,21 +100,30 @@ def solve_constrained_ddp(
     solve: Any = _solve
     start_inside: Any = interior_point
     sweeps, interior, converged = 0, 0, False
+    starts = [np.zeros_like(v)] if guess is None else [v.copy(), np.zeros_like(v)]
     if state_multiplier is not None:
         sweeps, converged = solve(
             integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
             settings.warm_sweeps, settings.max_halvings,
         )  # fmt: skip
+        # of bounds that only just leave room sweeps may end on multipliers beyond all measure
+        converged = converged and max(lx.max(initial=0.0), lv.max(initial=0.0)) <= p.price
     if not converged:
-        together = (
+        together = [
             np.concatenate([a[1:], c], axis=1) for a, c in zip(on_states, on_inputs, strict=True)
-        )
+        ]
         n_x, n_v = len(lx[0]), len(lv[0])
         multiplier, excess = np.empty((steps, n_x + n_v)), np.empty((steps, n_x + n_v))
-        interior, near = start_inside(
-            *costs, *together, n_x, v, u, multiplier, excess, p.price,
-            settings.max_interior_steps, settings.tolerance,
-        )  # fmt: skip
+        near = False
+        for start in starts:
+            v[:] = start
+            most = settings.max_interior_steps // (1 if start is starts[-1] else 3)
+            iterations, near = start_inside(
+                *costs, *together, n_x, v, u, multiplier, excess, p.price, most, settings.tolerance
+            )  # fmt: skip
+            interior += iterations
+            if near:
+                break
         lx[1:], lv[:] = multiplier[:, :n_x], multiplier[:, n_x:]
         if near:
             # bounds that nothing keeps are widened by as little as can be
@@ -128,7 +137,11 @@ def solve_constrained_ddp(
             sweeps += more
             if not converged:
                 v, lx, lv = inside
-                converged = True
+            elif max(lx.max(initial=0.0), lv.max(initial=0.0)) > p.price:
+                _, lx, lv = inside
+            converged = True
+        elif not np.isfinite(v).all():
+            v[:], lx[:], lv[:] = 0.0, 0.0, 0.0
     return LocalSolution(
         v, p.states(v), lx, lv, p.cost(v), p.violation(v), sweeps, interior, bool(converged)
     )

@@ -263,8 +263,8 @@ def _resampled(rows: FloatArray, step: float, p: LocalParameters) -> FloatArray:
 
 
 def _shifted(state: LocalState, time: float, p: LocalParameters) -> LocalSolution | None:
-    """Returns the solution before as it goes on from now, to start from; None if it is too old."""
-    if state.solution is None:
+    """Returns the solution before as it goes on from now; None if it is too old or none at all."""
+    if state.solution is None or not state.solution.converged:
         return None
     steps = int(np.floor((time - state.start) / p.time_step + 0.5))
     if not 0 <= steps < p.horizon:

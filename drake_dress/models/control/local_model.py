@@ -45,6 +45,8 @@ class LocalParameters:
         beside: how far the armhole of a dressed sleeve may be beside its arm, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
         return_speed: at which bounds that are exceeded now come back, m/s.
+        stretch: share of the distances that the garment reaches, φ_c and φ_f, that is used: a garment
+            drawn taut is pulled by both arms.
         taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
         coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
             they are no longer.
@@ -58,6 +60,7 @@ class LocalParameters:
     beside: float = 0.04
     beside_speed: float = 0.05
     return_speed: float = 0.05
+    stretch: float = 1.0
     taut_share: float = 0.8
     coupled_share: float = 0.85
     released_share: float = 0.8
@@ -156,7 +159,8 @@ def local_problem(
     radius = np.full((n + 1, 6), np.inf)
     matrix[:, :4] = _PAIRS
     offset[:, :4] = np.einsum("kab,tb->tka", matrix[0, :4], where)
-    radius[:, :4] = [*reach.to_far_gripper, reach.between_sleeves, reach.between_grippers]
+    distances = [*reach.to_far_gripper, reach.between_sleeves, reach.between_grippers]
+    radius[:, :4] = p.stretch * np.array(distances)
     moving, moved = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
     limit = np.full((n, 4), np.inf)
     for i, goal in enumerate(goals):

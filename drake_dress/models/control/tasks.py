@@ -43,6 +43,10 @@ class Approach:
     orientation: float
     emphasis: float = 1.0
 
+    def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
+        """Returns the unit vector along which an armhole is drawn over the hand."""
+        return _between(_inward(to, side), axis.D(0.0), self.share)
+
 
 @dataclass(frozen=True)
 class TaskParameters:
@@ -54,6 +58,7 @@ class TaskParameters:
         tethered_approach_distance: the same with the other sleeve on, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
         approaches: how a hand is gone about; after each attempt that missed it the next, in turn.
+        tethered_approaches: the same with the other sleeve on.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
@@ -81,6 +86,7 @@ class TaskParameters:
         Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
+    tethered_approaches: tuple[Approach, ...] = approaches
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
@@ -161,11 +167,13 @@ class TaskPlanner:
         p = self.parameters
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
         missed = stages.attempts
+        linked = [self._linked(x, joints, side) for side in (0, 1)]
+        ways = [self._approach(missed[i], linked[1 - i]) for i in (0, 1)]
         facts = (
-            self._facts(x, joints, axes[0], to, sleeves[0], 0, missed[0]),
-            self._facts(x, joints, axes[1], to, sleeves[1], 1, missed[1]),
+            self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
+            self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
         )
-        goals = [self._waypoint(axes[i], to, facts[i], i, missed[i]) for i in (0, 1)]
+        goals = [self._waypoint(axes[i], to, facts[i], i, ways[i]) for i in (0, 1)]
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(stages, facts, p.stages, distance, time)
         return stages, Assignment(
@@ -212,29 +220,29 @@ class TaskPlanner:
             self._target(assignment, 1, axes, headings, sleeves, time_step),
         )
 
-    def _approach(self, attempts: int) -> Approach:
+    def _approach(self, attempts: int, tethered: bool) -> Approach:
         """Returns how to go about a hand that was missed so often.
 
         What misses a hand once mostly misses it again: an arm that another approach suits gets it.
         """
-        ways = self.parameters.approaches
+        ways = self.parameters.tethered_approaches if tethered else self.parameters.approaches
         return ways[attempts % len(ways)]
 
-    def _approach_direction(
-        self, axis: ArmAxis, to: Heading, side: int, attempts: int
-    ) -> FloatArray:
-        """Returns the unit vector along which an armhole is drawn over the hand."""
-        return _between(_inward(to, side), axis.D(0.0), self._approach(attempts).share)
+    def _linked(self, x: FloatArray, joints: FloatArray, side: int) -> bool:
+        """Returns whether an arm passes through its armhole."""
+        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
+        interior = torso_interior(joints[0], joints[3])
+        loop = x[self.armholes[side]]
+        return abs(arm_linking_number(loop, shoulder, elbow, hand, interior)) == 1
 
     def _waypoint(
-        self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int, attempts: int
+        self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int, way: Approach
     ) -> FloatArray:
         """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + _NEXT))
-        direction = self._approach_direction(axis, to, side, attempts)
-        return axis.G(0.0) - p.approach_distance * direction
+        return axis.G(0.0) - p.approach_distance * way.direction(axis, to, side)
 
     def _facts(
         self,
@@ -244,16 +252,13 @@ class TaskPlanner:
         to: Heading,
         sleeve: SleeveState,
         side: int,
-        attempts: int,
+        linked: bool,
+        way: Approach,
     ) -> SleeveFacts:
-        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
-        interior = torso_interior(joints[0], joints[3])
-        linked = (
-            abs(arm_linking_number(x[self.armholes[side]], shoulder, elbow, hand, interior)) == 1
-        )
+        _, elbow, hand = joints[3 * side : 3 * side + 3]
         s, _, _ = axis.coordinates(sleeve.p_c)
         offset = hand - sleeve.p_c
-        aside = _aside(offset, self._approach_direction(axis, to, side, attempts))
+        aside = _aside(offset, way.direction(axis, to, side))
         sight = free_sight(x, self.mesh.faces, self.armholes[side], hand)
         return SleeveFacts(
             linked=linked,
@@ -287,7 +292,7 @@ class TaskPlanner:
         """
         p = self.parameters
         hand = axis.G(0.0)
-        direction = self._approach_direction(axis, to, side, attempts)
+        direction = self._approach(attempts, tethered).direction(axis, to, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
@@ -325,7 +330,7 @@ class TaskPlanner:
         facts, attempts = given.facts, given.attempts
         task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
         position, direction = np.empty((n, 3)), np.empty((n, 3))
-        way = self._approach(attempts[side])
+        way = self._approach(attempts[side], facts[1 - side].linked)
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]

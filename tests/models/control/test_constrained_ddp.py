@@ -109,6 +109,23 @@ def test_a_solution_is_its_own_start(seed: int) -> None:
     np.testing.assert_allclose(again.v, s.v, atol=1e-5)
 
 
+@given(seed=seeds, size=st.sampled_from([1e-3, 1.0, 1e3, 1e6]))
+@settings(max_examples=20, deadline=None)
+def test_the_optimum_does_not_depend_on_the_start(seed: int, size: float) -> None:
+    p = drawn(seed)
+    best = solve_constrained_ddp(p)
+    rng = np.random.default_rng(seed)
+    s = solve_constrained_ddp(
+        p,
+        size * rng.standard_normal(best.v.shape),
+        size * rng.standard_normal(best.state_multiplier.shape),
+        size * rng.standard_normal(best.input_multiplier.shape),
+    )
+    assert s.converged
+    assert s.violation < 1e-6
+    assert s.cost == pytest.approx(best.cost, rel=1e-4)
+
+
 @given(seed=seeds)
 @settings(max_examples=10, deadline=None)
 def test_gains_are_the_derivative_of_the_first_input_by_the_state(seed: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -115,6 +117,8 @@ def test_without_anything_planned_it_rests(controller: LocalController) -> None:
 
 
 def test_left_to_itself_it_goes_for_the_targets(controller: LocalController) -> None:
+    # the garment hangs a little wider than it is drawn by default
+    controller = replace(controller, parameters=replace(P, stretch=1.0))
     x, _, armholes = seen(controller)
     given = Assignment((Task.PREPARE, Task.REST), (OFF, OFF))
     plan = GlobalPlan(0.0, 0.1, np.zeros((8, 2, 3)), np.tile(armholes, (9, 1, 1)), given)
@@ -127,6 +131,22 @@ def test_left_to_itself_it_goes_for_the_targets(controller: LocalController) -> 
     apart = np.linalg.norm(local.state[:, 6:9] - local.state[:, 9:], axis=1)
     assert apart.max() <= max(controller.reach.between_grippers, apart[0]) + 1e-6
     assert np.linalg.norm(local.velocity[0, 1]) < 0.5 * P.max_speed
+
+
+@pytest.mark.parametrize("stretch", [0.8, 0.9])
+def test_a_garment_drawn_wider_than_asked_is_let_together(
+    controller: LocalController, stretch: float
+) -> None:
+    controller = replace(controller, parameters=replace(P, stretch=stretch))
+    _, _, armholes = seen(controller)
+    given = Assignment((Task.PREPARE, Task.REST), (OFF, OFF))
+    plan = GlobalPlan(0.0, 0.1, np.zeros((8, 2, 3)), np.tile(armholes, (9, 1, 1)), given)
+    local = solve(controller, plan).plan
+    apart = np.linalg.norm(local.state[:, 6:9] - local.state[:, 9:], axis=1)
+    allowed = stretch * controller.reach.between_grippers
+    assert apart[0] > allowed
+    time = P.time_step * np.arange(len(apart))
+    assert (apart <= np.maximum(allowed, apart[0] - P.return_speed * time) + 1e-6).all()
 
 
 def test_between_solves_the_gains_correct_and_speed_stays_bounded(
