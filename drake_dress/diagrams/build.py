@@ -108,7 +108,11 @@ def local_setup(scenario: schema.Scenario, policy: DressingPolicy) -> LocalSetup
         return None
     values = scenario.controller.local
     parameters = LocalParameters(
-        **{f.name: getattr(values, f.name) for f in fields(LocalParameters) if f.name in vars(values)}
+        **{
+            f.name: getattr(values, f.name)
+            for f in fields(LocalParameters)
+            if f.name in vars(values)
+        }
     )
     solvers = {"constrained_ddp": constrained_ddp, "cone": cone_programme}
     return LocalSetup(

@@ -45,8 +45,8 @@ class LocalParameters:
         beside: how far the armhole of a dressed sleeve may be beside its arm, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
         return_speed: at which bounds that are exceeded now come back, m/s.
-        stretch: share of the distances that the garment reaches, φ_c and φ_f, that is used: a garment
-            drawn taut is pulled by both arms.
+        stretch: share of the distances that the garment reaches, φ_c and φ_f, that is used: a
+            garment drawn taut is pulled by both arms.
         taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
         coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
             they are no longer.
