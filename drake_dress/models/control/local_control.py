@@ -195,7 +195,7 @@ class LocalController:
             p.time_step,
             velocity,
             base + found.x,
-            feedback_gains(problem, found),
+            _bounded(feedback_gains(problem, found), 1.0 / p.time_step),
             p.max_speed,
         )
         return LocalOutcome(LocalState(found, time, coupled), local, problem)
@@ -251,6 +251,21 @@ def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> Loca
     return solve_constrained_ddp(
         problem, before.v, before.state_multiplier, before.input_multiplier
     )
+
+
+def _bounded(gain: FloatArray, most: float) -> FloatArray:
+    """Returns gains (N,6,12), those of a step scaled to a spectral norm of at most `most`, 1/s.
+
+    To be back in a step is the most that can be asked. Bounds that only just leave room ask for
+    any gain at all, as the smallest change moves what is active far along them.
+    """
+    size = np.linalg.norm(gain, axis=(1, 2))
+    if not (size > most).any() and np.isfinite(size).all():
+        return gain
+    known = np.where(np.isfinite(size)[:, None, None], gain, 0.0)
+    spectral = np.linalg.norm(known, ord=2, axis=(1, 2))
+    bounded: FloatArray = known * (most / np.maximum(spectral, most))[:, None, None]
+    return bounded
 
 
 def _resampled(rows: FloatArray, step: float, p: LocalParameters) -> FloatArray:

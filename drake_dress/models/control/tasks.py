@@ -63,6 +63,8 @@ class TaskParameters:
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         widening: growth of the cap of l_h with each attempt that missed the hand.
+        tethered_reach: share of the distance between both armholes at rest that a sleeve is asked
+            to be from the other one, which is on its arm, at most.
         least_sight: share of an opening that the hand has to see for it to be drawn over.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
@@ -91,6 +93,7 @@ class TaskParameters:
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     widening: float = 0.1
+    tethered_reach: float = 2.0
     least_sight: float = 0.5
     aside_free: float = 0.02
     overshoot: float = 0.12
@@ -317,6 +320,12 @@ class TaskPlanner:
             goal = hand - cap * direction - min(wait, behind) * to.front
         return goal
 
+    def _within_reach(self, goal: FloatArray, other: FloatArray) -> FloatArray:
+        """Returns the place nearest to a goal that is within reach of the other armhole, m."""
+        apart = float(np.linalg.norm(goal - other))
+        share = min(1.0, self.parameters.tethered_reach * self._reach / apart)
+        return other + share * (goal - other)
+
     def _target(
         self,
         given: Assignment,
@@ -345,6 +354,8 @@ class TaskPlanner:
                     given.retreat[side],
                     attempts[side],
                 )
+                if facts[1 - side].linked:
+                    position[j] = self._within_reach(position[j], sleeves[1 - side].p_c)
                 direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
             if task == Task.DRESS:

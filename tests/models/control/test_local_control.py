@@ -11,9 +11,11 @@ from drake_dress.models.control.local_control import (
     GlobalPlan,
     LocalController,
     LocalState,
+    constrained_ddp,
     continued,
 )
 from drake_dress.models.control.local_model import LocalParameters
+from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
 from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner
 from drake_dress.models.dressing.stages import SleeveFacts, Task
 from drake_dress.models.garment.coat import CoatParameters, make_coat
@@ -147,6 +149,19 @@ def test_a_garment_drawn_wider_than_asked_is_let_together(
     assert apart[0] > allowed
     time = P.time_step * np.arange(len(apart))
     assert (apart <= np.maximum(allowed, apart[0] - P.return_speed * time) + 1e-6).all()
+
+
+def test_gains_ask_for_no_more_than_to_be_back_in_a_step(controller: LocalController) -> None:
+    def opposed(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
+        # the bound on one gripper's speed as active as that on where it is
+        found = constrained_ddp(problem, before)
+        both = np.full_like(found.state_multiplier, 1e3), np.full_like(found.input_multiplier, 1e3)
+        return replace(found, state_multiplier=both[0], input_multiplier=both[1])
+
+    controller = replace(controller, solver=opposed)
+    local = solve(controller, plan_of(controller, np.zeros((2, 3)), seen(controller)[2])).plan
+    assert np.isfinite(local.gain).all()
+    assert np.linalg.norm(local.gain, ord=2, axis=(1, 2)).max() <= 1.0 / P.time_step + 1e-9
 
 
 def test_between_solves_the_gains_correct_and_speed_stays_bounded(
