@@ -37,11 +37,13 @@ class Approach:
         share: of the direction in which an armhole is drawn over the hand.
         orientation: of the direction from the armhole to the garment's entry.
         emphasis: factor on Q.
+        distance: factor on how far outside of the hand and behind it a sleeve is prepared.
     """
 
     share: float
     orientation: float
     emphasis: float = 1.0
+    distance: float = 1.0
 
     def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector along which an armhole is drawn over the hand."""
@@ -63,15 +65,18 @@ class TaskParameters:
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         widening: growth of the cap of l_h with each attempt that missed the hand.
-        tethered_reach: share of the distance between both armholes at rest that a sleeve is asked
-            to be from the other one, which is on its arm, at most.
         least_sight: share of an opening that the hand has to see for it to be drawn over.
+        clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
+            the hand is before the opening.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
         inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
+        waiting_weight: factor on W of a waiting sleeve.
+        waiting_aside: how far a waiting sleeve goes beside its arm, and draws it along, for the
+            other sleeve to reach its place, m.
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
             armpit, and both sleeves would pull against each other.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
@@ -93,13 +98,15 @@ class TaskParameters:
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     widening: float = 0.1
-    tethered_reach: float = 2.0
     least_sight: float = 0.5
+    clear_sight: float = 0.9
     aside_free: float = 0.02
     overshoot: float = 0.12
     inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
+    waiting_weight: float = 1.0
+    waiting_aside: float = 0.15
     final_progress: float = 1.99
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
@@ -266,6 +273,7 @@ class TaskPlanner:
         return SleeveFacts(
             linked=linked,
             in_sight=sight >= self.parameters.least_sight,
+            clear=_ramp(sight, self.parameters.least_sight, self.parameters.clear_sight),
             s=float(s) if linked else 0.0,
             hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
@@ -278,9 +286,9 @@ class TaskPlanner:
         axis: ArmAxis,
         to: Heading,
         sleeve: SleeveState,
+        fact: SleeveFacts,
         side: int,
         tethered: bool,
-        in_sight: bool,
         retreat: bool = False,
         attempts: int = 0,
     ) -> FloatArray:
@@ -295,24 +303,28 @@ class TaskPlanner:
         """
         p = self.parameters
         hand = axis.G(0.0)
-        direction = self._approach(attempts, tethered).direction(axis, to, side)
+        way = self._approach(attempts, tethered)
+        direction = way.direction(axis, to, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
         beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
-        facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if in_sight else 0.0
+        facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if fact.in_sight else 0.0
+        if tethered:
+            facing = max(facing, fact.clear)
         inside = facing * _ramp(depth, -0.02, 0.02)
         aside = (1.0 - facing) * _aside(offset, direction)
         cap = p.tethered_approach_distance if tethered else p.approach_distance
-        cap *= 1.0 + p.widening * min(attempts, 3)
+        cap *= way.distance * (1.0 + p.widening * min(attempts, 3))
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
-        if not in_sight:
+        if not fact.in_sight:
             distance = cap
         if retreat:
             return hand - cap * direction - p.retreat_distance * to.front
         onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
+        behind *= way.distance
         if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
             error = error - to.front * (to.front @ error)
@@ -320,11 +332,17 @@ class TaskPlanner:
             goal = hand - cap * direction - min(wait, behind) * to.front
         return goal
 
-    def _within_reach(self, goal: FloatArray, other: FloatArray) -> FloatArray:
-        """Returns the place nearest to a goal that is within reach of the other armhole, m."""
-        apart = float(np.linalg.norm(goal - other))
-        share = min(1.0, self.parameters.tethered_reach * self._reach / apart)
-        return other + share * (goal - other)
+    def _waiting_place(self, place: FloatArray, other: FloatArray) -> FloatArray:
+        """Returns where on or beside its arm, at `place` (3,), m, a sleeve waits.
+
+        Arms hang further apart than the coat is wide. A sleeve that keeps to its arm then pulls
+        against the other one through the coat, with all that grippers may; an arm that is drawn
+        along to meet it takes a few newtons.
+        """
+        way = other - place
+        apart = float(np.linalg.norm(way))
+        lacking = apart - self.parameters.waiting_reach * self._reach
+        return place + way / apart * min(max(0.0, lacking), self.parameters.waiting_aside)
 
     def _target(
         self,
@@ -348,14 +366,12 @@ class TaskPlanner:
                     axis,
                     to,
                     sleeves[side],
+                    facts[side],
                     side,
                     facts[1 - side].linked,
-                    facts[side].in_sight,
                     given.retreat[side],
                     attempts[side],
                 )
-                if facts[1 - side].linked:
-                    position[j] = self._within_reach(position[j], sleeves[1 - side].p_c)
                 direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
             if task == Task.DRESS:
@@ -366,16 +382,19 @@ class TaskPlanner:
             else:
                 k = 1 - side
                 other = self._prepared(
-                    axes[j + 1][k], to, sleeves[k], k, True, facts[k].in_sight, False, attempts[k]
+                    axes[j + 1][k], to, sleeves[k], facts[k], k, True, False, attempts[k]
                 )
                 s = self._waiting_progress(axis, other)
+                position[j], direction[j] = self._waiting_place(axis.G(s), other), axis.D(s)
+                continue
             s = min(p.final_progress, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
             return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
-        return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
+        weight = p.waiting_weight if task == Task.WAIT else 1.0
+        return SleeveTarget(position, direction, weight, direction_weight=p.dressing_direction)
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
         """Returns the largest s from which the garment reaches `other` (3,), m (J_w).

@@ -48,6 +48,7 @@ class SleeveFacts:
         passed: how far the armhole centre has gone past the hand toward the shoulder beside
             the arm, along the arm, m; 0 or less before the hand.
         in_sight: nothing of the garment hangs between hand and armhole.
+        clear: 0 to 1, how much more than that the hand sees of the opening.
         opening: inward part of the forearm's direction from hand to elbow, -1 to 1: how far the arm
             opens sideways.
     """
@@ -58,6 +59,7 @@ class SleeveFacts:
     prepared_error: float
     passed: float
     in_sight: bool = True
+    clear: float = 0.0
     opening: float = 0.0
 
 
