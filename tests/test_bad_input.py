@@ -99,7 +99,7 @@ BAD_YAML = {
     ),
     "soft limit over the hard one": (
         "safety: {soft_force_limit: 30}",
-        ["safety.soft_force_limit", "21"],
+        ["safety.soft_force_limit", "17"],
     ),
     "braking slower than accelerating": (
         "safety: {max_acceleration: 8}",

@@ -230,7 +230,7 @@ class Weights:
 
     position: float = 1.0
     direction: float = 0.05
-    speed: float = 0.5
+    speed: float = 0.125
     safety: float = 3e-4
     free_force: float = 5.0  # N
     separation: float = 1.0
@@ -246,13 +246,13 @@ class GlobalMpc:
 
     period: float = 0.5  # between solves, s
     delay: float = 0.2  # from what is seen to the use of the plan, s; a multiple of time_step
-    time_step: float = 0.1  # of the prediction, s
-    horizon: int = 7  # steps
+    time_step: float = 0.2  # of the prediction, s
+    horizon: int = 5  # steps
     max_iterations: int = 3  # gradient steps per solve
     inner_iterations: int = 8  # of the garment's linear solve; 1 is the paper's scheme
     max_speed: float = 0.12  # of a gripper, m/s
     weights: Weights = field(default_factory=Weights)
-    progress_step: float = 0.04  # advance of s asked for per step (k)
+    progress_step: float = 0.08  # advance of s asked for per step (k)
     approach_distance: float = 0.20  # cap of l_h, m
     waiting_progress: float = 0.3  # least s of a waiting sleeve
     force_limit: float | None = None  # deprecated, N: is safety.force_limit now
@@ -280,7 +280,7 @@ class Local:
 class Controller:
     """What the controllers believe and how they act."""
 
-    spacing: float = 0.028  # of the believed garment's mesh, m
+    spacing: float = 0.04  # of the believed garment's mesh, m
     material: Material = field(default_factory=Material)
     method: str = "global"  # global plan alone, local compensation alone, or full: both
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
@@ -305,7 +305,7 @@ class Safety:
     max_speed: float = 0.25  # of a gripper's command, m/s
     max_acceleration: float = 2.0  # the same, m/s²
     max_braking: float = 6.0  # where the other limits need it; never exceeded, m/s²
-    force_limit: float = 21.0  # no pulling from here on, N; beyond it grippers give way
+    force_limit: float = 17.0  # no pulling from here on, N; beyond it grippers give way
     soft_force_limit: float | None = None  # pulling fades from here on, N; half of it if empty
     force_filter_time: float = 0.05  # of the force's low-pass, s
     yield_rate: float = 0.005  # speed of giving way per force beyond the limit, m/s/N

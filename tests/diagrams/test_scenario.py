@@ -51,7 +51,7 @@ plant:
 controller:
   spacing: 0.04
   material: {stretch_stiffness: 80}
-  global_mpc: {period: 1.0, delay: 0.3, horizon: 4, weights: {direction: 0.1}}
+  global_mpc: {period: 1.0, delay: 0.3, time_step: 0.1, horizon: 4, weights: {direction: 0.1}}
   predictor: constant_velocity
   command_rate: 200.0
 safety:
@@ -111,7 +111,7 @@ def test_safety_group_reaches_the_limits(tmp_path: Path) -> None:
     assert limits.workspace is not None
     assert limits.workspace.tolist() == [[-2.0, -1.0, 0.5], [1.0, 1.0, 2.0]]
     defaults = safety_limits(load_scenario(write(tmp_path, "seed: 0")))
-    assert (defaults.soft_force, defaults.hard_force, defaults.workspace) == (10.5, 21.0, None)
+    assert (defaults.soft_force, defaults.hard_force, defaults.workspace) == (8.5, 17.0, None)
 
 
 def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:

@@ -114,8 +114,8 @@ class SafetyLimits:
     max_speed: float = 0.25
     max_acceleration: float = 2.0
     max_braking: float = 6.0
-    soft_force: float = 10.5
-    hard_force: float = 21.0
+    soft_force: float = 8.5
+    hard_force: float = 17.0
     filter_time: float = 0.05
     yield_rate: float = 0.005
     yield_speed: float = 0.1

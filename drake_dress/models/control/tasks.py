@@ -11,7 +11,7 @@ from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
-from drake_dress.models.dressing.sight import free_sight
+from drake_dress.models.dressing.sight import free_sight, move_into_sight
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.dressing.stages import (
     SleeveFacts,
@@ -37,13 +37,11 @@ class Approach:
         share: of the direction in which an armhole is drawn over the hand.
         orientation: of the direction from the armhole to the garment's entry.
         emphasis: factor on Q.
-        distance: factor on how far outside of the hand and behind it a sleeve is prepared.
     """
 
     share: float
     orientation: float
     emphasis: float = 1.0
-    distance: float = 1.0
 
     def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector along which an armhole is drawn over the hand."""
@@ -66,6 +64,8 @@ class TaskParameters:
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         widening: growth of the cap of l_h with each attempt that missed the hand.
         least_sight: share of an opening that the hand has to see for it to be drawn over.
+        outlook_distance: from the hand, within which a tethered sleeve goes where it is seen, m.
+        outlook_reach: share of the distance between both armholes at rest at which it stays then.
         clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
             the hand is before the opening.
         aside_free: distance beside that does not count, m.
@@ -74,9 +74,6 @@ class TaskParameters:
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
-        waiting_weight: factor on W of a waiting sleeve.
-        waiting_aside: how far a waiting sleeve goes beside its arm, and draws it along, for the
-            other sleeve to reach its place, m.
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
             armpit, and both sleeves would pull against each other.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
@@ -93,20 +90,25 @@ class TaskParameters:
         Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
-    tethered_approaches: tuple[Approach, ...] = approaches
+    tethered_approaches: tuple[Approach, ...] = (
+        Approach(0.25, 0.75, 3.0),
+        Approach(0.25, 0.6),
+        Approach(0.25, 0.85, 3.0),
+        Approach(0.5, 0.85, 3.0),
+    )
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     widening: float = 0.1
     least_sight: float = 0.5
+    outlook_distance: float = 0.35
+    outlook_reach: float = 1.04
     clear_sight: float = 0.9
     aside_free: float = 0.02
     overshoot: float = 0.12
     inside_radius: float = 0.08
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
-    waiting_weight: float = 1.0
-    waiting_aside: float = 0.15
     final_progress: float = 1.99
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
@@ -118,7 +120,8 @@ class Assignment:
 
     Attributes:
         tasks: of each. facts: of each. retreat: whether it keeps away from the hand. ease: whether
-            it gives way. attempts: how often it has missed the hand.
+            it gives way. attempts: how often it has missed the hand. outlook: place from the hand
+            at which the hand sees the armhole of a tethered sleeve, (3,) m.
     """
 
     tasks: tuple[Task, Task]
@@ -126,6 +129,7 @@ class Assignment:
     retreat: tuple[bool, bool] = (False, False)
     ease: tuple[bool, bool] = (False, False)
     attempts: tuple[int, int] = (0, 0)
+    outlook: tuple[FloatArray | None, FloatArray | None] = (None, None)
 
 
 def arm_axes(joints: FloatArray) -> tuple[ArmAxis, ArmAxis]:
@@ -192,6 +196,10 @@ class TaskPlanner:
             (retreats(stages, 0, p.stages, time), retreats(stages, 1, p.stages, time)),
             (eases(stages, 0, p.stages, time), eases(stages, 1, p.stages, time)),
             stages.attempts,
+            (
+                self._outlook(x, joints[2], to, sleeves, 0, linked),
+                self._outlook(x, joints[5], to, sleeves, 1, linked),
+            ),
         )
 
     def renewed(
@@ -245,6 +253,27 @@ class TaskPlanner:
         loop = x[self.armholes[side]]
         return abs(arm_linking_number(loop, shoulder, elbow, hand, interior)) == 1
 
+    def _outlook(
+        self,
+        x: FloatArray,
+        hand: FloatArray,
+        to: Heading,
+        sleeves: Sequence[SleeveState],
+        side: int,
+        linked: Sequence[bool],
+    ) -> FloatArray | None:
+        """Returns where, from the hand, a tethered sleeve is seen by it, (3,) m, if it is near."""
+        p, sleeve, other = self.parameters, sleeves[side], sleeves[1 - side]
+        near = np.linalg.norm(hand - sleeve.p_c) < p.outlook_distance
+        if linked[side] or not linked[1 - side] or not near:
+            return None
+        reach = p.outlook_reach * self._reach
+        loop, normal = self.armholes[side], sleeve.v_c
+        frame = np.stack([to.front, to.leftward, np.cross(to.front, to.leftward)])
+        move = move_into_sight(x, self.mesh.faces, loop, normal, hand, other.p_c, reach, frame)
+        place: FloatArray = sleeve.p_c + move - hand
+        return place
+
     def _waypoint(
         self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int, way: Approach
     ) -> FloatArray:
@@ -291,6 +320,7 @@ class TaskPlanner:
         tethered: bool,
         retreat: bool = False,
         attempts: int = 0,
+        outlook: FloatArray | None = None,
     ) -> FloatArray:
         """Returns where a sleeve is prepared (Eq. Jpi).
 
@@ -298,8 +328,10 @@ class TaskPlanner:
         outside the hand, and further back (against v_f) until it is in line: so the hand comes in
         by the open front. An arm that comes from anywhere else meets the outside of the front
         panel, with the armhole's centre at the hand and the hand not in it; so an opening that the
-        hand does not see stays outside. One that faces the hand is drawn along its own normal, and
-        along the forearm once the hand is in it: further inward it would be pulled past the hand.
+        hand does not see stays outside. The garment does not reach that far with its other sleeve
+        on an arm: the second one goes where the hand comes to see it. One that faces the hand is
+        drawn along its own normal, and along the forearm once the hand is in it: further inward it
+        would be pulled past it.
         """
         p = self.parameters
         hand = axis.G(0.0)
@@ -315,34 +347,25 @@ class TaskPlanner:
         inside = facing * _ramp(depth, -0.02, 0.02)
         aside = (1.0 - facing) * _aside(offset, direction)
         cap = p.tethered_approach_distance if tethered else p.approach_distance
-        cap *= way.distance * (1.0 + p.widening * min(attempts, 3))
+        cap *= 1.0 + p.widening * min(attempts, 3)
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
         if not fact.in_sight:
             distance = cap
         if retreat:
             return hand - cap * direction - p.retreat_distance * to.front
+        if outlook is not None:
+            onward = (1.0 - inside) * sleeve.v_c + inside * axis.D(0.0)
+            there: FloatArray = hand + (1.0 - facing) * outlook + facing * p.overshoot * onward
+            return there
         onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
-        behind *= way.distance
         if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
             error = error - to.front * (to.front @ error)
             wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
             goal = hand - cap * direction - min(wait, behind) * to.front
         return goal
-
-    def _waiting_place(self, place: FloatArray, other: FloatArray) -> FloatArray:
-        """Returns where on or beside its arm, at `place` (3,), m, a sleeve waits.
-
-        Arms hang further apart than the coat is wide. A sleeve that keeps to its arm then pulls
-        against the other one through the coat, with all that grippers may; an arm that is drawn
-        along to meet it takes a few newtons.
-        """
-        way = other - place
-        apart = float(np.linalg.norm(way))
-        lacking = apart - self.parameters.waiting_reach * self._reach
-        return place + way / apart * min(max(0.0, lacking), self.parameters.waiting_aside)
 
     def _target(
         self,
@@ -371,6 +394,7 @@ class TaskPlanner:
                     facts[1 - side].linked,
                     given.retreat[side],
                     attempts[side],
+                    given.outlook[side],
                 )
                 direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
@@ -382,19 +406,24 @@ class TaskPlanner:
             else:
                 k = 1 - side
                 other = self._prepared(
-                    axes[j + 1][k], to, sleeves[k], facts[k], k, True, False, attempts[k]
+                    axes[j + 1][k],
+                    to,
+                    sleeves[k],
+                    facts[k],
+                    k,
+                    True,
+                    False,
+                    attempts[k],
+                    given.outlook[k],
                 )
                 s = self._waiting_progress(axis, other)
-                position[j], direction[j] = self._waiting_place(axis.G(s), other), axis.D(s)
-                continue
             s = min(p.final_progress, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
             return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
-        weight = p.waiting_weight if task == Task.WAIT else 1.0
-        return SleeveTarget(position, direction, weight, direction_weight=p.dressing_direction)
+        return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
         """Returns the largest s from which the garment reaches `other` (3,), m (J_w).

@@ -13,6 +13,15 @@ import numpy.typing as npt
 
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 
+# Moves of an opening that are tried: along the edges, face and space diagonals of a cube, m.
+_MOVES = (0.05, 0.10, 0.15, 0.20)
+# Prices of a move, m: of an opening that is not seen, of one that is seen aslant, and of a metre
+# beyond reach or too near.
+_UNSEEN, _ASLANT, _BEYOND = 0.4, 0.1, 2.0
+# Distance at which an opening is looked at, m: nearer a panel lies on the hand, and follows it.
+_NEAREST = 0.13
+# Share of an opening that is enough to see.
+_ENOUGH = 0.85
 # Points of the opening that are looked at: its centre and this many, half-way to its rim.
 _RIM_POINTS = 8
 
@@ -41,6 +50,56 @@ def free_sight(
         barred,
     )
     return 1.0 - float(barred.mean())
+
+
+def move_into_sight(
+    x: FloatArray,
+    faces: IntArray,
+    loop: npt.NDArray[np.integer],
+    normal: FloatArray,
+    eye: FloatArray,
+    held: FloatArray,
+    reach: float,
+    frame: FloatArray,
+) -> FloatArray:
+    """Returns the move (3,), m, by which an opening comes into sight: short and within reach.
+
+    The garment is taken to move as it is. A panel that bars the way mostly does so by a few
+    centimetres: 5 to 10 cm forward and upward are enough where further outward is out of reach.
+
+    Args:
+        x: (n,3) garment, m.
+        faces: (F,3) its triangles.
+        loop: (k,) nodes around the opening, in order.
+        normal: (3,) of the opening, unit, to the side from which it is entered.
+        eye: (3,) where one looks from, m.
+        held: (3,) centre of another opening that stays where it is, m.
+        reach: how far apart both may be, m.
+        frame: (3,3) rows are the unit vectors between and along which it is moved.
+    """
+    center = x[loop].mean(axis=0)
+    best, least = np.zeros(3), np.inf
+    for move in np.vstack([np.zeros((1, 3)), *(size * _directions() @ frame for size in _MOVES)]):
+        to_eye = eye - move - center
+        distance = float(np.linalg.norm(to_eye))
+        aslant = 1.0 - float(to_eye @ normal) / max(distance, 1e-9)
+        beyond = max(0.0, float(np.linalg.norm(center + move - held)) - reach)
+        beyond += max(0.0, _NEAREST - distance)
+        price = float(np.linalg.norm(move)) + _ASLANT * aslant + _BEYOND * beyond
+        if price < least:
+            unseen = max(0.0, _ENOUGH - free_sight(x, faces, loop, eye - move))
+            price += _UNSEEN * unseen
+        if price < least:
+            best, least = move, price
+    return best
+
+
+def _directions() -> FloatArray:
+    """Returns the 26 unit vectors to corners, edges and faces of a cube."""
+    grid = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    grid = grid[np.any(grid != 0.0, axis=1)]
+    unit: FloatArray = grid / np.linalg.norm(grid, axis=1, keepdims=True)
+    return unit
 
 
 @nb.njit(cache=True, nogil=True)

@@ -167,7 +167,7 @@ def test_force_over_the_limit_is_answered_at_once_and_flutter_is_not() -> None:
 
 def test_lasting_force_stops_both_until_it_is_under_the_soft_limit() -> None:
     arms = Arms()
-    left = np.array([[-22.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    left = np.stack([-(LIMITS.hard_force + 1.0) * X, 0.0 * X])
     arms.ask(0.1 * Y, left, duration=LIMITS.stop_time - DT)
     assert Verdict.STOPPED not in arms.verdicts[0]
     arms.ask(0.1 * Y, left, duration=2 * DT)
