@@ -100,24 +100,23 @@ def solve_constrained_ddp(
     solve: Any = _solve
     start_inside: Any = interior_point
     sweeps, interior, converged = 0, 0, False
-    starts = [np.zeros_like(v)] if guess is None else [v.copy(), np.zeros_like(v)]
+    starts = [(np.zeros_like(v), settings.max_interior_steps)]
+    if guess is not None:
+        starts.insert(0, (v.copy(), settings.max_interior_steps // 3))
     if state_multiplier is not None:
         sweeps, converged = solve(
             integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
             settings.warm_sweeps, settings.max_halvings,
         )  # fmt: skip
-        # of bounds that only just leave room sweeps may end on multipliers beyond all measure
-        converged = converged and max(lx.max(initial=0.0), lv.max(initial=0.0)) <= p.price
+        converged = converged and _are_within(p.price, lx, lv)
     if not converged:
         together = [
             np.concatenate([a[1:], c], axis=1) for a, c in zip(on_states, on_inputs, strict=True)
         ]
         n_x, n_v = len(lx[0]), len(lv[0])
         multiplier, excess = np.empty((steps, n_x + n_v)), np.empty((steps, n_x + n_v))
-        near = False
-        for start in starts:
+        for start, most in starts:
             v[:] = start
-            most = settings.max_interior_steps // (1 if start is starts[-1] else 3)
             iterations, near = start_inside(
                 *costs, *together, n_x, v, u, multiplier, excess, p.price, most, settings.tolerance
             )  # fmt: skip
@@ -137,7 +136,7 @@ def solve_constrained_ddp(
             sweeps += more
             if not converged:
                 v, lx, lv = inside
-            elif max(lx.max(initial=0.0), lv.max(initial=0.0)) > p.price:
+            elif not _are_within(p.price, lx, lv):
                 _, lx, lv = inside
             converged = True
         elif not np.isfinite(v).all():
@@ -145,6 +144,14 @@ def solve_constrained_ddp(
     return LocalSolution(
         v, p.states(v), lx, lv, p.cost(v), p.violation(v), sweeps, interior, bool(converged)
     )
+
+
+def _are_within(price: float, *multipliers: FloatArray) -> bool:
+    """Returns whether no multiplier is beyond the price of an excess.
+
+    Of bounds that only just leave room, sweeps may end on multipliers beyond all measure.
+    """
+    return all(m.max(initial=0.0) <= price for m in multipliers)
 
 
 def _widen(radius: FloatArray, excess: FloatArray) -> None:

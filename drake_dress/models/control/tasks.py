@@ -269,8 +269,9 @@ class TaskPlanner:
             return None
         reach = p.outlook_reach * self._reach
         loop, normal = self.armholes[side], sleeve.v_c
-        frame = np.stack([to.front, to.leftward, np.cross(to.front, to.leftward)])
-        move = move_into_sight(x, self.mesh.faces, loop, normal, hand, other.p_c, reach, frame)
+        move = move_into_sight(
+            x, self.mesh.faces, loop, normal, hand, other.p_c, reach, to.rotation.T
+        )
         place: FloatArray = sleeve.p_c + move - hand
         return place
 
@@ -312,15 +313,12 @@ class TaskPlanner:
 
     def _prepared(
         self,
+        given: Assignment,
+        side: int,
         axis: ArmAxis,
         to: Heading,
         sleeve: SleeveState,
-        fact: SleeveFacts,
-        side: int,
-        tethered: bool,
         retreat: bool = False,
-        attempts: int = 0,
-        outlook: FloatArray | None = None,
     ) -> FloatArray:
         """Returns where a sleeve is prepared (Eq. Jpi).
 
@@ -334,6 +332,8 @@ class TaskPlanner:
         would be pulled past it.
         """
         p = self.parameters
+        fact, tethered = given.facts[side], given.facts[1 - side].linked
+        attempts, outlook = given.attempts[side], given.outlook[side]
         hand = axis.G(0.0)
         way = self._approach(attempts, tethered)
         direction = way.direction(axis, to, side)
@@ -377,24 +377,16 @@ class TaskPlanner:
         time_step: float,
     ) -> SleeveTarget:
         p, n = self.parameters, len(axes) - 1
-        facts, attempts = given.facts, given.attempts
+        facts = given.facts
         task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
         position, direction = np.empty((n, 3)), np.empty((n, 3))
-        way = self._approach(attempts[side], facts[1 - side].linked)
+        way = self._approach(given.attempts[side], facts[1 - side].linked)
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
             if entering:
                 position[j] = self._prepared(
-                    axis,
-                    to,
-                    sleeves[side],
-                    facts[side],
-                    side,
-                    facts[1 - side].linked,
-                    given.retreat[side],
-                    attempts[side],
-                    given.outlook[side],
+                    given, side, axis, to, sleeves[side], given.retreat[side]
                 )
                 direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
@@ -405,17 +397,7 @@ class TaskPlanner:
                     s = min(s, max(facts[side].s, other_fact.s + p.largest_lead))
             else:
                 k = 1 - side
-                other = self._prepared(
-                    axes[j + 1][k],
-                    to,
-                    sleeves[k],
-                    facts[k],
-                    k,
-                    True,
-                    False,
-                    attempts[k],
-                    given.outlook[k],
-                )
+                other = self._prepared(given, k, axes[j + 1][k], to, sleeves[k])
                 s = self._waiting_progress(axis, other)
             s = min(p.final_progress, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)

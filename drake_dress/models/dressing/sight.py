@@ -13,8 +13,12 @@ import numpy.typing as npt
 
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 
-# Moves of an opening that are tried: along the edges, face and space diagonals of a cube, m.
-_MOVES = (0.05, 0.10, 0.15, 0.20)
+# Moves of an opening that are tried, m: none, and along the 26 vectors from the centre of a cube to
+# its corners, edges and faces.
+_CUBE = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_AROUND = _CUBE[_CUBE.any(axis=1)]
+_AROUND = _AROUND / np.linalg.norm(_AROUND, axis=1, keepdims=True)
+_MOVES = np.vstack([np.zeros((1, 3)), *(size * _AROUND for size in (0.05, 0.10, 0.15, 0.20))])
 # Prices of a move, m: of an opening that is not seen, of one that is seen aslant, and of a metre
 # beyond reach or too near.
 _UNSEEN, _ASLANT, _BEYOND = 0.4, 0.1, 2.0
@@ -79,7 +83,7 @@ def move_into_sight(
     """
     center = x[loop].mean(axis=0)
     best, least = np.zeros(3), np.inf
-    for move in np.vstack([np.zeros((1, 3)), *(size * _directions() @ frame for size in _MOVES)]):
+    for move in _MOVES @ frame:
         to_eye = eye - move - center
         distance = float(np.linalg.norm(to_eye))
         aslant = 1.0 - float(to_eye @ normal) / max(distance, 1e-9)
@@ -92,14 +96,6 @@ def move_into_sight(
         if price < least:
             best, least = move, price
     return best
-
-
-def _directions() -> FloatArray:
-    """Returns the 26 unit vectors to corners, edges and faces of a cube."""
-    grid = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    grid = grid[np.any(grid != 0.0, axis=1)]
-    unit: FloatArray = grid / np.linalg.norm(grid, axis=1, keepdims=True)
-    return unit
 
 
 @nb.njit(cache=True, nogil=True)

@@ -119,8 +119,6 @@ def test_without_anything_planned_it_rests(controller: LocalController) -> None:
 
 
 def test_left_to_itself_it_goes_for_the_targets(controller: LocalController) -> None:
-    # the garment hangs a little wider than it is drawn by default
-    controller = replace(controller, parameters=replace(P, stretch=1.0))
     x, _, armholes = seen(controller)
     given = Assignment((Task.PREPARE, Task.REST), (OFF, OFF))
     plan = GlobalPlan(0.0, 0.1, np.zeros((8, 2, 3)), np.tile(armholes, (9, 1, 1)), given)
