@@ -272,6 +272,10 @@ class Local:
     stretch: float = 1.0  # share of the distances that the garment reaches, that is used
     beside: float = 0.04  # that a dressed sleeve may be beside its target, m
     beside_speed: float = 0.05  # that it may move beside its arm, m/s
+    dragged: float = 0.04  # how far a hand is taken to be pushed by the garment, m
+    # share of what a sleeve is off from where the plan foresaw it, that is made up for:
+    prepare_correction: float = 0.0  # while it is prepared
+    dress_correction: float = 1.0  # while it is drawn on
     feedback: bool = True  # corrects between solves by the solution's gains
     solver: str = "constrained_ddp"  # or cone: Clarabel, exact and slower
 

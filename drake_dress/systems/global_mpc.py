@@ -19,6 +19,7 @@ from drake_dress.models.dressing.stages import Stage
 class _Finished:
     decision: Decision
     state: PolicyState
+    joints: np.ndarray
     solve_time: float
 
 
@@ -110,7 +111,7 @@ class GlobalMpc(LeafSystem):
         begin = clock.perf_counter()
         steps = round(self._period / self._policy.parameters.time_step)
         state, decision = self._policy.decide(memory, x, v, joints, now, steps)
-        return _Finished(decision, state, clock.perf_counter() - begin)
+        return _Finished(decision, state, joints, clock.perf_counter() - begin)
 
     def _finish(self, context: Context, state: State) -> None:
         if self._pending is None:
@@ -126,7 +127,7 @@ class GlobalMpc(LeafSystem):
             decision.plan.velocity[first:],
             decision.plan.armhole[first - 1 :],
             decision.assignment,
-            decision.target[first - 1 :] if p.plans else None,
+            finished.joints[first:] if p.plans else None,
         )
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)

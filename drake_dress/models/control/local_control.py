@@ -8,7 +8,7 @@ are those of the plan; where they lead follows the person and the sleeves as the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +24,7 @@ from drake_dress.models.control.local_model import (
 )
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
+from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import Task
 from drake_dress.models.garment.geodesics import Reach, reach
 
@@ -39,8 +40,8 @@ class GlobalPlan:
         velocity: (N,2,3) of left and right gripper, m/s.
         armhole: (N+1,2,3) armhole centres as foreseen, m; row 0 is at `start`.
         assignment: what the sleeves are to do; None before anything is planned.
-        target: (N+1,2,3) where the sleeves were asked to be when it was planned, m; None if the
-            plan is to rest, and the local controller to go for the targets by itself.
+        joints: (N+1,6,3) where it believed the person's to be, m; None if the plan is to rest, and
+            the local controller to go for the targets by itself.
     """
 
     start: float
@@ -48,7 +49,7 @@ class GlobalPlan:
     velocity: FloatArray
     armhole: FloatArray
     assignment: Assignment | None = None
-    target: FloatArray | None = None
+    joints: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -165,27 +166,32 @@ class LocalController:
             return LocalOutcome(LocalState(), self.resting(time), None)
         sleeves = self.planner.sleeves(x)
         centers = np.stack([sleeve.p_c for sleeve in sleeves])
-        nominal, foreseen, planned = continued(plan, centers, gripper, time, p)
+        nominal, foreseen = continued(plan, centers, gripper, time, p)
         coupled = is_coupled(
             state.coupled, float(np.linalg.norm(centers[0] - centers[1])), self.reach, p
         )
         assignment = self.planner.renewed(plan.assignment, sleeves, joints[0])
-        targets = self.planner.targets(assignment, sleeves, joints, joints_step)
+        places = self._places(assignment, sleeves, joints, joints_step)
+        if plan.joints is not None:
+            soon = time + joints_step * np.arange(len(joints), dtype=np.float64)
+            planned = joints_of_plan(plan, soon)
+            planned = _own_motion(planned, joints, assignment, p.dragged)
+            believed = self._places(assignment, sleeves, planned, joints_step)
         goals = []
-        axes = arm_axes(joints[0])
-        for i, target in enumerate(targets):
-            fact, task = assignment.facts[i], assignment.tasks[i]
-            on_arm = fact.linked and task in (Task.DRESS, Task.WAIT)
+        for i, (place, direction, weight) in enumerate(places):
+            task = assignment.tasks[i]
+            on_arm = assignment.facts[i].linked and task in (Task.DRESS, Task.WAIT)
             # between the times of the predicted joints targets go straight
-            first = axes[i].G(fact.s) if on_arm else target.position[0]
-            position = _resampled(np.vstack([first, target.position]), joints_step, p)
-            arm = position
-            if planned is not None:
-                # where the plan saw the sleeve, moved as its target has moved since
-                position = foreseen[:, i] + position - planned[:, i]
-            axis = _resampled(np.vstack([target.direction[:1], target.direction]), joints_step, p)
+            arm = position = _resampled(place, joints_step, p)
+            if plan.joints is not None:
+                # what the plan leads to, moved as the person moves otherwise than it believed
+                position = nominal.sleeve[:, i] + position
+                position = position - _resampled(believed[i][0], joints_step, p)
+                share = p.dress_correction if task == Task.DRESS else p.prepare_correction
+                position = position + share * (foreseen[:, i] - nominal.sleeve[:, i])
+            axis = _resampled(direction, joints_step, p)
             axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-            goals.append(SleeveGoal(position, target.position_weight, on_arm, arm, axis))
+            goals.append(SleeveGoal(position, weight, on_arm, arm, axis))
         problem = local_problem(nominal, (goals[0], goals[1]), coupled, self.reach, p)
         found = self.solver(problem, _shifted(state, time, p))
         velocity = nominal.velocity + found.v.reshape(-1, 2, 3)
@@ -200,6 +206,29 @@ class LocalController:
         )
         return LocalOutcome(LocalState(found, time, coupled), local, problem)
 
+    def _places(
+        self,
+        assignment: Assignment,
+        sleeves: Sequence[SleeveState],
+        joints: FloatArray,
+        joints_step: float,
+    ) -> list[tuple[FloatArray, FloatArray, float]]:
+        """Returns for each sleeve (M+1,3) where it shall be, m, and turned to; and the weight.
+
+        A sleeve on its arm begins where it is, one that is not at its first target.
+        """
+        targets = self.planner.targets(assignment, sleeves, joints, joints_step)
+        places = []
+        for axis, fact, task, t in zip(
+            arm_axes(joints[0]), assignment.facts, assignment.tasks, targets, strict=True
+        ):
+            on_arm = fact.linked and task in (Task.DRESS, Task.WAIT)
+            first = axis.G(fact.s) if on_arm else t.position[0]
+            position = np.vstack([first, t.position])
+            direction = np.vstack([t.direction[:1], t.direction])
+            places.append((position, direction, t.position_weight))
+        return places
+
 
 def continued(
     plan: GlobalPlan,
@@ -207,7 +236,7 @@ def continued(
     gripper: FloatArray,
     time: float,
     parameters: LocalParameters,
-) -> tuple[Nominal, FloatArray, FloatArray | None]:
+) -> tuple[Nominal, FloatArray]:
     """Returns a global plan from a time on, at the local steps; where it ends it goes on as it was.
 
     Args:
@@ -218,30 +247,37 @@ def continued(
         parameters: horizon and time step.
 
     Returns:
-        Where it leads from here, where it foresaw the sleeves (N+1,2,3), m, and where they were
-        asked to be then, (N+1,2,3) or None.
+        Where it leads from here, and where it foresaw the sleeves (N+1,2,3), m.
     """
     n, h = parameters.horizon, parameters.time_step
     now = (time - plan.start) / plan.time_step
     middle = now + (np.arange(n) + 0.5) * h / plan.time_step
     step = np.clip(np.floor(middle + 1e-9).astype(int), 0, len(plan.velocity) - 1)
     velocity = plan.velocity[step]
-    at = now + np.arange(n + 1) * h / plan.time_step
-    last = float(len(plan.velocity))
-    inside = np.clip(at, 0.0, last)
-    row = np.minimum(np.floor(inside).astype(int), len(plan.velocity) - 1)
-    share = (inside - row)[:, None, None]
+    at = time + h * np.arange(n + 1, dtype=np.float64)
     # beyond the end sleeves go on with their grippers
-    beyond = (np.maximum(at - last, 0.0) * plan.time_step)[:, None, None] * plan.velocity[-1]
-
-    def between(rows: FloatArray) -> FloatArray:
-        found: FloatArray = (1.0 - share) * rows[row] + share * rows[row + 1]
-        return found
-
-    foreseen = between(plan.armhole) + beyond
+    end = plan.start + len(plan.velocity) * plan.time_step
+    beyond = np.maximum(at - end, 0.0)[:, None, None] * plan.velocity[-1]
+    foreseen = _of_plan(plan, plan.armhole, at) + beyond
     moved = np.concatenate([np.zeros((1, 2, 3)), h * np.cumsum(velocity, axis=0)])
-    nominal = Nominal(sleeve + foreseen - foreseen[0], gripper + moved, velocity)
-    return nominal, foreseen, None if plan.target is None else between(plan.target)
+    planned = plan.joints is not None
+    return Nominal(sleeve + foreseen - foreseen[0], gripper + moved, velocity, planned), foreseen
+
+
+def joints_of_plan(plan: GlobalPlan, times: FloatArray) -> FloatArray:
+    """Returns (M,6,3) where a plan believed the joints to be at M times, s, m."""
+    if plan.joints is None:
+        raise ValueError("this plan is to rest and believes nothing of joints")
+    return _of_plan(plan, plan.joints, times)
+
+
+def _of_plan(plan: GlobalPlan, rows: FloatArray, times: FloatArray) -> FloatArray:
+    """Returns rows (N+1,…) of a plan at M times, s; before its start and after its end as there."""
+    at = np.clip((times - plan.start) / plan.time_step, 0.0, len(rows) - 1.0)
+    row = np.minimum(np.floor(at + 1e-9).astype(int), len(rows) - 2)
+    share = (at - row).reshape(-1, *[1] * (rows.ndim - 1))
+    found: FloatArray = (1.0 - share) * rows[row] + share * rows[row + 1]
+    return found
 
 
 def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
@@ -251,6 +287,32 @@ def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> Loca
     return solve_constrained_ddp(
         problem, before.v, before.state_multiplier, before.input_multiplier
     )
+
+
+def _own_motion(
+    planned: FloatArray, joints: FloatArray, assignment: Assignment, dragged: float
+) -> FloatArray:
+    """Returns joints (M+1,6,3) as a plan believed them, less what is not the person's own motion.
+
+    An arm in a sleeve goes where the sleeve takes it, and a hand is pushed along by the cloth on
+    it. Who follows that follows himself, and the garment creeps away with the arms in it.
+
+    Args:
+        planned: (M+1,6,3) as believed, m.
+        joints: (M+1,6,3) as predicted now, m.
+        assignment: whose arm is in its sleeve.
+        dragged: how far a hand is taken to be pushed, m.
+    """
+    off = joints - planned
+    for i, fact in enumerate(assignment.facts):
+        arm = slice(3 * i, 3 * i + 3)
+        body = off[:, 3 * i : 3 * i + 1]
+        own = off[:, arm] - body
+        far = np.linalg.norm(own[:, 2], axis=1)[:, None, None]
+        share = 0.0 if fact.linked else np.maximum(0.0, 1.0 - dragged / np.maximum(far, 1e-12))
+        off[:, arm] = body + share * own
+    believed: FloatArray = joints - off
+    return believed
 
 
 def _bounded(gain: FloatArray, most: float) -> FloatArray:

@@ -44,9 +44,13 @@ class LocalParameters:
         max_speed: of a gripper, m/s.
         beside: how far the armhole of a dressed sleeve may be beside its arm, m (φ_x).
         beside_speed: how fast it may move beside the arm, m/s (φ_v).
-        return_speed: at which bounds that are exceeded now come back, m/s.
+        return_speed: at which bounds that are exceeded now come back where nothing is planned, m/s.
         stretch: share of the distances that the garment reaches, φ_c and φ_f, that is used: a
             garment drawn taut is pulled by both arms.
+        dragged: how far from where the plan believed it a hand may be by the garment's doing, m;
+            only what is beyond is followed.
+        prepare_correction: share of what a sleeve is off from where the plan foresaw it now that
+            is made up for while it is prepared; dress_correction: while it is drawn on.
         taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
         coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
             they are no longer.
@@ -61,6 +65,9 @@ class LocalParameters:
     beside_speed: float = 0.05
     return_speed: float = 0.05
     stretch: float = 1.0
+    dragged: float = 0.04
+    prepare_correction: float = 0.0
+    dress_correction: float = 1.0
     taut_share: float = 0.8
     coupled_share: float = 0.85
     released_share: float = 0.8
@@ -73,11 +80,14 @@ class Nominal:
     Attributes:
         sleeve: (N+1,2,3) armhole centres, m. gripper: (N+1,2,3) m. velocity: (N,2,3) of the
             grippers, m/s. Left, then right.
+        planned: whether a plan with the garment leads there. Where it exceeds a bound by itself it
+            may: it knows of cloth and contact more than that bound does.
     """
 
     sleeve: FloatArray
     gripper: FloatArray
     velocity: FloatArray
+    planned: bool = False
 
 
 @dataclass(frozen=True)
@@ -179,9 +189,13 @@ def local_problem(
         moving[:, i] = across[:-1] @ b[rows]
         moved[:, i] = np.einsum("tab,tb->ta", across[:-1], np.diff(away, axis=0))
         limit[:, i] = p.beside_speed * h
-    # what is exceeded already comes back in time; at once it could not
-    now = np.linalg.norm(offset[0], axis=1)
-    radius = np.maximum(radius, now - p.return_speed * h * np.arange(n + 1)[:, None])
+    along = np.linalg.norm(offset, axis=2)
+    if nominal.planned:
+        radius = np.maximum(radius, along)
+        limit = np.maximum(limit, np.linalg.norm(moved, axis=2))
+    else:
+        # what is exceeded already comes back in time; at once it could not
+        radius = np.maximum(radius, along[0] - p.return_speed * h * np.arange(n + 1)[:, None])
     return LocalProblem(
         start=np.zeros(12),
         input_matrix=b,

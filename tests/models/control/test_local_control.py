@@ -48,32 +48,31 @@ def plan_of(controller: LocalController, velocity: np.ndarray, armholes: np.ndar
     n = 8
     moved = 0.1 * np.arange(n + 1)[:, None, None] * velocity
     given = Assignment((Task.PREPARE, Task.PREPARE), (OFF, OFF))
-    x, _, _ = seen(controller)
-    asked = controller.planner.targets(
-        given, controller.planner.sleeves(x), np.stack([JOINTS] * (n + 1)), 0.1
-    )
-    target = np.stack([t.position for t in asked], axis=1)
-    target = np.concatenate([target[:1], target])
-    return GlobalPlan(0.0, 0.1, np.tile(velocity, (n, 1, 1)), armholes + moved, given, target)
+    joints = np.stack([JOINTS] * (n + 1))
+    return GlobalPlan(0.0, 0.1, np.tile(velocity, (n, 1, 1)), armholes + moved, given, joints)
 
 
-def solve(controller: LocalController, plan: GlobalPlan, joints=STILL, shift=0.0):  # type: ignore[no-untyped-def]
+def solve(controller: LocalController, plan: GlobalPlan, joints=STILL, shift=0.0, time=0.0):  # type: ignore[no-untyped-def]
     x, grippers, _ = seen(controller)
-    return controller.solve(LocalState(), plan, x + shift, grippers + shift, joints, 0.2, 0.0)
+    return controller.solve(LocalState(), plan, x + shift, grippers + shift, joints, 0.2, time)
 
 
-def test_a_plan_that_comes_true_is_followed_as_it_is(controller: LocalController) -> None:
-    velocity = np.array([[0.05, 0.01, 0.0], [0.03, 0.0, -0.02]])
+@pytest.mark.parametrize("time", [0.0, 0.5])
+def test_a_plan_that_comes_true_is_followed_as_it_is(
+    controller: LocalController, time: float
+) -> None:
+    """Later, too, when targets are no longer where they were: they follow sleeves."""
+    velocity = np.array([[0.05, 0.01, 0.0], [0.05, 0.01, 0.0]])
     plan = plan_of(controller, velocity, seen(controller)[2])
-    local = solve(controller, plan).plan
+    local = solve(controller, plan, shift=time * velocity[0], time=time).plan
     np.testing.assert_allclose(local.velocity, np.tile(velocity, (P.horizon, 1, 1)), atol=1e-6)
 
 
 def test_a_sleeve_that_is_not_where_it_was_foreseen_is_brought_back(
     controller: LocalController,
 ) -> None:
-    velocity = np.zeros((2, 3))
-    plan = plan_of(controller, velocity, seen(controller)[2])
+    controller = replace(controller, parameters=replace(P, prepare_correction=1.0))
+    plan = plan_of(controller, np.zeros((2, 3)), seen(controller)[2])
     ahead = np.array([0.0, 0.0, 0.02])
     outcome = solve(controller, plan, shift=ahead)
     first = outcome.plan.velocity[0]
@@ -92,14 +91,39 @@ def test_it_goes_where_the_person_goes(controller: LocalController) -> None:
     assert np.all(moved.velocity[0][:, 1] > 0.01)
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_an_arm_that_the_garment_drags_is_not_followed(
+    controller: LocalController, linked: bool
+) -> None:
+    """But the person is, and what a hand does beyond that."""
+    plan = plan_of(controller, np.zeros((2, 3)), seen(controller)[2])
+    facts = (replace(OFF, linked=linked, s=0.3 * linked), OFF)
+    tasks = (Task.WAIT if linked else Task.PREPARE, Task.PREPARE)
+    plan = replace(plan, assignment=Assignment(tasks, facts))
+
+    def first(joints: np.ndarray) -> np.ndarray:
+        return solve(controller, plan, joints=joints).plan.velocity[0]
+
+    pushed = STILL.copy()
+    pushed[:, 2] += [0.0, 0.0, 0.03]
+    np.testing.assert_allclose(first(pushed), 0.0, atol=1e-6)
+    waved = STILL.copy()
+    waved[:, 2] += [0.0, 0.0, 0.09]
+    if linked:
+        np.testing.assert_allclose(first(waved), 0.0, atol=1e-6)
+    else:
+        assert first(waved)[0, 2] > 0.05
+    stepped = pushed + [0.0, 0.0, 0.03]
+    assert first(stepped)[0, 2] > 0.01
+
+
 def test_a_plan_is_cut_off_at_its_front_and_goes_on_at_its_end() -> None:
     rng = np.random.default_rng(0)
     velocity = rng.normal(0.0, 0.05, (8, 2, 3))
     armhole = np.concatenate([np.zeros((1, 2, 3)), np.cumsum(0.1 * velocity, axis=0)])
     plan = GlobalPlan(2.0, 0.1, velocity, armhole)
     here = np.ones((2, 3))
-    nominal, foreseen, planned = continued(plan, here, 2.0 * here, 2.3, P)
-    assert planned is None
+    nominal, foreseen = continued(plan, here, 2.0 * here, 2.3, P)
     np.testing.assert_allclose(nominal.velocity[:2], np.tile(velocity[3], (2, 1, 1)))
     np.testing.assert_allclose(nominal.velocity[-1], velocity[-1])
     np.testing.assert_allclose(nominal.sleeve[0], here)

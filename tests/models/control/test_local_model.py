@@ -1,5 +1,7 @@
 """The local model: who follows whom, and what its problem asks and forbids."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -133,3 +135,25 @@ def test_a_plan_that_is_right_is_left_alone() -> None:
     nominal = Nominal(nominal.sleeve + moved, nominal.gripper + moved, velocity)
     s, _, _ = solved(nominal, (goal(nominal, 0, np.zeros(3)), goal(nominal, 1, np.zeros(3))))
     np.testing.assert_allclose(s.x, 0.0, atol=1e-9)
+
+
+def test_bounds_that_a_plan_exceeds_by_itself_are_left_to_it() -> None:
+    """A sleeve on an arm is drawn aside, and the arm with it; so is a garment drawn wide."""
+    n, h = P.horizon, P.time_step
+    velocity = np.zeros((n, 2, 3))
+    velocity[:, 0, 1] = 2.0 * P.beside_speed
+    moved = np.concatenate([np.zeros((1, 2, 3)), h * np.cumsum(velocity, axis=0)])
+    wide = still(REACH.between_grippers - 0.01)
+    nominal = Nominal(wide.sleeve + moved, wide.gripper + moved, velocity, planned=True)
+    goals = tuple(
+        SleeveGoal(
+            nominal.sleeve[:, i], 1.0, True, wide.sleeve[:, i], goal(wide, i, np.zeros(3)).axis
+        )
+        for i in (0, 1)
+    )
+    s, _, _ = solved(nominal, (goals[0], goals[1]), coupled=True)
+    np.testing.assert_allclose(s.x, 0.0, atol=1e-9)
+    # the same without a plan that knows better: held back
+    s, sleeve, gripper = solved(replace(nominal, planned=False), (goals[0], goals[1]), coupled=True)
+    assert np.abs(sleeve[:, 0, 1] - wide.sleeve[0, 0, 1]).max() < P.beside + 1e-6
+    assert np.linalg.norm(gripper[:, 0] - gripper[:, 1], axis=1).max() < 0.5 + 1e-6
