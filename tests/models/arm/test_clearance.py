@@ -1,0 +1,85 @@
+"""Distances of capsules: against sampling, and their rates against finite differences."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drake_dress.models.arm.clearance import (
+    ArmShape,
+    Capsules,
+    clearance,
+    clearance_rates,
+    nearest,
+)
+from drake_dress.models.arm.panda import LIMITS, panda
+
+
+def segments(seed: int) -> tuple[np.ndarray, ...]:
+    """Returns ends of 12 pairs of segments: some parallel, some points, some crossing."""
+    rng = np.random.default_rng(seed)
+    a, b, c, d = rng.normal(0.0, 0.3, (4, 12, 3))
+    d[0] = c[0] + 0.7 * (b[0] - a[0])
+    d[1] = c[1] - 1.7 * (b[1] - a[1])
+    b[2] = a[2]
+    d[3] = c[3]
+    b[4], d[4] = a[4], c[4]
+    c[5], d[5] = 0.5 * (a[5] + b[5]) + [0.1, 0.2, 0.0], 0.5 * (a[5] + b[5]) - [0.1, 0.2, 0.0]
+    return a, b, c, d
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=30, deadline=None)
+def test_no_pair_of_points_is_nearer(seed: int) -> None:
+    a, b, c, d = segments(seed)
+    s, t = np.array([nearest(*ends) for ends in zip(a, b, c, d, strict=True)]).T[:, :, None]
+    here, there = a + s * (b - a), c + t * (d - c)
+    found = np.linalg.norm(here - there, axis=1)
+    t = np.linspace(0.0, 1.0, 61)[:, None, None]
+    on_first, on_second = a + t * (b - a), c + t * (d - c)
+    sampled = np.linalg.norm(on_first[:, None] - on_second[None], axis=3).min(axis=(0, 1))
+    assert (found <= sampled + 1e-9).all()
+    # and they are on the segments
+    for p, e, f in ((here, a, b), (there, c, d)):
+        ways = np.linalg.norm(p - e, axis=1) + np.linalg.norm(f - p, axis=1)
+        np.testing.assert_allclose(ways, np.linalg.norm(f - e, axis=1), atol=1e-9)
+
+
+def test_capsules_are_apart_by_what_their_radii_leave() -> None:
+    one = Capsules(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.array([0.1]))
+    other = Capsules(np.array([[0.5, 0.0, 0.4]]), np.array([[0.5, 0.3, 0.4]]), np.array([0.15]))
+    near = clearance(one, other, np.array([[0, 0]]))
+    np.testing.assert_allclose(near.distance, 0.25)
+    np.testing.assert_allclose(near.away, [[-1.0, 0.0, 0.0]])
+
+
+def test_axes_that_cross_have_a_way_apart() -> None:
+    one = Capsules(np.array([[-1.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]]), np.array([0.1]))
+    other = Capsules(np.array([[0.0, -1.0, 0.0]]), np.array([[0.0, 1.0, 0.0]]), np.array([0.1]))
+    near = clearance(one, other, np.array([[0, 0]]))
+    np.testing.assert_allclose(near.distance, -0.2)
+    np.testing.assert_allclose(np.abs(near.away), [[0.0, 0.0, 1.0]], atol=1e-9)
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=20, deadline=None)
+def test_rates_are_what_finite_differences_say(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arm = panda(np.eye(4))
+    link = np.arange(8)
+    shape = ArmShape(link, Capsules(*rng.normal(0.0, 0.1, (2, 8, 3)), rng.uniform(0.02, 0.06, 8)))
+    person = Capsules(*rng.normal(0.0, 0.5, (2, 3, 3)), rng.uniform(0.05, 0.1, 3))
+    pairs = np.stack(np.meshgrid(link, np.arange(3), indexing="ij"), axis=-1).reshape(-1, 2)
+    q, e = rng.uniform(LIMITS.lower, LIMITS.upper), 1e-6
+    way = rng.normal(size=7)
+
+    def distance(s: float) -> np.ndarray:
+        return clearance(shape.placed(arm.links(q + s * way)), person, pairs).distance
+
+    links = arm.links(q)
+    near = clearance(shape.placed(links), person, pairs)
+    rates = clearance_rates(near, arm, shape, links, 0) @ way
+    steady = np.abs(distance(e) - 2.0 * near.distance + distance(-e)) < 1e-9
+    np.testing.assert_allclose(
+        rates[steady], ((distance(e) - distance(-e)) / (2 * e))[steady], atol=1e-5
+    )
+    assert steady.mean() > 0.8
