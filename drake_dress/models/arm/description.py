@@ -1,0 +1,113 @@
+"""The Panda's URDF and meshes, from the package that keeps them, in a form that Drake reads.
+
+The package's visual meshes are COLLADA, its collision meshes STL; Drake reads neither. So they are
+converted once, to glTF, and kept in the user's cache. Distances are kept by capsules (`panda.SHAPE`)
+before anything touches, so the description has no collision geometry; fingers are fixed, closed on
+cloth.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from importlib import metadata
+from pathlib import Path
+
+import trimesh
+
+PACKAGE = "example-robot-data"
+_FOLDER = "robots/panda_description"
+# Version of what is made of the package's files.
+_FORM = 1
+# Of each finger, m: two layers of cloth.
+_OPENING = 0.001
+
+
+def panda_urdf(cache: Path | None = None) -> Path:
+    """Returns the Panda's URDF, its meshes beside it; makes both the first time.
+
+    Args:
+        cache: folder to keep them in; the user's cache by default.
+
+    Raises:
+        FileNotFoundError: the package is not there, or has no Panda.
+    """
+    try:
+        version = metadata.version(PACKAGE)
+    except metadata.PackageNotFoundError:
+        raise FileNotFoundError(f"package {PACKAGE} is not installed; it has the Panda") from None
+    folder = (cache or _user_cache()) / f"panda-{version}-{_FORM}"
+    urdf = folder / "panda.urdf"
+    if not urdf.exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=folder.parent, prefix="panda-"))
+        try:
+            _convert(panda_source(), made)
+            try:
+                made.rename(folder)
+            except OSError:
+                if not urdf.exists():  # another process was no faster: it is a real error
+                    raise
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+    return urdf
+
+
+def panda_source() -> Path:
+    """Returns the package's own folder of the Panda.
+
+    Raises:
+        FileNotFoundError: it has none.
+    """
+    for file in metadata.files(PACKAGE) or []:
+        if file.as_posix().endswith(f"{_FOLDER}/urdf/panda.urdf"):
+            return Path(str(file.locate())).resolve().parents[1]
+    raise FileNotFoundError(f"package {PACKAGE} has no {_FOLDER}/urdf/panda.urdf")
+
+
+def _user_cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "drake_dress"
+
+
+def _convert(source: Path, out: Path) -> None:
+    tree = ElementTree.parse(source / "urdf" / "panda.urdf")
+    robot = tree.getroot()
+    for link in robot.iter("link"):
+        for collision in link.findall("collision"):
+            link.remove(collision)
+        for mesh in link.iter("mesh"):
+            name = Path(mesh.attrib["filename"]).stem
+            _write_mesh(source / "meshes" / "visual" / f"{name}.dae", out / name)
+            mesh.attrib["filename"] = f"{name}/model.gltf"
+    for joint in robot.iter("joint"):
+        for tag in ("safety_controller", "mimic"):
+            for element in joint.findall(tag):
+                joint.remove(element)
+        if joint.attrib["type"] == "prismatic":
+            _fix(joint)
+    tree.write(out / "panda.urdf", encoding="unicode")
+
+
+def _fix(joint: ElementTree.Element) -> None:
+    """Makes a finger's joint a fixed one, a little open."""
+    axis, origin = joint.find("axis"), joint.find("origin")
+    if axis is None or origin is None:
+        raise ValueError(f"joint {joint.attrib['name']} has no axis or no origin")
+    way = [float(v) * _OPENING for v in axis.attrib["xyz"].split()]
+    place = [float(v) for v in origin.attrib["xyz"].split()]
+    origin.attrib["xyz"] = " ".join(f"{p + w:g}" for p, w in zip(place, way, strict=True))
+    joint.attrib["type"] = "fixed"
+    for tag in ("axis", "limit", "dynamics"):
+        for element in joint.findall(tag):
+            joint.remove(element)
+
+
+def _write_mesh(source: Path, folder: Path) -> None:
+    if folder.exists():
+        return
+    folder.mkdir()
+    for name, content in trimesh.load_scene(source).export(file_type="gltf").items():
+        (folder / name).write_bytes(content)
