@@ -62,9 +62,7 @@ def add_arms(plant: MultibodyPlant, bases: dict[Side, np.ndarray]) -> dict[Side,
         for i in range(len(LIMITS.torque)):
             joint = plant.GetJointByName(f"panda_joint{i + 1}", model)
             joint.set_acceleration_limits([-LIMITS.acceleration[i]], [LIMITS.acceleration[i]])
-            actuator = plant.AddJointActuator(
-                f"{side}_panda_joint{i + 1}", joint, LIMITS.torque[i]
-            )
+            actuator = plant.AddJointActuator(f"{side}_panda_joint{i + 1}", joint, LIMITS.torque[i])
             actuator.set_controller_gains(PdControllerGains(p=_STIFFNESS[i], d=_DAMPING[i]))
         tool = plant.GetBodyByName("panda_hand_tcp", model).index()
         arms[side] = PlantArm(model, panda(bases[side]), tool)

@@ -1,7 +1,7 @@
 """The Panda's URDF and meshes, from the package that keeps them, in a form that Drake reads.
 
 The package's visual meshes are COLLADA, its collision meshes STL; Drake reads neither. So they are
-converted once, to glTF, and kept in the user's cache. Distances are kept by capsules (`panda.SHAPE`)
+converted once, to glTF, and kept in the user's cache. Distances are kept by capsules (`SHAPE`)
 before anything touches, so the description has no collision geometry; fingers are fixed, closed on
 cloth.
 """

@@ -36,20 +36,9 @@ def person_obstacles(person: PersonModel, joints: FloatArray, time_step: float) 
         time_step: between them, s.
     """
     h = time_step
-    torso = [c for c in person.capsules if c.body == "torso"]
-    upper, fore, hand = person.radius
-    radius = np.array([c.radius for c in torso] + [upper, fore, hand] * 2)
-    rows_a, rows_b = [], []
-    for q in joints:
-        turned = heading(q).rotation
-        shift = 0.5 * (q[0] + q[3]) - turned @ person.shoulders.mean(axis=0)
-        a = [turned @ c.a_B + shift for c in torso]
-        b = [turned @ c.b_B + shift for c in torso]
-        for i in (0, 3):
-            a += [q[i], q[i + 1], q[i + 2]]
-            b += [q[i + 1], q[i + 2], q[i + 2]]
-        rows_a.append(np.array(a))
-        rows_b.append(np.array(b))
+    placed = [person_capsules(person, q) for q in joints]
+    rows_a, rows_b = [a for a, _, _ in placed], [b for _, b, _ in placed]
+    radius = placed[0][2]
     predicted = []
     for j in range(len(joints) - 1):
         va, vb = (rows_a[j + 1] - rows_a[j]) / h, (rows_b[j + 1] - rows_b[j]) / h
@@ -58,3 +47,25 @@ def person_obstacles(person: PersonModel, joints: FloatArray, time_step: float) 
         omega = np.cross(axis, vb - va) / length2
         predicted.append(Obstacles(rows_a[j], rows_b[j], radius, va, omega))
     return predicted
+
+
+def person_capsules(
+    person: PersonModel, joints: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns ends (K,3), (K,3) and radii (K,), m, of the person's capsules, torso first.
+
+    Args:
+        person: its shape.
+        joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
+    """
+    torso = [c for c in person.capsules if c.body == "torso"]
+    upper, fore, hand = person.radius
+    radius = np.array([c.radius for c in torso] + [upper, fore, hand] * 2)
+    turned = heading(joints).rotation
+    shift = 0.5 * (joints[0] + joints[3]) - turned @ person.shoulders.mean(axis=0)
+    a = [turned @ c.a_B + shift for c in torso]
+    b = [turned @ c.b_B + shift for c in torso]
+    for i in (0, 3):
+        a += [joints[i], joints[i + 1], joints[i + 2]]
+        b += [joints[i + 1], joints[i + 2], joints[i + 2]]
+    return np.array(a), np.array(b), radius

@@ -1,0 +1,104 @@
+"""Joint commands of two arms whose grippers follow commands in space."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from drake_dress.models.arm.clearance import Capsules
+from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal
+from drake_dress.models.control.person_model import PersonModel, person_capsules
+from drake_dress.models.sides import SIDES
+
+
+class ArmController(LeafSystem):
+    """Turns positions commanded to grippers into joint commands that keep the arms' limits.
+
+    .. pydrake_system::
+
+        name: ArmController
+        input_ports:
+        - left_position_command
+        - right_position_command
+        - left_velocity_command
+        - right_velocity_command
+        - joint_position
+        output_ports:
+        - left_arm_position_command
+        - right_arm_position_command
+        - left_arm_velocity_command
+        - right_arm_velocity_command
+        - clearance
+        - speed_share
+
+    Commands (3,) p_WG and v_WG, m, m/s. joint_position: (18,) of the person's arms as they are
+    believed to be, m. Arm commands (7,) rad, rad/s. clearance: (3,) least distance between the
+    arms, of the left and of the right one to the person, m. speed_share: (2,) of the speed asked
+    for that the grippers have. Outputs are of the state alone, no feedthrough. A command that is
+    not finite is not followed: the arms come to rest.
+
+    It integrates its commands itself, from `start` on; what arms measure is for those who watch
+    them.
+
+    Args:
+        arms: with their limits and settings.
+        start: (2,7) joints at time 0, left, then right, rad.
+        period: of the commands, s.
+        person: shape of the person to keep away from.
+    """
+
+    def __init__(
+        self, arms: ArmPair, start: np.ndarray, period: float, person: PersonModel
+    ) -> None:
+        super().__init__()
+        self._arms = arms
+        self._period = period
+        self._person = person
+        self._rotation = [arm.links(start[i])[-1, :3, :3] for i, arm in enumerate(arms.arms)]
+        self._joints = self.DeclareDiscreteState(np.concatenate([start.ravel(), np.zeros(14)]))
+        self._shown = self.DeclareDiscreteState(np.concatenate([np.full(3, np.inf), np.ones(2)]))
+        for name in ("position", "velocity"):
+            for side in SIDES:
+                self.DeclareVectorInputPort(f"{side}_{name}_command", 3)
+        self.DeclareVectorInputPort("joint_position", 18)
+        ticket = {self.discrete_state_ticket(self._joints)}
+        for offset, name in ((0, "position"), (14, "velocity")):
+            for i, side in enumerate(SIDES):
+                rows = slice(offset + 7 * i, offset + 7 * i + 7)
+                self.DeclareVectorOutputPort(
+                    f"{side}_arm_{name}_command", 7, self._show(self._joints, rows), ticket
+                )
+        ticket = {self.discrete_state_ticket(self._shown)}
+        for name, rows in (("clearance", slice(0, 3)), ("speed_share", slice(3, 5))):
+            self.DeclareVectorOutputPort(
+                name, rows.stop - rows.start, self._show(self._shown, rows), ticket
+            )
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        state = context.get_discrete_state(self._joints).value()
+        q, rate = state[:14].reshape(2, 7), state[14:].reshape(2, 7)
+        seen = self.GetInputPort("joint_position").Eval(context).reshape(6, 3)
+        person = None
+        if np.isfinite(seen).all():
+            person = Capsules(*person_capsules(self._person, seen))
+        left, right = (self._goal(context, i, side, q[i]) for i, side in enumerate(SIDES))
+        found = self._arms.rates(q, rate, (left, right), self._period, person)
+        new = q + self._period * found.rate
+        discrete.set_value(self._joints, np.concatenate([new.ravel(), found.rate.ravel()]))
+        discrete.set_value(
+            self._shown, np.concatenate([[found.between_arms], found.to_person, found.share])
+        )
+
+    def _goal(self, context: Context, i: int, side: str, q: np.ndarray) -> GripperGoal:
+        position = self.GetInputPort(f"{side}_position_command").Eval(context)
+        velocity = self.GetInputPort(f"{side}_velocity_command").Eval(context)
+        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+            return GripperGoal(self._arms.arms[i].tool_position(q), np.zeros(3), self._rotation[i])
+        return GripperGoal(position, velocity, self._rotation[i])
+
+    def _show(self, state, rows: slice):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state(state).value()[rows])
+
+        return calc
