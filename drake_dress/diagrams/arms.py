@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,97 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, PdControllerGains
 
 from drake_dress.models.arm.chain import SerialArm
+from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.description import panda_urdf
-from drake_dress.models.arm.panda import LIMITS, panda
+from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal, RateParameters
 from drake_dress.models.sides import SIDES, Side
 
 # Of the drives at the joints: stiff as the maker's own position control, N·m/rad and N·m·s/rad.
 _STIFFNESS = np.array([6000.0, 6000.0, 5000.0, 5000.0, 3000.0, 2000.0, 1500.0])
 _DAMPING = 2.0 * np.sqrt(_STIFFNESS) * np.array([1.2, 1.2, 0.8, 0.8, 0.3, 0.3, 0.2])
+
+
+# Joints that the arms like: elbows bent, wrists in the middle of what they can, rad.
+HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
+# Of the search for the joints at the start: step, s, steps, and what is near enough, m.
+_SEARCH_STEP, _SEARCH_STEPS, _NEAR = 0.01, 1500, 1e-3
+
+
+class ArmReachError(ValueError):
+    """An arm does not reach where its gripper shall be."""
+
+
+@dataclass(frozen=True)
+class ArmPlacement:
+    """Where two arms stand behind a person, and how their hands point.
+
+    Attributes:
+        distance_behind: of the bases, m. spread: between them, m. height: of both, m.
+        tilt: of the hands, which point forward and this much down, rad.
+    """
+
+    distance_behind: float = 0.9
+    spread: float = 1.0
+    height: float = 1.0
+    tilt: float = 0.8
+
+    def base(self, side: Side) -> np.ndarray:
+        """Returns X_WB (4,4) of an arm."""
+        pose = np.eye(4)
+        half = 0.5 * self.spread
+        pose[:3, 3] = -self.distance_behind, half if side == "left" else -half, self.height
+        return pose
+
+    @property
+    def hand(self) -> np.ndarray:
+        """R_WT (3,3): z forward and down, y to the person's left."""
+        c, s = np.cos(self.tilt), np.sin(self.tilt)
+        return np.array([[s, 0.0, c], [0.0, 1.0, 0.0], [c, 0.0, -s]])
+
+
+@dataclass(frozen=True)
+class ArmSetup:
+    """Two arms, and their joints (2,7) at the start, rad."""
+
+    pair: ArmPair
+    start: np.ndarray
+
+
+def set_up_arms(
+    placement: ArmPlacement,
+    grippers: np.ndarray,
+    person: Capsules,
+    parameters: RateParameters | None = None,
+) -> ArmSetup:
+    """Returns two arms whose grippers are at `grippers` (2,3), p_WG, m.
+
+    Args:
+        placement: of the arms.
+        grippers: left, then right.
+        person: to keep away from.
+        parameters: of the arms' control.
+
+    Raises:
+        ArmReachError: one cannot get there; the message tells which and by how much.
+    """
+    left, right = (panda(placement.base(side)) for side in SIDES)
+    pair = ArmPair(
+        (left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, parameters or RateParameters()
+    )
+    q, rate = pair.home.copy(), np.zeros((2, 7))
+    goals = [GripperGoal(p, np.zeros(3), placement.hand) for p in grippers]
+    for _ in range(_SEARCH_STEPS):
+        rate = pair.rates(q, rate, (goals[0], goals[1]), _SEARCH_STEP, person).rate
+        q = q + _SEARCH_STEP * rate
+    for i, side in enumerate(SIDES):
+        short = float(np.linalg.norm(pair.arms[i].tool_position(q[i]) - grippers[i]))
+        if short > _NEAR:
+            raise ArmReachError(
+                f"the {side} arm does not reach its gripper's place at the start, "
+                f"{np.round(grippers[i], 3).tolist()} m: it ends {100.0 * short:.1f} cm short"
+            )
+    return ArmSetup(pair, q)
 
 
 @dataclass(frozen=True)
@@ -35,7 +120,7 @@ class PlantArm:
     tool: BodyIndex
 
 
-def add_arms(plant: MultibodyPlant, bases: dict[Side, np.ndarray]) -> dict[Side, PlantArm]:
+def add_arms(plant: MultibodyPlant, bases: Mapping[Side, np.ndarray]) -> dict[Side, PlantArm]:
     """Adds a Panda for each side, with drives that hold positions and speeds asked for.
 
     A Panda carries its own weight (its maker's control does), so gravity is off for it. Its torques

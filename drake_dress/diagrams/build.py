@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.geometry import Meshcat
 
 from drake_dress.diagrams import scenario as schema
+from drake_dress.diagrams.arms import ArmPlacement
 from drake_dress.diagrams.behaviour import Behaviour, Kind
 from drake_dress.diagrams.dressing import LocalSetup, Rates
 from drake_dress.diagrams.person import JointParameters, Person
@@ -66,7 +67,15 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         distance_behind=start.distance_behind,
         height_offset=start.height_offset,
         lateral_offset=start.lateral_offset,
+        placement=placement(scenario.station.arms),
     )
+
+
+def placement(arms: schema.Arms) -> ArmPlacement | None:
+    """Returns where arms stand; None where grippers float."""
+    if arms.model == "floating":
+        return None
+    return ArmPlacement(arms.distance_behind, arms.spread, arms.height, math.radians(arms.tilt_deg))
 
 
 def controller_policy(
@@ -182,6 +191,7 @@ def rates(scenario: schema.Scenario) -> Rates:
         global_delay=c.global_mpc.delay,
         command_period=1.0 / c.command_rate,
         log_period=1.0 / scenario.log.rate,
+        arm_period=1.0 / scenario.station.arms.rate,
     )
 
 

@@ -23,6 +23,7 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
+from drake_dress.systems.arm_controller import ArmController
 from drake_dress.systems.delay import delayed
 from drake_dress.systems.garment_oracle import GarmentOracle
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
@@ -43,6 +44,7 @@ class Rates:
     global_delay: float = 0.2
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
+    arm_period: float = 0.005
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,23 @@ def make_dressing(
                 lab, f"{side}_gripper.{quantity}_measured", governor, f"{side}_gripper_{quantity}"
             )
         connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
-        connect(governor, f"{side}_position_command", lab, f"{side}_gripper.position_command")
+        if station.robots is None:
+            connect(governor, f"{side}_position_command", lab, f"{side}_gripper.position_command")
+    arms = None
+    if station.robots is not None:
+        arms = builder.AddNamedSystem(
+            "arm_controller",
+            ArmController(
+                station.robots.pair, station.robots.start, rates.arm_period, policy.person
+            ),
+        )
+        connect(joints, "joint_position", arms, "joint_position")
+        for side in SIDES:
+            for quantity in ("position", "velocity"):
+                connect(governor, f"{side}_{quantity}_command", arms, f"{side}_{quantity}_command")
+                connect(
+                    arms, f"{side}_arm_{quantity}_command", lab, f"{side}_arm.{quantity}_command"
+                )
 
     if writer is not None:
         capsules = [(int(station.person.body_indices[c.body]), c) for c in station.person.capsules]
@@ -186,8 +204,17 @@ def make_dressing(
                 rates.log_period,
                 rates.command_period,
                 local is not None,
+                arms is not None,
             ),
         )
+        if arms is not None:
+            connect(arms, "clearance", recorder, "clearance")
+            for side in SIDES:
+                connect(arms, f"{side}_arm_position_command", recorder, f"{side}_arm_command")
+                for quantity in ("position", "velocity"):
+                    connect(
+                        lab, f"{side}_arm.{quantity}_measured", recorder, f"{side}_arm_{quantity}"
+                    )
         if local is not None:
             connect(asking, "solve_time", recorder, "local_solve_time")
         connect(lab, "cheat_garment_position", recorder, "garment_position")

@@ -13,9 +13,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
+from drake_dress.diagrams.arms import ArmReachError
 from drake_dress.diagrams.assemble import garments, parts, wired
 from drake_dress.diagrams.dressing import Dressing, is_finished
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
+from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.report.log import RunLog, RunLogWriter
 from drake_dress.report.measures import measure
@@ -46,15 +48,18 @@ def run_scenario(
         realtime_rate: at most this many simulated seconds per second; 0 for no limit.
 
     Raises:
-        UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
+        UserError: the garment cannot be used, or hangs where grippers may not or cannot be.
     """
     scenario = apply_variation(scenario)
     meshes, limits = garments(scenario, source)
-    out.mkdir(parents=True, exist_ok=True)
     page = _open_meshcat() if meshcat else None
 
     begin = clock.perf_counter()
-    p = parts(scenario, meshes, limits, page)
+    try:
+        p = parts(scenario, meshes, limits, page)
+    except ArmReachError as error:
+        raise UserError(str(source), "station.arms", str(error)) from error
+    out.mkdir(parents=True, exist_ok=True)
     with RunLogWriter(
         out / "run.h5",
         garment=p.garments.plant,
@@ -64,6 +69,7 @@ def run_scenario(
         radius=p.station.person.radius,
         capsule_radius=[c.radius for c in p.station.person.capsules],
         estimate_garment=p.garments.belief,
+        has_arms=p.station.robots is not None,
     ) as writer:
         dressing = wired(p, writer)
         interrupted = _simulate(dressing, scenario.duration, realtime_rate)

@@ -341,10 +341,23 @@ class Start:
 
 
 @dataclass
+class Arms:
+    """What carries the grippers: nothing (they float), or two Panda arms behind the person."""
+
+    model: str = "floating"  # or panda
+    distance_behind: float = 0.9  # of the arms' bases, m
+    spread: float = 1.0  # between them, m
+    height: float = 1.0  # of both, m
+    tilt_deg: float = 45.0  # of the hands, which point forward and this much down
+    rate: float = 200.0  # of the joints' commands, Hz
+
+
+@dataclass
 class Station:
     """Robots, or what stands in for them."""
 
     kind: str = "simulated"
+    arms: Arms = field(default_factory=Arms)
     gripper: Gripper = field(default_factory=Gripper)
     start: Start = field(default_factory=Start)
 
@@ -418,12 +431,18 @@ _CHOICES = {
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated",),
+    "station.arms.model": ("floating", "panda"),
 }
 
 # Ranges by the end of the dotted key, both ends allowed; all other numbers must be finite.
 _RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63 - 1),
     "duration": (0.1, 600.0),
+    "arms.distance_behind": (-5.0, 5.0),
+    "arms.spread": (0.0, 5.0),
+    "arms.height": (-1.0, 3.0),
+    "arms.tilt_deg": (-180.0, 180.0),
+    "arms.rate": (50.0, 1000.0),
     "coat.scale": (0.7, 1.4),
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),

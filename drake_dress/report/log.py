@@ -37,10 +37,20 @@ JOINT_NAMES = (
     "right_elbow",
     "right_hand",
 )
+_CLEARANCES = ("between arms", "left arm to person", "right arm to person")
 STAGE_NAMES = ("prepare", "dress", "done")
 
 _FLUSH_PERIOD = 1.0  # s of wall time
 _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+
+
+@dataclass(frozen=True)
+class ArmSample:
+    """What is logged of one arm: `q` (7,) rad, `v` (7,) rad/s, `q_commanded` (7,) rad."""
+
+    q: npt.ArrayLike
+    v: npt.ArrayLike
+    q_commanded: npt.ArrayLike
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,9 @@ class Sample:
         estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
         estimate_joint_position: (6,3), m; None where it has none.
         capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
+        arms: of each side, where there are arms.
+        clearance: (3,) least distance since the sample before between the arms, and from the left
+            and the right one to the person, m, where there are arms.
         safety: (2,) flags of `models.control.safety.Verdict` that came up since the sample before;
             left, right.
     """
@@ -81,6 +94,8 @@ class Sample:
     capsule_a: npt.ArrayLike | None = None
     capsule_b: npt.ArrayLike | None = None
     safety: npt.ArrayLike = (0, 0)
+    arms: Mapping[Side, ArmSample] | None = None
+    clearance: npt.ArrayLike | None = None
 
 
 class RunLogWriter:
@@ -97,6 +112,7 @@ class RunLogWriter:
         capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
         estimate_garment: the controller's garment; None: its positions are not logged.
         flush_period: wall time between flushes, s.
+        has_arms: whether samples have arms.
 
     Raises:
         UserError: the file cannot be written.
@@ -116,6 +132,7 @@ class RunLogWriter:
         capsule_radius: npt.ArrayLike | None = None,
         estimate_garment: GarmentMesh | None = None,
         flush_period: float = _FLUSH_PERIOD,
+        has_arms: bool = False,
     ) -> None:
         self.path = Path(path)
         try:
@@ -158,6 +175,12 @@ class RunLogWriter:
             self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
         self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
         self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
+        if has_arms:
+            for side in SIDES:
+                for name, unit in (("q", "rad"), ("v", "rad/s"), ("q_commanded", "rad")):
+                    self._add(f"/arm/{side}/{name}", (7,), unit, dtype="f8")
+            self._add("/arm/clearance", (3,), "m", dtype="f8")
+            self._series["/arm/clearance"].attrs["names"] = list(_CLEARANCES)
         if estimate_garment is not None:
             self._write_garment("/estimate/garment", estimate_garment)
             m = len(estimate_garment.rest_position)
@@ -224,7 +247,11 @@ class RunLogWriter:
             rows[f"/gripper/{side}/force"] = sample.gripper_force[side]
             for coordinate, value in zip(("s", "l", "theta"), sample.dressing[side], strict=True):
                 rows[f"/dressing/{side}/{coordinate}"] = value
+        if sample.arms is not None:
+            for side, arm in sample.arms.items():
+                rows |= {f"/arm/{side}/{name}": row for name, row in vars(arm).items()}
         optional = {
+            "/arm/clearance": sample.clearance,
             "/estimate/human/joint_position": sample.estimate_joint_position,
             "/estimate/garment/position": sample.estimate_garment_position,
             "/human/capsule_a": sample.capsule_a,

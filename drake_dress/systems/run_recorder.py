@@ -15,7 +15,7 @@ from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log import RunLogWriter, Sample
+from drake_dress.report.log import ArmSample, RunLogWriter, Sample
 
 
 class RunRecorder(LeafSystem):
@@ -40,10 +40,18 @@ class RunRecorder(LeafSystem):
         - estimated_joint_position
         - verdict
         - local_solve_time
+        - left_arm_position
+        - left_arm_velocity
+        - left_arm_command
+        - right_arm_position
+        - right_arm_velocity
+        - right_arm_command
+        - clearance
 
     Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
-    samples nothing is lost: a sample holds all their flags. The last port is there where there is a
-    local controller; of what it solves between two samples the last is kept.
+    samples nothing is lost: a sample holds all their flags. local_solve_time is there where there
+    is a local controller; of what it solves between samples the last is kept. The ports after it
+    are there with arms; of their clearance the least between two samples is kept.
 
     Args:
         writer: the open log.
@@ -53,6 +61,7 @@ class RunRecorder(LeafSystem):
         period: between samples, s.
         verdict_period: between verdicts, s.
         has_local: whether there is a local controller.
+        has_arms: whether there are arms.
     """
 
     def __init__(
@@ -64,6 +73,7 @@ class RunRecorder(LeafSystem):
         period: float,
         verdict_period: float,
         has_local: bool = False,
+        has_arms: bool = False,
     ) -> None:
         super().__init__()
         self._writer = writer
@@ -72,6 +82,8 @@ class RunRecorder(LeafSystem):
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
         self._solves = {"solve_time": 0.0, "local_solve_time": 0.0}
         self._has_local = has_local
+        self._has_arms = has_arms
+        self._clearance = np.full(3, np.inf)
         self._verdict = np.zeros(2, dtype=int)
         n = len(mesh.rest_position)
         self.DeclareVectorInputPort("garment_position", 3 * n)
@@ -89,11 +101,19 @@ class RunRecorder(LeafSystem):
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
         self.DeclareVectorInputPort("verdict", 2)
+        if has_arms:
+            for side in SIDES:
+                for name in ("position", "velocity", "command"):
+                    self.DeclareVectorInputPort(f"{side}_arm_{name}", 7)
+            self.DeclareVectorInputPort("clearance", 3)
         self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
 
     def _collect(self, context: Context) -> None:
         self._verdict |= self.GetInputPort("verdict").Eval(context).astype(int)
+        if self._has_arms:
+            now = self.GetInputPort("clearance").Eval(context)
+            self._clearance = np.minimum(self._clearance, now)
 
     def _append(self, context: Context) -> None:
         def value(name: str) -> np.ndarray:
@@ -119,6 +139,15 @@ class RunRecorder(LeafSystem):
             dressing[side] = (s if inside else 0.0, l, theta)
         self._collect(context)
         verdict, self._verdict = self._verdict, np.zeros(2, dtype=int)
+        clearance, self._clearance = self._clearance, np.full(3, np.inf)
+        arms = None
+        if self._has_arms:
+            arms = {
+                side: ArmSample(
+                    *(value(f"{side}_arm_{n}") for n in ("position", "velocity", "command"))
+                )
+                for side in SIDES
+            }
         self._writer.append(
             Sample(
                 time=context.get_time(),
@@ -137,6 +166,8 @@ class RunRecorder(LeafSystem):
                 estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
                 capsule_a=np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
                 capsule_b=np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
+                arms=arms,
+                clearance=clearance,
             )
         )
 

@@ -80,7 +80,7 @@ class DressingPolicy:
     ) -> None:
         self.mesh = mesh
         self.parameters = parameters
-        self._person = person
+        self.person = person
         elements = make_elements(mesh.rest_position, mesh.faces)
         held = np.concatenate([mesh.grasp[side] for side in SIDES])
         cloth = ExplicitBiasCloth(
@@ -138,7 +138,7 @@ class DressingPolicy:
         target = np.stack([t.position for t in targets], axis=1)
         if not p.plans:
             return replace(state, stages=stages), Decision(self._rest(x), assignment, target)
-        obstacles = person_obstacles(self._person, joints, p.time_step)
+        obstacles = person_obstacles(self.person, joints, p.time_step)
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
