@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -25,6 +25,8 @@ _DAMPING = 2.0 * np.sqrt(_STIFFNESS) * np.array([1.2, 1.2, 0.8, 0.8, 0.3, 0.3, 0
 
 # Joints that the arms like: elbows bent, wrists in the middle of what they can, rad.
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
+# Of the limits of speed, acceleration used; how far from those of position joints stay, rad.
+_SPEED_SHARE, _ROOM = 0.85, 0.02
 # Of the search for the joints at the start: step, s, steps, and what is near enough, m.
 _SEARCH_STEP, _SEARCH_STEPS, _NEAR = 0.01, 1500, 1e-3
 
@@ -42,10 +44,10 @@ class ArmPlacement:
         tilt: of the hands, which point forward and this much down, rad.
     """
 
-    distance_behind: float = 0.9
-    spread: float = 1.0
-    height: float = 1.0
-    tilt: float = 0.8
+    distance_behind: float
+    spread: float
+    height: float
+    tilt: float
 
     def base(self, side: Side) -> np.ndarray:
         """Returns X_WB (4,4) of an arm."""
@@ -56,9 +58,9 @@ class ArmPlacement:
 
     @property
     def hand(self) -> np.ndarray:
-        """R_WT (3,3): z forward and down, y to the person's left."""
+        """R_WT (3,3): z forward and down, fingers that close across a seam to the left, x."""
         c, s = np.cos(self.tilt), np.sin(self.tilt)
-        return np.array([[s, 0.0, c], [0.0, 1.0, 0.0], [c, 0.0, -s]])
+        return np.array([[0.0, s, c], [1.0, 0.0, 0.0], [0.0, c, -s]])
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,11 @@ def set_up_arms(
     Raises:
         ArmReachError: one cannot get there; the message tells which and by how much.
     """
-    left, right = (panda(placement.base(side)) for side in SIDES)
+    # what drives overshoot by stays within the limits, too
+    left, right = (
+        replace(arm, limits=arm.limits.within(_SPEED_SHARE, _ROOM))
+        for arm in (panda(placement.base(side)) for side in SIDES)
+    )
     pair = ArmPair(
         (left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, parameters or RateParameters()
     )

@@ -28,7 +28,13 @@ from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
-from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, shoulder_joint
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    Posture,
+    shoulder_height,
+    shoulder_joint,
+)
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.prediction import (
     ConstantVelocityPredictor,
@@ -67,15 +73,22 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         distance_behind=start.distance_behind,
         height_offset=start.height_offset,
         lateral_offset=start.lateral_offset,
-        placement=placement(scenario.station.arms),
+        placement=placement(scenario),
     )
 
 
-def placement(arms: schema.Arms) -> ArmPlacement | None:
+def placement(scenario: schema.Scenario) -> ArmPlacement | None:
     """Returns where arms stand; None where grippers float."""
+    arms = scenario.station.arms
     if arms.model == "floating":
         return None
-    return ArmPlacement(arms.distance_behind, arms.spread, arms.height, math.radians(arms.tilt_deg))
+    shoulders = shoulder_height(measures(scenario.person), posture(scenario.person))
+    return ArmPlacement(
+        arms.distance_behind,
+        arms.spread,
+        shoulders + arms.height_offset,
+        math.radians(arms.tilt_deg),
+    )
 
 
 def controller_policy(

@@ -345,10 +345,10 @@ class Arms:
     """What carries the grippers: nothing (they float), or two Panda arms behind the person."""
 
     model: str = "floating"  # or panda
-    distance_behind: float = 0.9  # of the arms' bases, m
+    distance_behind: float = 0.85  # of the arms' bases behind the person, m
     spread: float = 1.0  # between them, m
-    height: float = 1.0  # of both, m
-    tilt_deg: float = 45.0  # of the hands, which point forward and this much down
+    height_offset: float = -0.45  # of both, over the person's shoulders, m
+    tilt_deg: float = 35.0  # of the hands, which point forward and this much down
     rate: float = 200.0  # of the joints' commands, Hz
 
 
@@ -440,7 +440,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "duration": (0.1, 600.0),
     "arms.distance_behind": (-5.0, 5.0),
     "arms.spread": (0.0, 5.0),
-    "arms.height": (-1.0, 3.0),
+    "arms.height_offset": (-2.0, 2.0),
     "arms.tilt_deg": (-180.0, 180.0),
     "arms.rate": (50.0, 1000.0),
     "coat.scale": (0.7, 1.4),

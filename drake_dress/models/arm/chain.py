@@ -25,6 +25,16 @@ class JointLimits:
     acceleration: FloatArray
     torque: FloatArray
 
+    def within(self, share: float, room: float) -> JointLimits:
+        """Returns limits within these: a share of speeds and accelerations, and rad of room."""
+        return JointLimits(
+            self.lower + room,
+            self.upper - room,
+            share * self.speed,
+            share * self.acceleration,
+            self.torque,
+        )
+
 
 @dataclass(frozen=True)
 class SerialArm:

@@ -15,12 +15,15 @@ import xml.etree.ElementTree as ElementTree
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 import trimesh
 
 PACKAGE = "example-robot-data"
 _FOLDER = "robots/panda_description"
 # Version of what is made of the package's files.
-_FORM = 1
+_FORM = 2
+# glTF has y up, and is turned back by whoever reads it.
+_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 # Of each finger, m: two layers of cloth.
 _OPENING = 0.001
 
@@ -109,5 +112,7 @@ def _write_mesh(source: Path, folder: Path) -> None:
     if folder.exists():
         return
     folder.mkdir()
-    for name, content in trimesh.load_scene(source).export(file_type="gltf").items():
+    scene = trimesh.load_scene(source)
+    scene.apply_transform(_Y_UP)
+    for name, content in scene.export(file_type="gltf").items():
         (folder / name).write_bytes(content)

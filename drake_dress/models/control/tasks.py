@@ -68,6 +68,10 @@ class TaskParameters:
         outlook_reach: share of the distance between both armholes at rest at which it stays then.
         clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
             the hand is before the opening.
+        funnel_wide: hand this far beside the normal of an opening that it sees clearly: the opening
+            is brought in line first, `funnel_distance` before the hand, m.
+        funnel_narrow: this far beside it is drawn on, m.
+        funnel_distance: m.
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
         inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
@@ -104,6 +108,9 @@ class TaskParameters:
     outlook_distance: float = 0.35
     outlook_reach: float = 1.04
     clear_sight: float = 0.9
+    funnel_wide: float = 0.07
+    funnel_narrow: float = 0.03
+    funnel_distance: float = 0.08
     aside_free: float = 0.02
     overshoot: float = 0.12
     inside_radius: float = 0.08
@@ -354,8 +361,11 @@ class TaskPlanner:
         if retreat:
             return hand - cap * direction - p.retreat_distance * to.front
         if outlook is not None:
+            # not over the hand before it is in line: what is beside goes first
+            ahead = _ramp(beside, p.funnel_wide, p.funnel_narrow) if depth < 0.0 else 1.0
             onward = (1.0 - inside) * sleeve.v_c + inside * axis.D(0.0)
-            there: FloatArray = hand + (1.0 - facing) * outlook + facing * p.overshoot * onward
+            onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
+            there: FloatArray = hand + (1.0 - facing) * outlook + facing * onward
             return there
         onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
         goal = hand - distance * direction + p.overshoot * onward

@@ -119,20 +119,20 @@ def test_a_hand_that_was_missed_is_gone_about_in_other_ways(
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_a_tethered_sleeve_goes_where_it_is_seen_then_straight_on(
+def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
     planner: TaskPlanner, side: int
 ) -> None:
     axes = arm_axes(joints())
     hand, away = axes[side].G(0.0), np.array([-0.1, 0.02, -0.06])
     normal = np.array([0.6, 0.0, 0.8])
-    # the hand is 20 cm beside the opening's axis, on the side from which it is entered
-    sleeve = SleeveState(hand - 0.1 * normal + [0.0, 0.2, 0.0], normal)
-    sleeves = [sleeve, SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))]
     on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
     outlook = (away, None) if side == 0 else (None, away)
     rows = np.stack([joints()] * (HORIZON + 1))
 
-    def asked(clear: float, retreats: bool) -> np.ndarray:
+    def asked(clear: float, retreats: bool, beside: float = 0.2) -> np.ndarray:
+        # the hand is beside the opening's axis, on the side from which it is entered
+        sleeve = SleeveState(hand - 0.1 * normal + [0.0, beside, 0.0], normal)
+        sleeves = [sleeve, SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))]
         off = SleeveFacts(False, 0.0, 0.2, 0.2, 0.0, in_sight=clear > 0.0, clear=clear)
         order = (off, on) if side == 0 else (on, off)
         given = Assignment(
@@ -143,9 +143,12 @@ def test_a_tethered_sleeve_goes_where_it_is_seen_then_straight_on(
         return found
 
     np.testing.assert_allclose(asked(0.0, False), hand + away)
-    overshoot = planner.parameters.overshoot
-    np.testing.assert_allclose(asked(1.0, False), hand + overshoot * normal)
-    halfway = 0.5 * (away + overshoot * normal)
-    np.testing.assert_allclose(asked(0.5, False), hand + halfway)
+    p = planner.parameters
+    before, beyond = -p.funnel_distance * normal, p.overshoot * normal
+    np.testing.assert_allclose(asked(1.0, False), hand + before)
+    np.testing.assert_allclose(asked(0.5, False), hand + 0.5 * (away + before))
+    np.testing.assert_allclose(asked(1.0, False, p.funnel_narrow), hand + beyond)
+    between = 0.5 * (p.funnel_narrow + p.funnel_wide)
+    np.testing.assert_allclose(asked(1.0, False, between), hand + 0.5 * (before + beyond))
     # one that has just missed the hand keeps away first, seen or not
     assert np.linalg.norm(asked(1.0, True) - hand) > planner.parameters.retreat_distance

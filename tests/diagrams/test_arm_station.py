@@ -1,0 +1,66 @@
+"""A scenario on arms: where they start, what is logged, and what is said when they cannot reach."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from drake_dress.diagrams.arms import ArmPlacement, ArmReachError, set_up_arms
+from drake_dress.diagrams.run import run_scenario
+from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.errors import UserError
+from drake_dress.models.arm.clearance import Capsules
+from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.sides import SIDES
+
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "dummy_standing.yaml"
+COARSE = ("station.arms.model=panda", "plant.spacing=0.05", "controller.spacing=0.06")
+NOBODY = Capsules(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+GRIPPERS = np.array([[-0.75, 0.22, 1.4], [-0.75, -0.22, 1.4]])
+BEHIND = ArmPlacement(0.85, 1.0, 0.95, 0.6)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.4])
+def test_arms_start_where_grippers_are(ahead: float) -> None:
+    """With their hands as asked, unless that is too near to their bases."""
+    grippers = GRIPPERS + [ahead, 0.0, 0.0]
+    setup = set_up_arms(BEHIND, grippers, NOBODY)
+    assert np.linalg.det(BEHIND.hand) == pytest.approx(1.0)
+    for i in (0, 1):
+        arm = setup.pair.arms[i]
+        tool = arm.links(setup.start[i])[-1]
+        np.testing.assert_allclose(tool[:3, 3], grippers[i], atol=1e-3)
+        if ahead:
+            np.testing.assert_allclose(tool[:3, :3], BEHIND.hand, atol=0.1)
+        assert (setup.start[i] > LIMITS.lower).all() and (setup.start[i] < LIMITS.upper).all()
+
+
+def test_a_place_out_of_reach_is_told() -> None:
+    with pytest.raises(ArmReachError, match=r"left arm does not reach .* \d\d\.\d cm short"):
+        set_up_arms(BEHIND, GRIPPERS + [1.5, 0.0, 0.0], NOBODY)
+
+
+def test_a_run_that_cannot_start_writes_nothing(tmp_path: Path) -> None:
+    scenario = load_scenario(SCENARIO, [*COARSE, "station.arms.distance_behind=3.0"])
+    with pytest.raises(UserError, match="station.arms: the left arm does not reach"):
+        run_scenario(scenario, SCENARIO, tmp_path / "out", meshcat=False)
+    assert not (tmp_path / "out").exists()
+
+
+def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
+    scenario = load_scenario(SCENARIO, [*COARSE, "duration=2.0"])
+    run_scenario(scenario, SCENARIO, tmp_path, meshcat=False)
+    with h5py.File(tmp_path / "run.h5") as log:
+        for side in SIDES:
+            q, asked = log[f"arm/{side}/q"][:], log[f"arm/{side}/q_commanded"][:]
+            assert np.abs(q - asked).max() < 0.02
+            assert (np.abs(log[f"arm/{side}/v"][:]) <= LIMITS.speed).all()
+            assert (q > LIMITS.lower).all() and (q < LIMITS.upper).all()
+            moved = np.linalg.norm(np.diff(log[f"gripper/{side}/position"][:], axis=0), axis=1)
+            assert moved.sum() > 0.05
+        assert log["arm/clearance"][:].min() > 0.045
+        np.testing.assert_array_equal(
+            log["arm/clearance"].attrs["names"],
+            ["between arms", "left arm to person", "right arm to person"],
+        )
