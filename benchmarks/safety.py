@@ -34,7 +34,7 @@ from pydrake.systems.framework import (
     DiscreteValues,
     LeafSystem,
 )
-from pydrake.systems.primitives import VectorLogSink
+from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.sides import SIDES
@@ -296,6 +296,8 @@ def measure(failure: str, ask: Ask, disturb: Disturb, commands: int, seed: int) 
     sensors = builder.AddSystem(FailingSensors(disturb, rng))
     governor = builder.AddSystem(SafetyGovernor(START, PERIOD, LIMITS))
     builder.Connect(controller.GetOutputPort("request_time"), governor.GetInputPort("request_time"))
+    permission = builder.AddSystem(ConstantVectorSource([1.0]))
+    builder.Connect(permission.get_output_port(), governor.GetInputPort("permission"))
     sinks = {}
     for i, side in enumerate(SIDES):
         gripper = builder.AddSystem(

@@ -15,7 +15,7 @@ from drake_dress import __version__
 from drake_dress.errors import UserError
 
 UNUSABLE, INTERRUPTED = 2, 130
-BENCHMARKS = ("cloth", "dressing", "explain", "local")
+BENCHMARKS = ("cloth", "dressing", "explain", "hardware", "local")
 
 _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml
@@ -23,6 +23,8 @@ _EXAMPLES = """examples:
   drake-dress run scenarios/dummy_standing.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress dataset measured --hide random --seed 1 --out out/lab
   drake-dress explain out/lab/measured.h5 --scenario scenarios/measured.yaml
+  drake-dress sim-station scenarios/lab.yaml
+  drake-dress run scenarios/lab.yaml --set station.kind=hardware
   drake-dress replay out/dummy_standing-seed0/run.h5
   drake-dress bench cloth --only draping,growth --json cloth.json
 
@@ -91,6 +93,46 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(command=_run)
 
+    lab = verbs.add_parser(
+        "sim-station", help="play the lab behind the messages of hardware, for a run to drive"
+    )
+    lab.add_argument("scenario", metavar="SCENARIO.yaml")
+    lab.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>-lab")
+    lab.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
+    lab.add_argument("--seed", type=int, metavar="N", help="in place of the scenario's seed")
+    lab.add_argument(
+        "--realtime-rate",
+        type=_rate,
+        default=1.0,
+        metavar="R",
+        help="at most R simulated seconds per second (default: 1)",
+    )
+    lab.set_defaults(command=_sim_station)
+
+    calibrate = verbs.add_parser(
+        "calibrate", help="find where a camera stands, by a ChArUco board in a gripper"
+    )
+    calibrate.add_argument(
+        "directory", metavar="DIR", nargs="?", help="with poses.csv (image,q1,…,q7) and pictures"
+    )
+    calibrate.add_argument("--scenario", metavar="SCENARIO.yaml", default="scenarios/lab.yaml")
+    calibrate.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
+    calibrate.add_argument(
+        "--side", choices=("left", "right"), default="left", help="arm that holds the board"
+    )
+    calibrate.add_argument(
+        "--board",
+        metavar="CxR:SQUARE:MARKER:DICT",
+        default="7x5:0.03:0.022:DICT_4X4_50",
+        help="m; default: %(default)s",
+    )
+    calibrate.add_argument(
+        "--camera", metavar="NAME", help="of the scenario, for its intrinsics; default: find them"
+    )
+    calibrate.add_argument("--out", metavar="FILE", help="default: DIR/calibration.json")
+    calibrate.add_argument("--print-board", metavar="FILE.png", help="write the board to print")
+    calibrate.set_defaults(command=_calibrate)
+
     replay = verbs.add_parser("replay", help="show a log in Meshcat, with a slider")
     replay.add_argument("log", metavar="run.h5")
     replay.add_argument("--port", type=int, metavar="PORT", help="default: a free one")
@@ -132,6 +174,35 @@ def _parser() -> argparse.ArgumentParser:
         "bench", help="measure speed and accuracy, beside other simulators where installed"
     )
     return parser
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from drake_dress.diagrams.calibration import calibrate_camera, parse_board, write_board
+    from drake_dress.diagrams.scenario import load_scenario
+
+    board = parse_board(options.board)
+    if options.print_board is not None:
+        write_board(board, Path(options.print_board))
+        return 0
+    if options.directory is None:
+        raise UserError("calibrate", "", "expected DIR, or --print-board FILE.png")
+    directory, source = Path(options.directory), Path(options.scenario)
+    if not directory.is_dir():
+        raise UserError(str(directory), "", "no such directory, expected one with poses.csv")
+    out = Path(options.out) if options.out else directory / "calibration.json"
+    scenario = load_scenario(source, options.set)
+    calibrate_camera(directory, scenario, source, options.side, board, options.camera, out)
+    return 0
+
+
+def _sim_station(options: argparse.Namespace) -> int:
+    from drake_dress.diagrams.lab import run_lab
+    from drake_dress.diagrams.scenario import load_scenario
+
+    scenario = load_scenario(options.scenario, options.set, options.seed)
+    source = Path(options.scenario)
+    out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}-lab")
+    return run_lab(scenario, source, out, options.realtime_rate)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -21,6 +21,38 @@ BAD_YAML = {
     "value for a group": ("plant: 3", ["plant", "keys"]),
     "empty group": ("plant:", ["plant", "keys"]),
     "number for text": ("person: {posture: 3}", ["person.posture", "standing"]),
+    "hardware without arms": (
+        "station: {kind: hardware}",
+        ["station.arms.model", "floating", "expected panda"],
+    ),
+    "no bus": (
+        "station: {hardware: {lcm_url: nonsense}}",
+        ["station.hardware.lcm_url", "nonsense", "udpm://"],
+    ),
+    "camera without a name": (
+        "station: {cameras: [{position: [1, 0, 1], target: [0, 0, 1]}]}",
+        ["station.cameras[0].name", "front"],
+    ),
+    "camera that looks down": (
+        "station: {cameras: [{name: a, position: [0, 0, 2], target: [0, 0, 1]}]}",
+        ["station.cameras[0].target", "straight above or below"],
+    ),
+    "camera at no place": (
+        "station: {cameras: [{name: a, position: [0, 0], target: [0, 0, 1]}]}",
+        ["station.cameras[0].position", "x, y, z"],
+    ),
+    "fault of an unknown kind": (
+        "lab: {faults: [{kind: earthquake}]}",
+        ["lab.faults[0].kind", "earthquake", "bus_lost"],
+    ),
+    "fault of an unknown source": (
+        "lab: {faults: [{source: camera_front}]}",
+        ["lab.faults[0].source", "camera_front", "left_arm"],
+    ),
+    "fault before the run": (
+        "lab: {faults: [{start: -1}]}",
+        ["lab.faults[0].start", "0 to"],
+    ),
     "unknown posture": ("person: {posture: lying}", ["person.posture", "standing or sitting"]),
     "unknown person": (
         "person: {behaviour: {kind: robot}}",

@@ -16,16 +16,22 @@ from typing import Any
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import read_results, seed_range, write_results
-from benchmarks.parser import INTERRUPTED, OneLineParser, some_of
+from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
+from benchmarks.section import END, around, begin, write_between
 from drake_dress.discrepancy.results import write_text
+from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
+
+_NAME = "dressing"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
+    if options.into:
+        around(options.into, _NAME)
     chosen = cases(options.methods, options.persons, options.coats, options.seeds)
-    kept = {} if options.json is None else read_results(options.json, _name, "dressing")
+    kept = {} if options.json is None else read_results(options.json, _name, _NAME)
     new = [] if options.kept else [case for case in chosen if case.name not in kept]
     print(f"{len(chosen)} runs, {len(new)} of them not run yet", flush=True)
     with caught_interrupt() as stop, ThreadPoolExecutor(options.jobs) as pool:
@@ -42,7 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
     results = [kept[case.name] for case in chosen if case.name in kept]
-    print("\n" + "\n\n".join(t.text() for t in tables(results) if t.rows), flush=True)
+    shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
+    print(f"\n{shown}", flush=True)
+    if options.into:
+        write_between(options.into, _NAME, shown)
     if options.plot:
         write_text(options.plot, figure(results))
     if stop.is_set():
@@ -76,9 +85,19 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
     parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
     parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the tables between {begin(_NAME)} and {END}",
+    )
     parser.add_argument("--plot", type=Path, metavar="FILE", help="s, l and force over time, SVG")
     return parser
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except UserError as error:
+        print(f"drake-dress: {error}", file=sys.stderr)
+        sys.exit(UNUSABLE)

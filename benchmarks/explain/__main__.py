@@ -23,6 +23,7 @@ from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
+from benchmarks.section import END, around, begin, write_between
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
@@ -33,7 +34,7 @@ from drake_dress.models.effects.effect import Effect
 
 GROUPS = ("effect", "nothing", "pair", "coarse", "outside")
 _DRAWS = {"effect": 4, "nothing": 40, "pair": 20, "coarse": 10, "outside": 4}
-BEGIN, END = "<!-- bench explain -->", "<!-- end -->"
+_NAME = "explain"
 _SCENARIO = Path(__file__).parents[2] / "scenarios" / "measured.yaml"
 
 
@@ -41,11 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs all cases and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     if options.into:
-        _around(options.into)
+        around(options.into, _NAME)
     draws = {g: options.draws or _DRAWS[g] for g in GROUPS}
     chosen = study(options.only, draws, options.seed, options.size, options.noise, options.beside)
     workers = max(1, (os.cpu_count() or 1) // options.jobs)
-    kept = {} if options.json is None else read_results(options.json, name_of, "explain")
+    kept = {} if options.json is None else read_results(options.json, name_of, _NAME)
     new = [case for case in chosen if case.name not in kept]
     if options.kept:
         chosen, new = [case for case in chosen if case.name in kept], []
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
     print(f"\n{shown}", flush=True)
     if options.into:
-        write_between(options.into, shown)
+        write_between(options.into, _NAME, shown)
     if options.plot:
         write_text(options.plot, reliability_plot(results))
     return INTERRUPTED if stop.is_set() else 0
@@ -169,7 +170,10 @@ def _parser() -> argparse.ArgumentParser:
         "--beside", type=int, default=1, metavar="N", help="draws at further sizes and noises"
     )
     parser.add_argument(
-        "--into", type=Path, metavar="FILE.md", help=f"put the tables between {BEGIN} and {END}"
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the tables between {begin(_NAME)} and {END}",
     )
     parser.add_argument("--cache", type=Path, default=Path("out/bench-explain"), metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases side by side")
@@ -191,29 +195,6 @@ def _numbers(text: str) -> list[float]:
     if not all(0.0 < v < float("inf") for v in values):
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected more than 0")
     return values
-
-
-def write_between(path: Path, text: str) -> None:
-    """Puts text between the two marks of a file.
-
-    Raises:
-        UserError: the file cannot be read, or lacks them.
-    """
-    before, after = _around(path)
-    write_text(path, f"{before}{BEGIN}\n\n{text}\n\n{END}{after}")
-
-
-def _around(path: Path) -> tuple[str, str]:
-    """Returns what a file holds before and after the marks."""
-    try:
-        content = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
-    before, _, rest = content.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    if content.count(BEGIN) != 1 or content.count(END) != 1 or END not in rest:
-        raise UserError(str(path), "", f"expected one {BEGIN}, and one {END} after it")
-    return before, after
 
 
 if __name__ == "__main__":

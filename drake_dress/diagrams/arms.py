@@ -71,6 +71,13 @@ class ArmSetup:
     start: np.ndarray
 
 
+def arm_bases(setup: ArmSetup | None) -> dict[Side, np.ndarray] | None:
+    """Returns X_WB (4,4) of each arm; None where there are none."""
+    if setup is None:
+        return None
+    return {side: arm.base for side, arm in zip(SIDES, setup.pair.arms, strict=True)}
+
+
 def set_up_arms(
     placement: ArmPlacement,
     grippers: np.ndarray,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,8 +10,10 @@ from pydrake.geometry import Meshcat
 
 from drake_dress.diagrams.build import (
     controller_policy,
-    effects,
+    described_person,
+    hardware_parameters,
     local_setup,
+    planned_arms,
     plant_station,
     predictor,
     rates,
@@ -19,6 +22,12 @@ from drake_dress.diagrams.build import (
 )
 from drake_dress.diagrams.dressing import Dressing, make_dressing
 from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.hardware_station import (
+    at_start,
+    listen,
+    make_hardware_station,
+    open_bus,
+)
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.station import Station, start_grippers
 from drake_dress.errors import UserError
@@ -26,7 +35,6 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLogWriter
 
 
@@ -80,9 +88,47 @@ def parts(
         limits: within which it starts.
         page: where the run is shown, if it is.
     """
-    station = plant_station(scenario, meshes.plant, page)
+    station = plant_station(scenario, meshes.plant, page, meshes.belief)
     policy = controller_policy(scenario, meshes.belief, station.person)
     return Parts(scenario, meshes, station, policy, limits, page)
+
+
+def hardware_parts(
+    scenario: Scenario,
+    meshes: Garments,
+    limits: SafetyLimits,
+    page: Meshcat | None = None,
+    told: Callable[[str], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Parts:
+    """Returns the parts of a scenario's diagram whose station is behind messages.
+
+    Args:
+        scenario: with nothing left to draw.
+        meshes: its garments; the controller's alone is used, and stands for both then.
+        limits: within which it starts.
+        page: where the run is shown, if it is.
+        told: is called with each source that is heard.
+        stopped: whether to give up waiting.
+
+    Raises:
+        ArmReachError: the arms do not reach where the run begins.
+        StationSilentError: a source is silent.
+        NotAtStartError: an arm is elsewhere.
+        NoBusError: there is no such bus.
+    """
+    at = station_parameters(scenario, meshes.belief)
+    person = described_person(at)
+    planned = planned_arms(at, person)
+    policy = controller_policy(scenario, meshes.belief, person)
+    p = hardware_parameters(scenario, len(meshes.belief.rest_position))
+    # subscriptions in Python end with their bus: a run has none
+    heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
+    robots = at_start(p, planned, heard.joints)
+    lcm = open_bus(p.links.lcm_url)
+    station = make_hardware_station(p, lcm, person, robots, heard)
+    believed = Garments(meshes.belief, meshes.belief)
+    return Parts(scenario, believed, station, policy, limits, page)
 
 
 def wired(
@@ -102,12 +148,10 @@ def wired(
         p.station,
         p.garments.plant,
         p.policy,
-        barycentric_transfer(p.garments.plant, p.garments.belief),
         rates(p.scenario),
         p.limits,
         writer,
         p.page,
-        effects(p.scenario),
         predictor(p.scenario),
         local,
     )

@@ -7,13 +7,23 @@ from dataclasses import fields
 
 import numpy as np
 from pydrake.geometry import Meshcat
+from pydrake.multibody.plant import MultibodyPlant
 
 from drake_dress.diagrams import scenario as schema
-from drake_dress.diagrams.arms import ArmPlacement
+from drake_dress.diagrams.arms import ArmPlacement, ArmSetup, set_up_arms
 from drake_dress.diagrams.behaviour import Behaviour, Kind
+from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.dressing import LocalSetup, Rates
-from drake_dress.diagrams.person import JointParameters, Person
-from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
+from drake_dress.diagrams.hardware_station import HardwareParameters, Links
+from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.diagrams.station import (
+    Sight,
+    SimulatedStation,
+    StationParameters,
+    make_simulated_station,
+    person_at_rest,
+    start_grippers,
+)
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.local_control import LocalController, constrained_ddp
@@ -26,6 +36,7 @@ from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.body import (
@@ -43,12 +54,78 @@ from drake_dress.models.human.prediction import (
 )
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES
+from drake_dress.models.supervision.supervision import Patience
 from drake_dress.solvers.cone_programme import cone_programme
 
 
-def plant_station(scenario: schema.Scenario, mesh: GarmentMesh, meshcat: Meshcat | None) -> Station:
-    """Returns the simulated station with the scenario's person and garment."""
-    return make_simulated_station(station_parameters(scenario, mesh), meshcat)
+def plant_station(
+    scenario: schema.Scenario,
+    mesh: GarmentMesh,
+    meshcat: Meshcat | None,
+    belief: GarmentMesh | None = None,
+) -> SimulatedStation:
+    """Returns the simulated station with the scenario's person and garment.
+
+    Args:
+        scenario: with nothing left to draw.
+        mesh: the true garment.
+        meshcat: where it is shown, if it is.
+        belief: the controller's garment, of which there are estimates then.
+    """
+    sight = None
+    if belief is not None:
+        sight = Sight(barycentric_transfer(mesh, belief), 1.0 / scenario.controller.command_rate)
+    return make_simulated_station(station_parameters(scenario, mesh), meshcat, sight)
+
+
+def described_person(p: StationParameters) -> Person:
+    """Returns the person as it is described, in a plant of its own that nobody simulates."""
+    return add_person(
+        MultibodyPlant(p.time_step), p.measures, p.posture, p.arms, p.joints, turns=False
+    )
+
+
+def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
+    """Returns two arms where a run begins.
+
+    Raises:
+        ArmReachError: they do not reach there.
+    """
+    if p.placement is None:
+        raise ValueError("grippers float, expected arms")
+    return set_up_arms(p.placement, start_grippers(p), person_at_rest(p, p.measures, person))
+
+
+def links(scenario: schema.Scenario) -> Links:
+    """Returns where a hardware station's messages go."""
+    h = scenario.station.hardware
+    return Links(
+        lcm_url=h.lcm_url,
+        status=h.status_channel,
+        command=h.command_channel,
+        garment=h.garment_channel,
+        person=h.person_channel,
+        camera=h.camera_channel,
+        command_period=1.0 / scenario.station.arms.rate,
+    )
+
+
+def hardware_parameters(scenario: schema.Scenario, node_count: int) -> HardwareParameters:
+    """Returns what a hardware station is made of, with so many nodes of the estimate."""
+    h = scenario.station.hardware
+    return HardwareParameters(
+        links=links(scenario),
+        mode=scenario.station.arms.mode,
+        node_count=node_count,
+        cameras=tuple(c.name for c in scenario.station.cameras),
+        stale_status=h.stale_status,
+        stale_estimate=h.stale_estimate,
+        stale_camera=h.stale_camera,
+        patience=Patience(h.settle_time, h.patience),
+        wait=h.wait,
+        start_distance=h.start_distance,
+        start_angle=h.start_angle,
+    )
 
 
 def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationParameters:
@@ -74,6 +151,24 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         height_offset=start.height_offset,
         lateral_offset=start.lateral_offset,
         placement=placement(scenario),
+        mode=scenario.station.arms.mode,
+        cameras=cameras(scenario),
+    )
+
+
+def cameras(scenario: schema.Scenario) -> tuple[Camera, ...]:
+    """Returns the scenario's cameras; degrees become radians."""
+    return tuple(
+        Camera(
+            c.name,
+            np.array(c.position),
+            np.array(c.target),
+            c.width,
+            c.height,
+            math.radians(c.fov_deg),
+            c.rate,
+        )
+        for c in scenario.station.cameras
     )
 
 

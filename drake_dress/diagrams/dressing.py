@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Multiplexer
 
+from drake_dress.diagrams.hardware_station import HardwareStation
 from drake_dress.diagrams.station import Station
 from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.models.effects.composition import true_times
-from drake_dress.models.effects.effect import Effect
-from drake_dress.models.effects.sensing import TimeOffset
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLogWriter
 from drake_dress.systems.arm_controller import ArmController
-from drake_dress.systems.delay import delayed
-from drake_dress.systems.garment_oracle import GarmentOracle
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
 from drake_dress.systems.human_predictor import HumanPredictor
-from drake_dress.systems.joint_oracle import JointOracle
 from drake_dress.systems.local_controller import LocalCompensation
 from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
@@ -45,6 +38,7 @@ class Rates:
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
     arm_period: float = 0.005
+    arm_offset: float = 0.0005
 
 
 @dataclass(frozen=True)
@@ -93,12 +87,10 @@ def make_dressing(
     station: Station,
     mesh: GarmentMesh,
     policy: DressingPolicy,
-    transfer: sp.csr_array,
     rates: Rates,
     limits: SafetyLimits,
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
-    effects: Sequence[Effect] = (),
     predictor: MotionPredictor | None = None,
     local: LocalSetup | None = None,
 ) -> Dressing:
@@ -106,31 +98,30 @@ def make_dressing(
 
     Args:
         station: simulated or hardware; only its exported ports are used.
-        mesh: the plant's garment.
+        mesh: the true garment; where it is not known, the controller's.
         policy: of the global controller, with the controller's garment.
-        transfer: (m,n) from the plant's nodes to the controller's.
         rates: of controllers and log.
         limits: that stand between controllers and grippers.
         writer: open log, if one is kept.
         meshcat: where the run is shown, if it is.
-        effects: those on cameras and their clock, which lie between truth and controllers. A clock
-            that is behind changes nothing for controllers that do not look at stamps.
         predictor: what is believed of how the arms move on; that they stay, when None.
         local: the local controller between plan and governor; the plan is followed when None.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
-    garment = builder.AddNamedSystem("garment_oracle", GarmentOracle(transfer, effects))
-    joints = builder.AddNamedSystem(
-        "joint_oracle", JointOracle(station.person.joint_points, effects)
-    )
     believed = predictor or StillPredictor()
     p = policy.parameters
     predicted = builder.AddNamedSystem(
         "human_predictor", HumanPredictor(believed, p.time_step, p.horizon)
     )
     mpc = builder.AddNamedSystem(
-        "global_mpc", GlobalMpc(policy, rates.global_period, rates.global_delay)
+        "global_mpc",
+        GlobalMpc(
+            policy,
+            rates.global_period,
+            rates.global_delay,
+            waits=not isinstance(station, HardwareStation),
+        ),
     )
     if local is None:
         asking = builder.AddNamedSystem("plan_follower", PlanFollower())
@@ -143,31 +134,22 @@ def make_dressing(
     def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]
         builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
 
-    connect(lab, "cheat_garment_position", garment, "garment_position")
-    connect(lab, "cheat_garment_velocity", garment, "garment_velocity")
-    connect(lab, "cheat_body_poses", joints, "body_poses")
-    connect(joints, "joint_position", predicted, "joint_position")
-    late = -float(true_times(np.zeros(1), effects, TimeOffset.NAME)[0])
+    connect(lab, "estimate.joint_position", predicted, "joint_position")
     for quantity in ("position", "velocity"):
-        port = garment.GetOutputPort(f"estimated_{quantity}")
-        still = np.zeros(port.size())
-        if quantity == "position":
-            still = np.asarray(transfer @ station.cloth.start_position).ravel()
-        port = delayed(builder, port, still, rates.command_period, late)
-        builder.Connect(port, mpc.GetInputPort(f"garment_{quantity}"))
-        if quantity == "position" and local is not None:
-            builder.Connect(port, asking.GetInputPort("garment_position"))
+        connect(lab, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
     connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
     if local is not None:
         soon = builder.AddNamedSystem(
             "near_human_predictor", HumanPredictor(believed, local.joints_step, local.joints_count)
         )
-        connect(joints, "joint_position", soon, "joint_position")
+        connect(lab, "estimate.joint_position", soon, "joint_position")
+        connect(lab, "estimate.garment_position", asking, "garment_position")
         connect(soon, "predicted_joint_position", asking, "predicted_joint_position")
         for side in SIDES:
             connect(lab, f"{side}_gripper.position_measured", asking, f"{side}_gripper_position")
     connect(mpc, "plan", asking, "plan")
     connect(asking, "request_time", governor, "request_time")
+    connect(lab, "permission", governor, "permission")
     for side in SIDES:
         for quantity in ("position", "force"):
             connect(
@@ -181,17 +163,23 @@ def make_dressing(
         arms = builder.AddNamedSystem(
             "arm_controller",
             ArmController(
-                station.robots.pair, station.robots.start, rates.arm_period, policy.person
+                station.robots.pair,
+                station.robots.start,
+                rates.arm_period,
+                policy.person,
+                rates.arm_offset,
             ),
         )
-        connect(joints, "joint_position", arms, "joint_position")
+        connect(lab, "estimate.joint_position", arms, "joint_position")
         for side in SIDES:
+            connect(lab, f"{side}_arm.position_measured", arms, f"{side}_arm_position")
+            connect(lab, f"{side}_arm.stopped", arms, f"{side}_arm_stopped")
             for quantity in ("position", "velocity"):
                 connect(governor, f"{side}_{quantity}_command", arms, f"{side}_{quantity}_command")
-                connect(
-                    arms, f"{side}_arm_{quantity}_command", lab, f"{side}_arm.{quantity}_command"
-                )
+                if lab.HasInputPort(f"{side}_arm.{quantity}"):
+                    connect(arms, f"{side}_arm_{quantity}_command", lab, f"{side}_arm.{quantity}")
 
+    true = lab.HasOutputPort("cheat_garment_position")
     if writer is not None:
         capsules = [(int(station.person.body_indices[c.body]), c) for c in station.person.capsules]
         recorder = builder.AddNamedSystem(
@@ -200,7 +188,7 @@ def make_dressing(
                 writer,
                 mesh,
                 len(policy.mesh.rest_position),
-                capsules,
+                capsules if true else policy.person,
                 rates.log_period,
                 rates.command_period,
                 local is not None,
@@ -211,19 +199,19 @@ def make_dressing(
             connect(arms, "clearance", recorder, "clearance")
             for side in SIDES:
                 connect(arms, f"{side}_arm_position_command", recorder, f"{side}_arm_command")
-                for quantity in ("position", "velocity"):
+                for quantity in ("position", "velocity", "torque"):
                     connect(
                         lab, f"{side}_arm.{quantity}_measured", recorder, f"{side}_arm_{quantity}"
                     )
         if local is not None:
             connect(asking, "solve_time", recorder, "local_solve_time")
-        connect(lab, "cheat_garment_position", recorder, "garment_position")
-        connect(lab, "cheat_contact", recorder, "contact")
-        connect(lab, "cheat_contact_force", recorder, "contact_force")
-        connect(lab, "cheat_body_poses", recorder, "body_poses")
-        connect(joints, "joint_position", recorder, "joint_position")
-        connect(joints, "joint_position", recorder, "estimated_joint_position")
-        connect(garment, "estimated_position", recorder, "estimated_position")
+        if true:
+            for name in ("contact", "contact_force", "body_poses"):
+                connect(lab, f"cheat_{name}", recorder, name)
+        for name in ("garment_position", "joint_position"):
+            connect(lab, f"cheat_{name}" if true else f"estimate.{name}", recorder, name)
+        connect(lab, "estimate.joint_position", recorder, "estimated_joint_position")
+        connect(lab, "estimate.garment_position", recorder, "estimated_position")
         connect(mpc, "stage", recorder, "stage")
         connect(mpc, "solve_time", recorder, "solve_time")
         connect(governor, "verdict", recorder, "verdict")
@@ -245,7 +233,12 @@ def make_dressing(
                 lab.GetOutputPort(f"{side}_gripper.position_measured"), grippers.get_input_port(i)
             )
         builder.Connect(grippers.get_output_port(), shown.GetInputPort("gripper_position"))
-        connect(lab, "cheat_garment_position", shown, "garment_position")
+        connect(
+            lab,
+            "cheat_garment_position" if true else "estimate.garment_position",
+            shown,
+            "garment_position",
+        )
         connect(mpc, "target", shown, "targets")
         connect(mpc, "stage", shown, "stage")
     diagram = builder.Build()

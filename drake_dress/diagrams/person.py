@@ -34,6 +34,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from drake_dress.diagrams.body_contact import add_body_contact
 from drake_dress.errors import UserError
 from drake_dress.models.human.arm import JOINT_NAMES, Arm, Arms
 from drake_dress.models.human.body import (
@@ -164,8 +165,8 @@ def add_person(
 ) -> Person:
     """Adds a person who stands or sits at `position` (2,), m, and faces +x.
 
-    The default context of the finalized plant has the person in the rest pose. Bodies are drawn
-    where the plant has a SceneGraph; they do not collide, as only the garment touches them.
+    The default context of the finalized plant has the person in the rest pose. Where the plant has
+    a SceneGraph, bodies are drawn, and arms do not go through trunk, legs and each other.
 
     Args:
         plant: not finalized.
@@ -209,6 +210,7 @@ def add_person(
     if plant.geometry_source_is_registered():
         for i, c in enumerate(capsules):
             _register(plant, bodies[c.body], c, f"{c.body}_{i}")
+        add_body_contact(plant, bodies, capsules, measures, posture, arms)
     limb = [measures.upper_arm_radius, measures.forearm_radius, measures.hand_radius]
     return Person(
         model,

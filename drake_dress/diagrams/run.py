@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time as clock
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +14,25 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress import __version__
-from drake_dress.diagrams.arms import ArmReachError
-from drake_dress.diagrams.assemble import garments, parts, wired
+from drake_dress.diagrams.arms import ArmReachError, arm_bases
+from drake_dress.diagrams.assemble import Garments, Parts, garments, hardware_parts, parts, wired
 from drake_dress.diagrams.dressing import Dressing, is_finished
+from drake_dress.diagrams.hardware_station import (
+    HardwareStation,
+    NoBusError,
+    NotAtStartError,
+    StationSilentError,
+)
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog, RunLogWriter
 from drake_dress.report.measures import measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.report_html import write_report
 from drake_dress.report.summary import summarize, write_summary
+from drake_dress.systems.command_meter import process_age
 
 DONE, NOT_DRESSED, INTERRUPTED = 0, 1, 130
 # Simulated time between looks at the stages, s, and for which both sleeves must stay done.
@@ -45,20 +54,21 @@ def run_scenario(
         source: the scenario's file, for messages and paths relative to it.
         out: directory to write to; made when all input has proved usable.
         meshcat: whether to show the run live.
-        realtime_rate: at most this many simulated seconds per second; 0 for no limit.
+        realtime_rate: at most this many simulated seconds per second; 0 for no limit, which is 1
+            for hardware.
 
     Raises:
-        UserError: the garment cannot be used, or hangs where grippers may not or cannot be.
+        UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
+            hardware is silent, or not where the run begins.
     """
     scenario = apply_variation(scenario)
     meshes, limits = garments(scenario, source)
     page = _open_meshcat() if meshcat else None
+    p = _parts(scenario, source, meshes, limits, page)
+    if isinstance(p.station, HardwareStation):
+        realtime_rate = realtime_rate or 1.0
 
     begin = clock.perf_counter()
-    try:
-        p = parts(scenario, meshes, limits, page)
-    except ArmReachError as error:
-        raise UserError(str(source), "station.arms", str(error)) from error
     out.mkdir(parents=True, exist_ok=True)
     with RunLogWriter(
         out / "run.h5",
@@ -69,19 +79,67 @@ def run_scenario(
         radius=p.station.person.radius,
         capsule_radius=[c.radius for c in p.station.person.capsules],
         estimate_garment=p.garments.belief,
-        has_arms=p.station.robots is not None,
+        bases=arm_bases(p.station.robots),
+        estimated=isinstance(p.station, HardwareStation),
     ) as writer:
         dressing = wired(p, writer)
-        interrupted = _simulate(dressing, scenario.duration, realtime_rate)
+        ending = _simulate(dressing, scenario.duration, realtime_rate)
+        _note(dressing, ending, writer)
     wall_time = clock.perf_counter() - begin
 
-    success, reason = _conclude(out, wall_time)
+    success, reason = conclude(out, wall_time)
     print(f"log, report and replay: {out}")
-    if interrupted:
+    if ending.interrupted:
         print("interrupted: what had run is in the log")
         return INTERRUPTED
     print("both sleeves on" if success else f"not dressed: {reason}")
     return DONE if success else NOT_DRESSED
+
+
+def _parts(
+    scenario: Scenario, source: Path, meshes: Garments, limits: SafetyLimits, page: Meshcat | None
+) -> Parts:
+    """Returns the parts of the diagram; a problem with arms or hardware is the user's to know."""
+    arms, hardware = "station.arms", "station.hardware"
+    try:
+        if scenario.station.kind == "simulated":
+            return parts(scenario, meshes, limits, page)
+        with caught_interrupt() as interrupt:
+            print(f"listening: {scenario.station.hardware.lcm_url}", flush=True)
+            p = hardware_parts(
+                scenario,
+                meshes,
+                limits,
+                page,
+                lambda name: print(f"heard: {name.replace('_', ' ')}", flush=True),
+                interrupt.is_set,
+            )
+        if interrupt.is_set():
+            raise KeyboardInterrupt
+        return p
+    except ArmReachError as error:
+        raise UserError(str(source), arms, str(error)) from error
+    except NoBusError as error:
+        raise UserError(str(source), f"{hardware}.lcm_url", str(error)) from error
+    except (StationSilentError, NotAtStartError) as error:
+        if isinstance(error, StationSilentError) and interrupt.is_set():
+            raise KeyboardInterrupt from None
+        raise UserError(str(source), hardware, str(error)) from error
+
+
+def _note(dressing: Dressing, ending: Ending, writer: RunLogWriter) -> None:
+    """Writes to the log what was wrong with hardware, and why the run ended if for that."""
+    if isinstance(dressing.station, HardwareStation):
+        events = dressing.station.watch.events
+        writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
+        meter = dressing.station.meter
+        if meter.first is not None:
+            times, ages = meter.commands
+            writer.series("/station/command_time", times, "s")
+            writer.series("/station/status_age", ages, "s")
+            writer.note("start_up", process_age(meter.first))
+    if ending.fault is not None:
+        writer.note("ended_by", ending.fault)
 
 
 def _open_meshcat() -> Meshcat:
@@ -91,19 +149,27 @@ def _open_meshcat() -> Meshcat:
     return page
 
 
-def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> bool:
-    """Runs until both sleeves have stayed done for a while or time is up.
+@dataclass(frozen=True)
+class Ending:
+    """Why a run ended before its time: the user interrupted, or the station had a fault."""
 
-    Returns whether the user interrupted.
-    """
+    interrupted: bool = False
+    fault: str | None = None
+
+
+def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Ending:
+    """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
     simulator = Simulator(dressing.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
+    if isinstance(dressing.station, HardwareStation):
+        dressing.station.catch_up()
     simulator.Initialize()
     context = dressing.mpc.GetMyContextFromRoot(simulator.get_context())
     stage_port = dressing.mpc.GetOutputPort("stage")
     terminal = sys.stderr.isatty()
     console = Console(stderr=True)
     done_since, told = np.inf, 0.0
+    fault: str | None = None
     with (
         caught_interrupt() as interrupt,
         Progress(
@@ -118,9 +184,15 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> bool
     ):
         task = progress.add_task("dressing", total=duration)
         now = 0.0
-        while now < duration and not interrupt.is_set():
+        while now < duration and not interrupt.is_set() and fault is None:
             now = min(duration, now + _CHUNK)
-            simulator.AdvanceTo(now)
+            try:
+                simulator.AdvanceTo(now)
+            except OSError as error:
+                # no command without a log of it: commands end, and arms stop by themselves
+                fault = f"log: cannot be written: {error}"
+                break
+            fault = _station_fault(dressing, simulator)
             stage = stage_port.Eval(context)
             names = [("prepare", "dress", "done")[int(s)] for s in stage]
             progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")
@@ -130,10 +202,18 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> bool
             done_since = min(done_since, now) if is_finished(stage) else np.inf
             if now - done_since >= _STAY:
                 break
-        return interrupt.is_set()
+        return Ending(interrupt.is_set(), fault)
 
 
-def _conclude(out: Path, wall_time: float) -> tuple[bool, str | None]:
+def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
+    """Returns why the station ends the run; None while it does not."""
+    if not isinstance(dressing.station, HardwareStation):
+        return None
+    watch = dressing.station.watch
+    return watch.conclusion(watch.GetMyContextFromRoot(simulator.get_context()))
+
+
+def conclude(out: Path, wall_time: float) -> tuple[bool, str | None]:
     """Writes summary, report and replay of the log in `out`; returns success and reason."""
     with RunLog.open(out / "run.h5") as log:
         measures = measure(log)

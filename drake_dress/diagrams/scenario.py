@@ -23,6 +23,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.human import motions
+from drake_dress.models.supervision.injection import KINDS
 
 
 @dataclass
@@ -236,8 +237,13 @@ class Weights:
     separation: float = 1.0
     least_spread: float = 0.5  # share of the grippers' distance at rest
     entering_spread: float = 0.85  # the same while a sleeve is entered
+    level: float = 20.0  # on a garment that is turned on edge
+    least_level: float = 0.5  # of the grippers' distance at rest: the left one is left of the right
     clearance: float = 10.0
     free_clearance: float = 0.05  # m
+    corridor: float = 3.0  # on cloth that hangs ahead of a hand that is to go in
+    corridor_radius: float = 0.06  # m
+    corridor_length: float = 0.12  # m
 
 
 @dataclass
@@ -350,16 +356,76 @@ class Arms:
     height_offset: float = -0.45  # of both, over the person's shoulders, m
     tilt_deg: float = 35.0  # of the hands, which point forward and this much down
     rate: float = 200.0  # of the joints' commands, Hz
+    mode: str = "position_velocity"  # what is commanded: or position, or velocity alone
+
+
+@dataclass
+class Hardware:
+    """Of a station of kind hardware, and of the lab that `drake-dress sim-station` plays."""
+
+    # ttl 0 keeps messages on this machine
+    lcm_url: str = "udpm://239.255.76.67:7667?ttl=0"
+    status_channel: str = "PANDA_STATUS"  # of the arms; _LEFT and _RIGHT are appended
+    command_channel: str = "PANDA_COMMAND"  # the same
+    garment_channel: str = "GARMENT_ESTIMATE"
+    person_channel: str = "PERSON_ESTIMATE"
+    camera_channel: str = "CAMERA"  # _NAME is appended
+    status_rate: float = 200.0  # of the lab, Hz
+    estimate_rate: float = 50.0  # of the lab, Hz
+    stale_status: float = 0.05  # age at which arms hold, s
+    stale_estimate: float = 0.2  # the same
+    stale_camera: float = 0.5  # the same
+    settle_time: float = 0.2  # for which all must be well before arms go on, s
+    patience: float = 3.0  # with what is wrong, before the run ends, s
+    wait: float = 10.0  # for the first messages, s
+    start_distance: float = 0.02  # of a gripper from where the run begins, at most, m
+    start_angle: float = 0.1  # of a joint, rad
+
+
+@dataclass
+class Camera:
+    """A camera for colour and depth that looks at the person; world frame, m."""
+
+    name: str = ""
+    position: list[float] = field(default_factory=list)  # x, y, z
+    target: list[float] = field(default_factory=list)  # what is in the middle of its image
+    width: int = 320  # pixels
+    height: int = 240
+    fov_deg: float = 60.0  # vertical
+    rate: float = 5.0  # of images, Hz
 
 
 @dataclass
 class Station:
     """Robots, or what stands in for them."""
 
-    kind: str = "simulated"
+    kind: str = "simulated"  # or hardware: the same behind LCM messages
     arms: Arms = field(default_factory=Arms)
+    hardware: Hardware = field(default_factory=Hardware)
     gripper: Gripper = field(default_factory=Gripper)
     start: Start = field(default_factory=Start)
+    cameras: list[Camera] = field(default_factory=list)
+
+
+@dataclass
+class LabFault:
+    """Something that goes wrong in the lab that `drake-dress sim-station` plays."""
+
+    kind: str = "stale"  # see models/supervision/injection.py
+    source: str = "left_arm"  # or right_arm, garment, person, camera_<name>; a lost bus is of all
+    start: float = 5.0  # s after the first command
+    duration: float = 1.0  # s
+
+
+@dataclass
+class Lab:
+    """The lab that `drake-dress sim-station` plays; a run does not know of it."""
+
+    faults: list[LabFault] = field(default_factory=list)
+    stale_command: float = 0.1  # age of commands at which arms stop by themselves, s
+    wait: float = 60.0  # for the first command, s
+    rest: float = 3.0  # after the last command, before the lab closes, s
+    push: float = 60.0  # of a fault of kind push, N
 
 
 @dataclass
@@ -410,11 +476,14 @@ class Scenario:
     controller: Controller = field(default_factory=Controller)
     safety: Safety = field(default_factory=Safety)
     station: Station = field(default_factory=Station)
+    lab: Lab = field(default_factory=Lab)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
     effects: Effects = field(default_factory=Effects)  # type: ignore[valid-type]
 
 
+# What the lab reports of, beside its cameras.
+_SOURCES = ("left_arm", "right_arm", "garment", "person")
 # Words that a text may be (Drake's loader has no literal types).
 _CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
@@ -430,8 +499,10 @@ _CHOICES = {
     "plant.integrator": ("implicit", "projective_dynamics"),
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
-    "station.kind": ("simulated",),
+    "station.kind": ("simulated", "hardware"),
+    "lab.faults.kind": KINDS,
     "station.arms.model": ("floating", "panda"),
+    "station.arms.mode": ("position_velocity", "position", "velocity"),
 }
 
 # Ranges by the end of the dotted key, both ends allowed; all other numbers must be finite.
@@ -443,6 +514,26 @@ _RANGES: dict[str, tuple[float, float]] = {
     "arms.height_offset": (-2.0, 2.0),
     "arms.tilt_deg": (-180.0, 180.0),
     "arms.rate": (50.0, 1000.0),
+    "hardware.status_rate": (20.0, 1000.0),
+    "hardware.estimate_rate": (1.0, 200.0),
+    "hardware.stale_status": (0.01, 1.0),
+    "hardware.stale_estimate": (0.02, 5.0),
+    "hardware.stale_camera": (0.05, 10.0),
+    "hardware.settle_time": (0.0, 10.0),
+    "hardware.patience": (0.0, 60.0),
+    "hardware.wait": (0.1, 3600.0),
+    "hardware.start_distance": (0.0, 0.2),
+    "hardware.start_angle": (0.0, 1.0),
+    "lab.stale_command": (0.01, 1.0),
+    "lab.wait": (0.1, 3600.0),
+    "lab.rest": (0.0, 60.0),
+    "lab.push": (0.0, 200.0),
+    "cameras.width": (16, 4096),
+    "cameras.height": (16, 4096),
+    "cameras.fov_deg": (5.0, 150.0),
+    "cameras.rate": (0.5, 60.0),
+    "lab.faults.start": (0.0, 1e4),
+    "lab.faults.duration": (0.0, 1e4),
     "coat.scale": (0.7, 1.4),
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
@@ -590,6 +681,8 @@ def load_scenario(
             "controller.local.delay",
             f"is {local.delay} s, expected less than the period, {local.period} s",
         )
+    _check_hardware(source, scenario.station)
+    _check_cameras(source, scenario)
     steps = mpc.delay / mpc.time_step
     if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:
         raise UserError(
@@ -747,8 +840,9 @@ def _check_ranges(source: str, key: str, value: Any) -> None:
     elif isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise UserError(source, key, f"is {value}, expected a finite number")
+        plain = re.sub(r"\[\d+\]", "", key)
         bounds = next(
-            (r for end, r in _RANGES.items() if key == end or key.endswith("." + end)),
+            (r for end, r in _RANGES.items() if plain == end or plain.endswith("." + end)),
             _MEASURE_RANGE if ".measures." in key else _EFFECT_RANGES.get(key),
         )
         if bounds is not None and not bounds[0] <= value <= bounds[1]:
@@ -811,6 +905,53 @@ def _check_safety(source: str, safety: Safety, command_period: float) -> None:
                 source,
                 "safety.workspace.high",
                 f"is {corners['high']}, expected more than low, {corners['low']}, on each axis",
+            )
+
+
+def _check_hardware(source: str, station: Station) -> None:
+    if station.kind == "hardware" and station.arms.model != "panda":
+        raise UserError(
+            source,
+            "station.arms.model",
+            f"is {station.arms.model}, expected panda with station.kind: hardware",
+        )
+    url = station.hardware.lcm_url
+    if not url.startswith(("udpm://", "memq://")):
+        raise UserError(
+            source,
+            "station.hardware.lcm_url",
+            f"is {url!r}, expected udpm://ADDRESS:PORT?ttl=0",
+        )
+
+
+def _check_cameras(source: str, scenario: Scenario) -> None:
+    """Holds cameras, and what faults name, against each other."""
+    names: set[str] = set()
+    for i, camera in enumerate(scenario.station.cameras):
+        key = f"station.cameras[{i}]"
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", camera.name) or camera.name in names:
+            raise UserError(
+                source,
+                f"{key}.name",
+                f"is {camera.name!r}, expected a name of its own, such as front",
+            )
+        names.add(camera.name)
+        for name in ("position", "target"):
+            point = getattr(camera, name)
+            if len(point) != 3 or not all(math.isfinite(x) for x in point):
+                raise UserError(source, f"{key}.{name}", f"is {point}, expected x, y, z in m")
+        ahead = [t - p for t, p in zip(camera.target, camera.position, strict=True)]
+        if math.hypot(ahead[0], ahead[1]) < 1e-3:
+            raise UserError(
+                source, f"{key}.target", "is straight above or below, expected it to the side"
+            )
+    sources = [*_SOURCES, *(f"camera_{name}" for name in sorted(names))]
+    for i, fault in enumerate(scenario.lab.faults):
+        if fault.source not in sources:
+            raise UserError(
+                source,
+                f"lab.faults[{i}].source",
+                f"is {fault.source!r}, expected {' or '.join(sources)}",
             )
 
 

@@ -1,16 +1,33 @@
 """The station: where robots, person and garment are. Simulated here; hardware has the same ports.
 
-    inputs   {left,right}_gripper.position_command   (3,) p_WG, m
-             or, with arms, {left,right}_arm.position_command (7,) rad, velocity_command rad/s
-    outputs  {left,right}_arm.position_measured (7,) rad, velocity_measured rad/s, with arms
-             {left,right}_gripper.position_measured  (3,) m
-             {left,right}_gripper.velocity_measured  (3,) m/s
-             {left,right}_gripper.force_measured     (3,) of the garment on the gripper, N
-             cheat_garment_position, cheat_garment_velocity   (3n,)
-             cheat_contact (n,), cheat_contact_force (3n,)
-             cheat_body_poses                        of the person's bodies
+With arms:
 
-What only simulation can know has the prefix `cheat_`.
+    inputs   {left,right}_arm.position, velocity             (7,) commands, rad, rad/s
+    outputs  {left,right}_arm.position_commanded, position_measured, velocity_commanded,
+             velocity_measured, acceleration_commanded, torque_commanded, torque_measured,
+             torque_external                                 (7,) as in Drake's Panda messages
+             {left,right}_arm.stopped                        (1,) > 0: its driver does not follow
+
+Without, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
+
+    outputs  {left,right}_gripper.position_measured          (3,) m
+             {left,right}_gripper.velocity_measured          (3,) m/s
+             {left,right}_gripper.force_measured             (3,) of the garment on the gripper, N
+             estimate.garment_position, garment_velocity     (3m,) of the controller's garment
+             estimate.joint_position                         (18,) of the person's arms, m
+             NAME.color_image, NAME.depth_image              of each camera
+             permission                                      (1,) 0: arms shall come to rest
+             cheat_garment_position, cheat_garment_velocity  (3n,)
+             cheat_contact (n,), cheat_contact_force (3n,)
+             cheat_joint_position                            (18,) of the person's arms
+             cheat_{left,right}_arm_stop                     (1,) why a driver does not follow
+    inputs   cheat_{left,right}_arm_fresh                    (1,) 0: its commands have ended
+             cheat_push                                      (6,) on the arms' tools, N
+    outputs  cheat_plant_state                               of the MultibodyPlant
+             cheat_body_poses                                of the person's bodies
+
+What only simulation can know has the prefix `cheat_`. What arms measure of their grippers comes
+from their joints; a floating gripper measures itself.
 """
 
 from __future__ import annotations
@@ -18,6 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
 from pydrake.multibody.plant import (
     AddMultibodyPlantSceneGraph,
@@ -25,12 +43,16 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
 )
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Demultiplexer, Multiplexer
+from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.arms import ArmPlacement, ArmSetup, PlantArm, add_arms, set_up_arms
 from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
+from drake_dress.diagrams.cameras import Camera, export_cameras
+from drake_dress.diagrams.oracles import export_oracles
+from drake_dress.diagrams.panda_driver import SimPandaDriver
 from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
 from drake_dress.models.arm.clearance import Capsules
+from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
@@ -56,6 +78,7 @@ from drake_dress.models.human.body import (
     shoulder_joint,
 )
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.systems.arm_measurement import ArmMeasurement
 from drake_dress.systems.cloth_plant import ClothPlant
 from drake_dress.systems.delay import delayed
 from drake_dress.systems.floating_gripper import FloatingGripper
@@ -64,6 +87,17 @@ from drake_dress.systems.tool_motion import ToolMotion
 
 FloatArray = np.ndarray
 _MOTION = ("position", "velocity")
+# What an arm reports, as Drake's PandaStatusSender has it.
+ARM_STATUS = (
+    "position_commanded",
+    "position_measured",
+    "velocity_commanded",
+    "velocity_measured",
+    "acceleration_commanded",
+    "torque_commanded",
+    "torque_measured",
+    "torque_external",
+)
 # Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
 _SETTLING_TIME = 1.6
 _SETTLING_DAMPING = 0.03
@@ -92,23 +126,58 @@ class StationParameters:
     self_collision: bool = False
     effects: tuple[Effect, ...] = ()
     placement: ArmPlacement | None = None
+    mode: str = "position_velocity"
+    cameras: tuple[Camera, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is seen of garment and person.
+
+    Attributes:
+        transfer: (m,n) from the true garment's nodes to the controller's.
+        period: of the controllers' commands, to which what is late is rounded, s.
+    """
+
+    transfer: sp.csr_array
+    period: float
 
 
 @dataclass(frozen=True)
 class Station:
-    """A station's diagram, and what its users need of what is inside."""
+    """A station's diagram, and what its users need to know of it.
+
+    Attributes:
+        diagram: with the ports above.
+        person: as it is described.
+        start_grippers: (2,3) of left and right at time 0, m.
+        robots: the arms; None where grippers float.
+    """
 
     diagram: Diagram
+    person: Person
+    start_grippers: FloatArray
+    robots: ArmSetup | None
+
+
+@dataclass(frozen=True)
+class SimulatedStation(Station):
+    """A station, and what is inside."""
+
     plant: MultibodyPlant
     scene_graph: SceneGraph
-    person: Person
     cloth: ClothPlant
-    start_grippers: FloatArray
-    robots: ArmSetup | None = None
 
 
-def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None) -> Station:
+def make_simulated_station(
+    p: StationParameters, meshcat: Meshcat | None = None, sight: Sight | None = None
+) -> SimulatedStation:
     """Returns a station whose grippers, on arms or floating, hold a coat behind a person.
+
+    Args:
+        p: what it is made of.
+        meshcat: where it is shown, if it is.
+        sight: what is seen of garment and person; without it there are no estimates.
 
     Raises:
         ArmReachError: the arms do not reach where the grippers are at first.
@@ -146,6 +215,9 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     )
     forces = cloth.GetOutputPort("person_forces")
     motion: dict[tuple[Side, str], OutputPort] = {}
+    measured: dict[tuple[Side, str], OutputPort] = {
+        (side, "force"): cloth.GetOutputPort(f"{side}_gripper_force") for side in SIDES
+    }
     if robots is None:
         for i, side in enumerate(SIDES):
             gripper = builder.AddNamedSystem(
@@ -159,8 +231,10 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
             )
             for quantity in _MOTION:
                 motion[side, quantity] = gripper.GetOutputPort(f"{quantity}_measured")
+        measured |= motion
     else:
-        motion, load = _wire_arms(builder, plant, cloth, arms, robots)
+        measured = _wire_drivers(builder, plant, arms, robots, p)
+        motion, load = _wire_tools(builder, plant, cloth, arms)
         both = builder.AddSystem(ExternallyAppliedSpatialForceMultiplexer(2))
         builder.Connect(forces, both.get_input_port(0))
         builder.Connect(load, both.get_input_port(1))
@@ -179,45 +253,89 @@ def make_simulated_station(p: StationParameters, meshcat: Meshcat | None = None)
     late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
     for i, side in enumerate(SIDES):
         for quantity in _MOTION:
-            port = motion[side, quantity]
-            builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
             first = grippers[i] if quantity == "position" else np.zeros(3)
-            port = delayed(builder, port, first, p.time_step, late)
+            port = delayed(builder, motion[side, quantity], first, p.time_step, late)
             builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
-        builder.ExportOutput(
-            cloth.GetOutputPort(f"{side}_gripper_force"), f"{side}_gripper.force_measured"
+        for quantity in (*_MOTION, "force"):
+            builder.ExportOutput(measured[side, quantity], f"{side}_gripper.{quantity}_measured")
+    if sight is not None:
+        export_oracles(
+            builder,
+            cloth,
+            plant,
+            person.joint_points,
+            sight.transfer,
+            p.effects,
+            sight.period,
         )
+        permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
+        builder.ExportOutput(permission.get_output_port(), "permission")
     for name in ("garment_position", "garment_velocity", "contact", "contact_force"):
         builder.ExportOutput(cloth.GetOutputPort(name), f"cheat_{name}")
     builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
+    builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
+    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
     diagram.set_name("station")
-    return Station(diagram, plant, scene_graph, person, cloth, grippers, robots)
+    return SimulatedStation(diagram, person, grippers, robots, plant, scene_graph, cloth)
 
 
-def _wire_arms(
+def _wire_drivers(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    arms: dict[Side, PlantArm],
+    robots: ArmSetup,
+    p: StationParameters,
+) -> dict[tuple[Side, str], OutputPort]:
+    """Adds the arms' drivers and exports their ports; returns what arms measure of grippers."""
+    measure = builder.AddNamedSystem("arm_measurement", ArmMeasurement(robots.pair.arms))
+    for i, side in enumerate(SIDES):
+        model = arms[side].model
+        plant.SetDefaultPositions(model, robots.start[i])
+        driver = builder.AddNamedSystem(
+            f"{side}_arm_driver", SimPandaDriver(robots.start[i], LIMITS, p.time_step, p.mode)
+        )
+        builder.Connect(plant.get_state_output_port(model), driver.GetInputPort("state"))
+        builder.Connect(
+            plant.get_net_actuation_output_port(model), driver.GetInputPort("actuation")
+        )
+        builder.Connect(
+            driver.GetOutputPort("desired_state"), plant.get_desired_state_input_port(model)
+        )
+        for quantity in _MOTION:
+            if quantity in p.mode:
+                builder.ExportInput(driver.GetInputPort(quantity), f"{side}_arm.{quantity}")
+        builder.ExportInput(driver.GetInputPort("fresh"), f"cheat_{side}_arm_fresh")
+        for name in (f"{side}_arm.stopped", f"cheat_{side}_arm_stop"):
+            builder.ExportOutput(driver.GetOutputPort("stop"), name)
+        for name in ARM_STATUS:
+            builder.ExportOutput(driver.GetOutputPort(name), f"{side}_arm.{name}")
+        for name, port in (
+            ("position", "position_measured"),
+            ("velocity", "velocity_measured"),
+            ("torque_external", "torque_external"),
+        ):
+            builder.Connect(driver.GetOutputPort(port), measure.GetInputPort(f"{side}_{name}"))
+    return {
+        (side, quantity): measure.GetOutputPort(f"{side}_gripper_{quantity}")
+        for side in SIDES
+        for quantity in (*_MOTION, "force")
+    }
+
+
+def _wire_tools(
     builder: DiagramBuilder,
     plant: MultibodyPlant,
     cloth: ClothPlant,
     arms: dict[Side, PlantArm],
-    robots: ArmSetup,
 ) -> tuple[dict[tuple[Side, str], OutputPort], OutputPort]:
-    """Returns the motion of the arms' tools, and the garment's forces on them."""
-    for i, side in enumerate(SIDES):
-        model = arms[side].model
-        plant.SetDefaultPositions(model, robots.start[i])
-        asked = builder.AddNamedSystem(f"{side}_arm_command", Multiplexer([7, 7]))
-        builder.Connect(asked.get_output_port(), plant.get_desired_state_input_port(model))
-        seen = builder.AddNamedSystem(f"{side}_arm_state", Demultiplexer([7, 7]))
-        builder.Connect(plant.get_state_output_port(model), seen.get_input_port())
-        for k, quantity in enumerate(_MOTION):
-            builder.ExportInput(asked.get_input_port(k), f"{side}_arm.{quantity}_command")
-            builder.ExportOutput(seen.get_output_port(k), f"{side}_arm.{quantity}_measured")
+    """Returns the true motion of the arms' tools, and the garment's forces on them."""
     tools = [arms[side].tool for side in SIDES]
     tool = builder.AddNamedSystem("tool_motion", ToolMotion(tools))
     load = builder.AddNamedSystem("tool_load", ToolLoad(tools))
+    builder.ExportInput(load.GetInputPort("push"), "cheat_push")
     for name in ("body_poses", "body_spatial_velocities"):
         builder.Connect(plant.GetOutputPort(name), tool.GetInputPort(name))
     for side in SIDES:

@@ -1,15 +1,21 @@
 """The log of a run, `run.h5`: written while it runs, read lazily afterwards.
 
 The file must be of use however the run ends. A run that is interrupted closes it with all samples
-whole. A process that is killed leaves what was flushed last: rows are flushed together about once
-a second, rows of bulky datasets are never rewritten, and HDF5 is told to keep its own bookkeeping
-in memory between flushes, so that the file on disk is consistent at all times but during a flush.
+whole. A disk that is nearly full ends the log before HDF5 is in trouble, which it does not survive:
+space to close the file is kept back for that. A process that is killed leaves what was flushed
+last: samples are written together about once a second, rows of bulky datasets are never rewritten,
+and HDF5 is told to keep its own bookkeeping in memory between flushes, so that the file on disk is
+consistent at all times but during a flush.
 """
 
 from __future__ import annotations
 
+import errno
+import os
+import tempfile
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,19 +44,24 @@ JOINT_NAMES = (
     "right_hand",
 )
 _CLEARANCES = ("between arms", "left arm to person", "right arm to person")
+_ARM_SERIES = (("q", "rad"), ("v", "rad/s"), ("q_commanded", "rad"), ("torque", "N m"))
 STAGE_NAMES = ("prepare", "dress", "done")
 
 _FLUSH_PERIOD = 1.0  # s of wall time
+# Kept back on the disk for the end, and what must be free beside it, bytes.
+_RESERVE, _LEAST_FREE = 16 << 20, 4 << 20
+_MOST_WAITING = 64  # samples that are kept in memory between flushes
 _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
 
 
 @dataclass(frozen=True)
 class ArmSample:
-    """What is logged of one arm: `q` (7,) rad, `v` (7,) rad/s, `q_commanded` (7,) rad."""
+    """What is logged of one arm: `q`, `q_commanded` (7,) rad, `v` (7,) rad/s, `torque` (7,) N·m."""
 
     q: npt.ArrayLike
     v: npt.ArrayLike
     q_commanded: npt.ArrayLike
+    torque: npt.ArrayLike
 
 
 @dataclass(frozen=True)
@@ -60,8 +71,8 @@ class Sample:
     Attributes:
         time: s, greater than that of the sample before.
         garment_position: (n,3) the plant's garment, m.
-        contact: (n,) 0 none, 1 stick, 2 slip.
-        contact_force: (n,3) of the person on the garment, N.
+        contact: (n,) 0 none, 1 stick, 2 slip; None where not known.
+        contact_force: (n,3) of the person on the garment, N; None where not known.
         joint_position: (6,3) shoulder, elbow, hand of left, then of right, m.
         gripper_position: side to (3,), m.
         gripper_force: side to (3,) of the garment on the gripper, N.
@@ -80,8 +91,8 @@ class Sample:
 
     time: float
     garment_position: npt.ArrayLike
-    contact: npt.ArrayLike
-    contact_force: npt.ArrayLike
+    contact: npt.ArrayLike | None
+    contact_force: npt.ArrayLike | None
     joint_position: npt.ArrayLike
     gripper_position: dict[str, npt.ArrayLike]
     gripper_force: dict[str, npt.ArrayLike]
@@ -112,7 +123,9 @@ class RunLogWriter:
         capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
         estimate_garment: the controller's garment; None: its positions are not logged.
         flush_period: wall time between flushes, s.
-        has_arms: whether samples have arms.
+        bases: X_WB (4,4) of each arm, where samples have arms.
+        estimated: whether garment and person are as they were estimated, since truth is not known;
+            there is no contact then.
 
     Raises:
         UserError: the file cannot be written.
@@ -132,7 +145,8 @@ class RunLogWriter:
         capsule_radius: npt.ArrayLike | None = None,
         estimate_garment: GarmentMesh | None = None,
         flush_period: float = _FLUSH_PERIOD,
-        has_arms: bool = False,
+        bases: Mapping[Side, npt.ArrayLike] | None = None,
+        estimated: bool = False,
     ) -> None:
         self.path = Path(path)
         try:
@@ -140,10 +154,17 @@ class RunLogWriter:
         except OSError as error:
             raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
         _keep_metadata_until_flush(self._file)
+        self._reserve = _reserved(self.path.parent, _RESERVE)
+        if self._reserve is None:
+            self._file.close()
+            self.path.unlink()
+            raise UserError(str(path), "", "no room on the disk, expected 16 MB at least")
         self._flush_period = flush_period
         self._count = 0
         self._last_time = -np.inf
         self._series: dict[str, h5py.Dataset] = {}
+        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._waiting: list[dict[str, npt.NDArray[Any]]] = []
 
         attributes = self._file.attrs
         attributes["schema"] = SCHEMA
@@ -156,8 +177,11 @@ class RunLogWriter:
         n = len(garment.rest_position)
         self._add("/time", (), "s", dtype="f8")
         self._add("/garment/position", (n, 3), "m", "world")
-        self._add("/garment/contact", (n,), "1", dtype="i1")
-        self._add("/garment/contact_force", (n, 3), "N", "world")
+        if estimated:
+            attributes["source"] = "estimate"
+        else:
+            self._add("/garment/contact", (n,), "1", dtype="i1")
+            self._add("/garment/contact_force", (n, 3), "N", "world")
         self._add("/human/joint_position", (6, 3), "m", "world", dtype="f8")
         self._series["/human/joint_position"].attrs["names"] = list(joint_names)
         for side in SIDES:
@@ -175,9 +199,10 @@ class RunLogWriter:
             self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
         self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
         self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
-        if has_arms:
+        if bases is not None:
             for side in SIDES:
-                for name, unit in (("q", "rad"), ("v", "rad/s"), ("q_commanded", "rad")):
+                self._fixed(f"/arm/{side}/base", np.asarray(bases[side], dtype=np.float64), "m")
+                for name, unit in _ARM_SERIES:
                     self._add(f"/arm/{side}/{name}", (7,), unit, dtype="f8")
             self._add("/arm/clearance", (3,), "m", dtype="f8")
             self._series["/arm/clearance"].attrs["names"] = list(_CLEARANCES)
@@ -194,25 +219,51 @@ class RunLogWriter:
         self._flush()
 
     def append(self, sample: Sample) -> None:
-        """Appends one sample, and flushes if the last flush was a while ago."""
+        """Appends one sample, and flushes if the last flush was a while ago.
+
+        Raises:
+            OSError: the disk is full; what was appended before is in the file.
+        """
         if not sample.time > self._last_time:
             raise ValueError(f"sample at {sample.time} s is not later than {self._last_time} s")
-        for name, value in self._rows(sample).items():
-            dataset = self._series[name]
-            row = np.asarray(value)
-            if row.shape != dataset.shape[1:]:
-                raise ValueError(f"{name}: shape {row.shape} given, {dataset.shape[1:]} expected")
-            dataset.resize(self._count + 1, axis=0)
-            dataset[self._count] = row
-        self._count += 1
+        row = {name: np.asarray(value) for name, value in self._rows(sample).items()}
+        for name, value in row.items():
+            if value.shape != self._shapes[name]:
+                raise ValueError(
+                    f"{name}: shape {value.shape} given, {self._shapes[name]} expected"
+                )
+        # its own copy: what is waiting must not change
+        self._waiting.append({name: value.copy() for name, value in row.items()})
         self._last_time = sample.time
         if clock.monotonic() - self._flushed_at >= self._flush_period:
             self._flush()
+        elif len(self._waiting) >= _MOST_WAITING:
+            self._write_waiting()
+
+    def note(self, name: str, value: str | float) -> None:
+        """Writes something about the run as an attribute of the file, which may be closed."""
+        with self._opened() as file:
+            file.attrs[name] = value
+
+    def series(self, name: str, rows: npt.ArrayLike, unit: str) -> None:
+        """Writes a series of its own, that has not a row a sample."""
+        with self._opened() as file:
+            _label(file.create_dataset(name, data=np.asarray(rows, dtype=np.float64)), unit, None)
+
+    @contextmanager
+    def _opened(self) -> Iterator[h5py.File]:
+        if self._file:
+            yield self._file
+        else:
+            with h5py.File(self.path, "a") as file:
+                yield file
 
     def close(self) -> None:
         """Closes the file with as many whole samples as were appended; may be called twice."""
         if not self._file:
             return
+        self._release()
+        self._write_waiting()
         # An interrupt may have come in the middle of a sample.
         for dataset in self._series.values():
             if dataset.shape[0] != self._count:
@@ -234,8 +285,6 @@ class RunLogWriter:
         rows: dict[str, Any] = {
             "/time": sample.time,
             "/garment/position": sample.garment_position,
-            "/garment/contact": sample.contact,
-            "/garment/contact_force": sample.contact_force,
             "/human/joint_position": sample.joint_position,
             "/control/stage": sample.stage,
             "/control/safety": sample.safety,
@@ -251,6 +300,8 @@ class RunLogWriter:
             for side, arm in sample.arms.items():
                 rows |= {f"/arm/{side}/{name}": row for name, row in vars(arm).items()}
         optional = {
+            "/garment/contact": sample.contact,
+            "/garment/contact_force": sample.contact_force,
             "/arm/clearance": sample.clearance,
             "/estimate/human/joint_position": sample.estimate_joint_position,
             "/estimate/garment/position": sample.estimate_garment_position,
@@ -298,9 +349,39 @@ class RunLogWriter:
             **options,
         )
         _label(dataset, unit, frame)
-        self._series[name] = dataset
+        self._series[name], self._shapes[name] = dataset, shape
+
+    def _write_waiting(self) -> None:
+        """Writes the samples since the last flush, all of a dataset at once."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        self._check_space(waiting)
+        count = self._count + len(waiting)
+        for name in waiting[0]:
+            dataset = self._series[name]
+            dataset.resize(count, axis=0)
+            dataset[self._count :] = np.stack([row[name] for row in waiting])
+        self._count = count
+
+    def _check_space(self, waiting: list[dict[str, npt.NDArray[Any]]]) -> None:
+        if self._reserve is None:
+            return
+        needed = sum(value.nbytes for row in waiting for value in row.values())
+        disk = os.statvfs(self.path.parent)
+        if disk.f_bavail * disk.f_frsize < needed + _LEAST_FREE:
+            self._waiting = waiting
+            self.close()
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+
+    def _release(self) -> None:
+        """Gives back what was kept back on the disk."""
+        if self._reserve is not None:
+            os.close(self._reserve)
+            self._reserve = None
 
     def _flush(self) -> None:
+        self._write_waiting()
         self._file.flush()
         self._flushed_at = clock.monotonic()
 
@@ -343,6 +424,37 @@ class RunLog:
             file.close()
             raise
         return RunLog(path, file)
+
+    @property
+    def estimated(self) -> bool:
+        """Whether garment and person are as they were estimated, since truth was not known."""
+        return str(self.file.attrs.get("source", "")) == "estimate"
+
+    @property
+    def commands(self) -> tuple[FloatArray, FloatArray] | None:
+        """Times of commands to hardware (K,), s, and (K,2) ages of what they answer, s."""
+        if "/station/command_time" not in self.file:
+            return None
+        names = ("/station/command_time", "/station/status_age")
+        times, ages = (np.asarray(self.file[name], dtype=np.float64) for name in names)
+        return times, ages
+
+    @property
+    def start_up(self) -> float | None:
+        """Time from the start of the process to its first command to hardware, s."""
+        value = self.file.attrs.get("start_up")
+        return None if value is None else float(value)
+
+    @property
+    def ended_by(self) -> str | None:
+        """What was wrong with the station, that ended the run; None if nothing was."""
+        text = self.file.attrs.get("ended_by")
+        return None if text is None else str(text)
+
+    @property
+    def events(self) -> list[str]:
+        """What changed at the station: lines of a time, s, and what."""
+        return str(self.file.attrs.get("events", "")).splitlines()
 
     def close(self) -> None:
         """Closes the file."""
@@ -476,6 +588,21 @@ class RunLog:
 
     def _read(self, name: str) -> FloatArray:
         return np.asarray(self.file[name], dtype=np.float64)
+
+
+def _reserved(directory: Path, size: int) -> int | None:
+    """Returns an open file without a name that takes so many bytes; None if there is no room."""
+    try:
+        number, name = tempfile.mkstemp(dir=directory)
+        os.unlink(name)
+        try:
+            os.posix_fallocate(number, 0, size)
+        except OSError:
+            os.close(number)
+            raise
+        return number
+    except OSError:
+        return None
 
 
 def _keep_metadata_until_flush(file: h5py.File) -> None:

@@ -10,11 +10,14 @@ from pydrake.geometry import Capsule, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
 from drake_dress.systems.garment_visualizer import DressingScene
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
+_ARM = Rgba(0.90, 0.91, 0.92, 1.0)
 _POLL_PERIOD = 0.03  # s
 _TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
 
@@ -74,7 +77,7 @@ class MeshcatReplay:
         meshcat.AddButton(_STOP_BUTTON, "Escape")
         meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.97])
         meshcat.SetProperty("/Background", "bottom_color", [1.0, 1.0, 1.0])
-        self._add_person()
+        self._add_bodies()
         center = log.joint_position[0].mean(axis=0)
         meshcat.SetCameraPose(center + [2.2, 1.0, 0.5], center)
         self.update()
@@ -101,22 +104,32 @@ class MeshcatReplay:
             self._show(sample)
             self.sample = sample
 
-    def _add_person(self) -> None:
-        a, b, radius = (self._log.capsules[0][0], self._log.capsules[1][0], self._log.capsules[2])
-        for k, r in enumerate(radius):
-            length = float(np.linalg.norm(b[k] - a[k]))
-            shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
-            self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
+    def _add_bodies(self) -> None:
+        for name, color, (a, b, radius) in self._bodies(0):
+            for k, r in enumerate(radius):
+                length = float(np.linalg.norm(b[k] - a[k]))
+                shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
+                self._meshcat.SetObject(f"dressing/{name}/{k}", shape, color)
+
+    def _bodies(self, i: int) -> list[tuple[str, Rgba, tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Returns name, colour and capsules of the person and of arms at a sample."""
+        a, b, radius = self._log.capsules
+        arm_a, arm_b, arm_radius = arm_capsules(self._log, np.array([i]))
+        return [
+            ("person", _SKIN, (a[i], b[i], radius)),
+            ("arms", _ARM, (arm_a[0], arm_b[0], arm_radius)),
+        ]
 
     def _show(self, i: int) -> None:
         log = self._log
         self.scene.show_garment(log.garment_position(i))
         self.scene.show_grippers(np.stack([log.gripper_position[side][i] for side in SIDES]))
         self.scene.show_stage(log.stage[i])
-        for k, (a, b) in enumerate(zip(log.capsules[0][i], log.capsules[1][i], strict=True)):
-            axis = b - a
-            rotation = RotationMatrix()
-            if np.linalg.norm(axis) > 1e-6:
-                rotation = RotationMatrix.MakeFromOneVector(axis, 2)
-            pose = RigidTransform(rotation, 0.5 * (a + b))
-            self._meshcat.SetTransform(f"dressing/person/{k}", pose)
+        for name, _, (first, second, _) in self._bodies(i):
+            for k, (a, b) in enumerate(zip(first, second, strict=True)):
+                axis = b - a
+                rotation = RotationMatrix()
+                if np.linalg.norm(axis) > 1e-6:
+                    rotation = RotationMatrix.MakeFromOneVector(axis, 2)
+                pose = RigidTransform(rotation, 0.5 * (a + b))
+                self._meshcat.SetTransform(f"dressing/{name}/{k}", pose)

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.stills import floor_height
 
@@ -61,9 +62,14 @@ def _page(log: RunLog, fps: float) -> bytes:
     step = max(_RESOLUTION, float((position.max(axis=(0, 1)) - low).max()) / _INT16_STEPS)
     a, b, radius = log.capsules
     a, b = np.nan_to_num(a[frames]), np.nan_to_num(b[frames])
+    body_count = len(radius)
+    arm_a, arm_b, arm_radius = arm_capsules(log, frames)
+    a, b = np.concatenate([a, arm_a], axis=1), np.concatenate([b, arm_b], axis=1)
+    radius = np.concatenate([radius, arm_radius])
     meta = {
         "frames": len(frames),
         "nodes": position.shape[1],
+        "body": body_count,
         "low": low.tolist(),
         "step": step,
         "time": [round(float(t), 4) for t in log.time[frames]],

@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import STAGE_NAMES, RunLog
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import chart, embedded, html_page
@@ -76,11 +77,20 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
         f'<header class="{"good" if success else "bad"}"><h1>{verdict}</h1>'
         f"<p>{html.escape(detail)}</p></header>",
         "<h2>Limits asked and reached</h2>",
-        _limits(summary, rules),
+        _limits(summary, rules, log.estimated),
         _safety(summary),
         "<h2>Pace</h2>",
         _pace(summary),
     ]
+    if log.estimated:
+        parts.insert(
+            parts.index("<h2>Pace</h2>"),
+            '<p class="note">Garment and person are as they were estimated: penetration and strain '
+            "would tell of the estimate, and are not judged.</p>",
+        )
+    if log.events:
+        lines = "".join(f"<li>{html.escape(line)}</li>" for line in log.events)
+        parts += [f"<details><summary>events at the station</summary><ul>{lines}</ul></details>"]
     if len(log):
         parts += ["<h2>Pictures</h2>", _pictures(log, m), "<h2>Course</h2>", _shading()]
         parts += [_chart(title, note, draw) for title, note, draw in _charts(log, m, rules)]
@@ -93,7 +103,7 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
     return html_page("Dressing report", parts)
 
 
-def _limits(summary: dict[str, Any], rules: SuccessRules) -> str:
+def _limits(summary: dict[str, Any], rules: SuccessRules, estimated: bool) -> str:
     rows: list[tuple[str, str, str, bool | None]] = []
 
     def at_most(name: str, key: str, limit: float, text: str, scale: float = 1.0) -> None:
@@ -115,24 +125,46 @@ def _limits(summary: dict[str, Any], rules: SuccessRules) -> str:
         through = bool(summary.get(f"hand_through_cuff_{side}"))
         rows.append((f"{side} hand through the cuff", "", "yes" if through else "no", None))
     at_most("gripper force, largest", "max_gripper_force_N", rules.max_gripper_force, "{:.1f} N")
-    at_most(
-        "penetration, deepest", "max_penetration_m", rules.max_penetration, "{:.1f} mm", scale=1e3
-    )
-    at_most(
-        "strain of 99 % of the edges, largest",
-        "max_edge_strain",
-        rules.max_edge_strain,
-        "{:.1f} %",
-        scale=1e2,
-    )
-    rows.append(
-        (
-            "contact force at one node, largest",
-            "",
-            _figure(summary.get("max_contact_force_N"), "{:.2f} N"),
-            None,
+    if not estimated:
+        at_most(
+            "penetration, deepest",
+            "max_penetration_m",
+            rules.max_penetration,
+            "{:.1f} mm",
+            scale=1e3,
         )
-    )
+        at_most(
+            "strain of 99 % of the edges, largest",
+            "max_edge_strain",
+            rules.max_edge_strain,
+            "{:.1f} %",
+            scale=1e2,
+        )
+        rows.append(
+            (
+                "contact force at one node, largest",
+                "",
+                _figure(summary.get("max_contact_force_N"), "{:.2f} N"),
+                None,
+            )
+        )
+    if "min_arms_apart_m" in summary:
+        least = rules.min_arm_distance
+        for name, key in (
+            ("arms apart, least", "min_arms_apart_m"),
+            ("arm to person but for hands, least", "min_arm_to_person_m"),
+        ):
+            value = summary[key]
+            asked, met = f"≥ {100 * least:g} cm", value is not None and value >= least
+            rows.append((name, asked, _figure(value, "{:.1f} cm", 100.0), met))
+        at_most("joint speed, share of its limit", "max_joint_speed_share", 1.0, "{:.2f}")
+        at_most("joint torque, share of its limit", "max_joint_torque_share", 1.0, "{:.2f}")
+        margin = summary["min_joint_margin_rad"]
+        kept = margin is not None and margin >= 0.0
+        rows.append(("joint to its limit, least", "≥ 0", _figure(margin, "{:.3f} rad"), kept))
+        tracking = summary["arm_tracking_mm"]
+        shown = f"{tracking['median']:.1f} mm (median), {tracking['p99']:.1f} mm (99 %)"
+        rows.append(("gripper off its joints' command", "", shown, None))
     mark = {
         True: '<td class="yes">met</td>',
         False: '<td class="no">broken</td>',
@@ -175,6 +207,12 @@ def _pace(summary: dict[str, Any]) -> str:
         median = _figure(solve.get("median"), "{:.1f} ms")
         p99 = _figure(solve.get("p99"), "{:.1f} ms")
         rows.append((f"{name} controller", f"{rate}, solves {median} (median), {p99} (99 %)"))
+    if "command_rate_hz" in summary:
+        latency = summary["command_latency_ms"]
+        rate = _figure(summary["command_rate_hz"], "{:.1f} Hz")
+        median, p99 = (_figure(latency[n], "{:.1f} ms") for n in ("median", "p99"))
+        rows.append(("commands", f"{rate}, latency {median} (median), {p99} (99 %)"))
+        rows.append(("start-up to first command", _figure(summary["start_up_s"], "{:.1f} s")))
     return (
         "<table><tbody>"
         + "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows)
@@ -205,8 +243,17 @@ def _pictures(log: RunLog, m: Measures) -> str:
         target = log.joint_position[i].mean(axis=0) - [0.0, 0.0, 0.12]
         eye = target + 2.9 * np.array([np.cos(azimuth), np.sin(azimuth), 0.22])
         camera = CameraPose(tuple(eye), tuple(target))
+        arms = arm_capsules(log, np.array([i]))
         picture = render_still(
-            log.faces, log.garment_position(i), a[i], b[i], radius, grippers, camera, _STILL_SIZE
+            log.faces,
+            log.garment_position(i),
+            a[i],
+            b[i],
+            radius,
+            grippers,
+            camera,
+            _STILL_SIZE,
+            arms=(arms[0][0], arms[1][0], arms[2]),
         )
         caption = f"{name}, t = {log.time[i]:.1f} s"
         figures.append(

@@ -35,6 +35,7 @@ FloatArray = npt.NDArray[np.float64]
 OUTSIDE_COLOR = (0.22, 0.44, 0.70)
 LINING_COLOR = (0.87, 0.62, 0.28)
 SKIN_COLOR = (0.87, 0.70, 0.58)
+ARM_COLOR = (0.90, 0.91, 0.92)
 GRIPPER_COLOR = (0.25, 0.26, 0.28)
 _FLOOR_COLOR = (0.76, 0.77, 0.79)
 _BACKGROUND = (0.95, 0.96, 0.97)
@@ -68,6 +69,7 @@ def render_still(
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
     floor: float | None = None,
+    arms: tuple[FloatArray, FloatArray, FloatArray] | None = None,
 ) -> npt.NDArray[np.uint8]:
     """Returns a picture (height, width, 3), RGB.
 
@@ -81,6 +83,7 @@ def render_still(
         camera: where it is taken from.
         size: width, height in pixels.
         floor: height of the floor, m; None: just below everything shown.
+        arms: ends (k,3), (k,3) and radii (k,) of capsules that are robot arms, m.
     """
     graph: SceneGraph = SceneGraph()
     graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters()))
@@ -98,13 +101,17 @@ def render_still(
     add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
     lining = position - _LINING_OFFSET * normals
     add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
-    for a, b, r in zip(capsule_a, capsule_b, capsule_radius, strict=True):
-        length = float(np.linalg.norm(b - a))
-        if length > 1e-6:
-            rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
-            add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), SKIN_COLOR)
-        else:
-            add(Sphere(r), RigidTransform(a), SKIN_COLOR)
+    bodies = [((capsule_a, capsule_b, capsule_radius), SKIN_COLOR)]
+    if arms is not None:
+        bodies.append((arms, ARM_COLOR))
+    for capsules, color in bodies:
+        for a, b, r in zip(*capsules, strict=True):
+            length = float(np.linalg.norm(b - a))
+            if length > 1e-6:
+                rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
+                add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), color)
+            else:
+                add(Sphere(r), RigidTransform(a), color)
     for p in np.reshape(grippers, (-1, 3)):
         add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:

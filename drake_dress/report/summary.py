@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import ArmMeasures, measure_arms
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
 
@@ -30,12 +31,15 @@ class SuccessRules:
         max_gripper_force: at every sample, N.
         max_penetration: of garment into person at every sample, m.
         max_edge_strain: of 99 % of the edges at every sample.
+        min_arm_distance: of arms to each other, and of arms but for their hands to the person, at
+            every sample, m. No joint may ever be beyond its limits of position, speed, torque.
     """
 
     min_s: float = 1.9
     max_gripper_force: float = 40.0
     max_penetration: float = 5e-3
     max_edge_strain: float = 0.10
+    min_arm_distance: float = 0.05
 
 
 def summarize(
@@ -54,7 +58,11 @@ def summarize(
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
     time from which both sleeves stay on (s and linking number). `safety_cut_s` is, for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
-    where not logged.
+    where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
+    sending of a status to the command that answers it) and `start_up_s` (to the first command).
+    Of a run with arms: `max_joint_speed_share`, `max_joint_torque_share` of limits,
+    `min_joint_margin_rad`, `arm_tracking_mm` (of grippers from where joints are commanded to be),
+    `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand).
 
     Args:
         log: of the run.
@@ -64,7 +72,8 @@ def summarize(
     """
     rules = rules or SuccessRules()
     m = measures if measures is not None else measure(log)
-    reason = _reason(log, m, rules)
+    arms = measure_arms(log)
+    reason = _reason(log, m, rules) or _arm_reason(log, arms, rules)
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
     on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
     dressed = first_lasting(on.all(axis=1))
@@ -100,6 +109,7 @@ def summarize(
             "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
         }
     summary["safety_cut_s"] = _safety_cuts(log)
+    summary |= _command_figures(log) | _arm_figures(arms)
     return summary | {"seed": log.seed, "version": log.version}
 
 
@@ -110,6 +120,8 @@ def write_summary(summary: dict[str, Any], path: str | Path) -> None:
 
 def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     """Returns the first rule that was broken, in words with the figure; None if none was."""
+    if log.ended_by is not None:
+        return log.ended_by
     if not len(log):
         return "nothing was logged"
     if not m.finite.all():
@@ -124,11 +136,14 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         if abs(linking) != 1:
             return f"{side} arm outside the sleeve: linking number {linking}"
     for k, side in enumerate(SIDES):
-        i = int(np.argmax(m.gripper_force[:, k]))
+        i = int(np.argmax(np.nan_to_num(m.gripper_force[:, k])))
         force = m.gripper_force[i, k]
         if force > rules.max_gripper_force:
             limit = f"{force:.1f} N > {rules.max_gripper_force:g} N"
             return f"{side} gripper force too high: {limit} at t = {log.time[i]:.2f} s"
+    if log.estimated:
+        # how far an estimate is inside the person, or strained, tells of the estimate
+        return None
     i = int(np.argmax(m.penetration))
     if m.penetration[i] > rules.max_penetration:
         limit = f"{1e3 * m.penetration[i]:.1f} mm > {1e3 * rules.max_penetration:g} mm"
@@ -149,6 +164,57 @@ def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:
         time = {v: float(since_last[(log.safety[:, k] & v.value) != 0].sum()) for v in Verdict}
         cuts[side] = {str(v.name).lower(): t for v, t in time.items() if t > 0.0}
     return cuts
+
+
+def _arm_reason(log: RunLog, arms: ArmMeasures | None, rules: SuccessRules) -> str | None:
+    """Returns the first rule that arms broke, with the figure; None if none was."""
+    if arms is None or not len(log):
+        return None
+    if not arms.kept.all():
+        t = log.time[int(np.argmin(arms.kept))]
+        return f"an arm's joint was beyond its limits at t = {t:.2f} s"
+    for name, distance in (
+        ("arms", arms.apart),
+        ("left arm and person", arms.to_person[:, 0]),
+        ("right arm and person", arms.to_person[:, 1]),
+    ):
+        i = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
+        if distance[i] < rules.min_arm_distance:
+            limit = f"{100 * distance[i]:.1f} cm < {100 * rules.min_arm_distance:g} cm"
+            return f"{name} too near: {limit} at t = {log.time[i]:.2f} s"
+    return None
+
+
+def _arm_figures(arms: ArmMeasures | None) -> dict[str, Any]:
+    if arms is None or not len(arms.apart):
+        return {}
+    return {
+        "max_joint_speed_share": _largest(arms.speed_share),
+        "max_joint_torque_share": _largest(arms.torque_share),
+        "min_joint_margin_rad": _number(float(arms.margin.min())),
+        "arm_tracking_mm": {
+            "median": 1e3 * float(np.median(arms.off)),
+            "p99": 1e3 * float(np.quantile(arms.off, 0.99)),
+        },
+        "min_arms_apart_m": _number(float(arms.apart.min())),
+        "min_arm_to_person_m": _number(float(arms.to_person.min())),
+    }
+
+
+def _command_figures(log: RunLog) -> dict[str, Any]:
+    """Returns rate, latency and start-up of commands to hardware; nothing of a simulation."""
+    if log.commands is None or len(log.commands[0]) < 2:
+        return {}
+    times, ages = log.commands
+    ages = ages[np.isfinite(ages)]
+    return {
+        "command_rate_hz": float((len(times) - 1) / (times[-1] - times[0])),
+        "command_latency_ms": {
+            "median": 1e3 * float(np.median(ages)) if len(ages) else None,
+            "p99": 1e3 * float(np.quantile(ages, 0.99)) if len(ages) else None,
+        },
+        "start_up_s": log.start_up,
+    }
 
 
 def _number(value: float) -> float | None:

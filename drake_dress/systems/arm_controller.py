@@ -10,6 +10,9 @@ from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal
 from drake_dress.models.control.person_model import PersonModel, person_capsules
 from drake_dress.models.sides import SIDES
 
+# From where it is commanded to be, beyond which a stopped arm is not drawn back there, rad.
+_ELSEWHERE = 0.02
+
 
 class ArmController(LeafSystem):
     """Turns positions commanded to grippers into joint commands that keep the arms' limits.
@@ -23,6 +26,10 @@ class ArmController(LeafSystem):
         - left_velocity_command
         - right_velocity_command
         - joint_position
+        - left_arm_position
+        - right_arm_position
+        - left_arm_stopped
+        - right_arm_stopped
         output_ports:
         - left_arm_position_command
         - right_arm_position_command
@@ -32,23 +39,30 @@ class ArmController(LeafSystem):
         - speed_share
 
     Commands (3,) p_WG and v_WG, m, m/s. joint_position: (18,) of the person's arms as they are
-    believed to be, m. Arm commands (7,) rad, rad/s. clearance: (3,) least distance between the
-    arms, of the left and of the right one to the person, m. speed_share: (2,) of the speed asked
-    for that the grippers have. Outputs are of the state alone, no feedthrough. A command that is
-    not finite is not followed: the arms come to rest.
+    believed to be, m. *_arm_position: (7,) where arms are, rad. *_arm_stopped: (1,) positive while
+    an arm's driver reports that it does not follow. Arm commands (7,) rad, rad/s. clearance: (3,)
+    least distance between the arms, of the left and of the right one to the person, m.
+    speed_share: (2,) of the speed asked for that the grippers have. Outputs are of the state alone,
+    no feedthrough. A command that is not finite is not followed: the arms come to rest.
 
-    It integrates its commands itself, from `start` on; what arms measure is for those who watch
-    them.
+    It integrates its commands itself, from `start` on. An arm whose driver has stopped by itself is
+    commanded to be where it is, so that it goes on from there.
 
     Args:
         arms: with their limits and settings.
         start: (2,7) joints at time 0, left, then right, rad.
         period: of the commands, s.
         person: shape of the person to keep away from.
+        offset: of the first command, s: a little after what it follows has changed.
     """
 
     def __init__(
-        self, arms: ArmPair, start: np.ndarray, period: float, person: PersonModel
+        self,
+        arms: ArmPair,
+        start: np.ndarray,
+        period: float,
+        person: PersonModel,
+        offset: float = 0.0,
     ) -> None:
         super().__init__()
         self._arms = arms
@@ -61,10 +75,14 @@ class ArmController(LeafSystem):
             for side in SIDES:
                 self.DeclareVectorInputPort(f"{side}_{name}_command", 3)
         self.DeclareVectorInputPort("joint_position", 18)
+        for side in SIDES:
+            self.DeclareVectorInputPort(f"{side}_arm_position", 7)
+        for side in SIDES:
+            self.DeclareVectorInputPort(f"{side}_arm_stopped", 1)
         ticket = {self.discrete_state_ticket(self._joints)}
-        for offset, name in ((0, "position"), (14, "velocity")):
+        for first, name in ((0, "position"), (14, "velocity")):
             for i, side in enumerate(SIDES):
-                rows = slice(offset + 7 * i, offset + 7 * i + 7)
+                rows = slice(first + 7 * i, first + 7 * i + 7)
                 self.DeclareVectorOutputPort(
                     f"{side}_arm_{name}_command", 7, self._show(self._joints, rows), ticket
                 )
@@ -73,11 +91,12 @@ class ArmController(LeafSystem):
             self.DeclareVectorOutputPort(
                 name, rows.stop - rows.start, self._show(self._shown, rows), ticket
             )
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, offset, self._update)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         state = context.get_discrete_state(self._joints).value()
         q, rate = state[:14].reshape(2, 7), state[14:].reshape(2, 7)
+        q, rate = self._taken_over(context, q, rate)
         seen = self.GetInputPort("joint_position").Eval(context).reshape(6, 3)
         person = None
         if np.isfinite(seen).all():
@@ -89,6 +108,20 @@ class ArmController(LeafSystem):
         discrete.set_value(
             self._shown, np.concatenate([[found.between_arms], found.to_person, found.share])
         )
+
+    def _taken_over(
+        self, context: Context, q: np.ndarray, rate: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns commands (2,7) and rates, of stopped arms those of where they are."""
+        q, rate = q.copy(), rate.copy()
+        for i, side in enumerate(SIDES):
+            if not self.GetInputPort(f"{side}_arm_stopped").Eval(context)[0] > 0.0:
+                continue
+            measured = self.GetInputPort(f"{side}_arm_position").Eval(context)
+            if np.abs(measured - q[i]).max() > _ELSEWHERE:
+                limits = self._arms.arms[i].limits
+                q[i], rate[i] = np.clip(measured, limits.lower, limits.upper), 0.0
+        return q, rate
 
     def _goal(self, context: Context, i: int, side: str, q: np.ndarray) -> GripperGoal:
         position = self.GetInputPort(f"{side}_position_command").Eval(context)

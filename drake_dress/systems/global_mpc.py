@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -13,6 +16,10 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
 from drake_dress.models.dressing.stages import Stage
+from drake_dress.systems.apart import Apart
+
+# Between looks for a plan where the world does not wait, s.
+_LOOKING_PERIOD = 0.01
 
 
 @dataclass(frozen=True)
@@ -21,6 +28,30 @@ class _Finished:
     state: PolicyState
     joints: np.ndarray
     solve_time: float
+
+
+@dataclass(frozen=True)
+class _Solve:
+    """One solve, anywhere."""
+
+    policy: DressingPolicy
+
+    def __call__(
+        self,
+        memory: PolicyState,
+        x: np.ndarray,
+        v: np.ndarray,
+        joints: np.ndarray,
+        now: float,
+        steps: int,
+    ) -> _Finished:
+        begin = clock.perf_counter()
+        state, decision = self.policy.decide(memory, x, v, joints, now, steps)
+        return _Finished(decision, state, joints, clock.perf_counter() - begin)
+
+
+def _submitted(pool: ThreadPoolExecutor, work: _Solve, *arguments: Any) -> Future[_Finished]:
+    return pool.submit(work, *arguments)
 
 
 class GlobalMpc(LeafSystem):
@@ -38,24 +69,31 @@ class GlobalMpc(LeafSystem):
         - stage
         - target
         - solve_time
+        - age
 
     garment_*: (3m,) of the controller's garment, m, m/s. plan: GlobalPlan. stage: (2,) 0 prepare,
     1 dress, 2 done. target: (6,) where left and right armhole shall be next, m. solve_time: (2,)
-    wall time of the last solve that ended, s, and the count of solves ended.
+    wall time of the last solve that ended, s, and the count of solves ended. age: (1,) since what
+    the plan in use answers was seen, s.
 
     A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
     however long it really took: the run is the same on any machine. It runs on a thread of its
-    own meanwhile, beside the simulated garment. What the plan before it does until then is part of
-    the prediction and not changed.
+    own meanwhile, beside the simulated garment. Where the world does not wait, `waits` is False:
+    it runs in a process of its own, a plan is used from k·period + delay on or from when it is
+    there, if that is later, and no solve begins before the one before it has ended. What the plan
+    before it does until then is part of the prediction and not changed.
 
     Args:
         policy: does the work.
         period: between solves, s.
         delay: from what is seen to the use of the plan, s, less than the period and as long as
             the policy's committed steps.
+        waits: whether the world waits for a solve that takes longer than its delay.
     """
 
-    def __init__(self, policy: DressingPolicy, period: float, delay: float) -> None:
+    def __init__(
+        self, policy: DressingPolicy, period: float, delay: float, waits: bool = True
+    ) -> None:
         super().__init__()
         if not 0.0 < delay < period:
             raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
@@ -65,16 +103,24 @@ class GlobalMpc(LeafSystem):
         self._policy = policy
         self._delay = delay
         self._period = period
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
+        solve = _Solve(policy)
+        if waits:
+            threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
+            self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)
+        else:
+            self._submit = Apart(solve).submit
         self._pending: Future[_Finished] | None = None
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
+        self._waits = waits
+        self._begun_at = 0.0
         idle = GlobalPlan(
             0.0, policy.parameters.time_step, np.zeros((n, 2, 3)), np.zeros((n + 1, 2, 3))
         )
         self._plan = self.DeclareAbstractState(Value(idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
-        self._shown = self.DeclareDiscreteState(np.zeros(10))
+        # what `_show` shows, and when was seen what the plan in use answers
+        self._shown = self.DeclareDiscreteState(np.zeros(11))
         self.DeclareVectorInputPort("garment_position", 3 * m)
         self.DeclareVectorInputPort("garment_velocity", 3 * m)
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (n + 1))
@@ -94,24 +140,32 @@ class GlobalMpc(LeafSystem):
             ("solve_time", slice(8, 10)),
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), shown)
+        self.DeclareVectorOutputPort("age", 1, self._calc_age)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._finish)
+        if waits:
+            self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._finish)
+        else:
+            self.DeclarePeriodicUnrestrictedUpdateEvent(_LOOKING_PERIOD, 0.0, self._look)
 
     def _begin(self, context: Context, state: State) -> None:
+        if self._pending is not None:
+            return
+        gone = context.get_time() - self._begun_at
+        self._begun_at = context.get_time()
         x = self.get_input_port(0).Eval(context).reshape(-1, 3).copy()
         v = self.get_input_port(1).Eval(context).reshape(-1, 3).copy()
         joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3).copy()
         memory = context.get_abstract_state(self._memory).get_value()
         now = context.get_time()
-        self._pending = self._worker.submit(self._solve, memory, x, v, joints, now)
+        # periods that were missed are gone, too
+        periods = max(1, round(gone / self._period))
+        steps = round(periods * self._period / self._policy.parameters.time_step)
+        self._pending = self._submit(memory, x, v, joints, now, steps)
 
-    def _solve(
-        self, memory: PolicyState, x: np.ndarray, v: np.ndarray, joints: np.ndarray, now: float
-    ) -> _Finished:
-        begin = clock.perf_counter()
-        steps = round(self._period / self._policy.parameters.time_step)
-        state, decision = self._policy.decide(memory, x, v, joints, now, steps)
-        return _Finished(decision, state, joints, clock.perf_counter() - begin)
+    def _look(self, context: Context, state: State) -> None:
+        due = context.get_time() >= self._begun_at + self._delay - 1e-9
+        if due and self._pending is not None and self._pending.done():
+            self._finish(context, state)
 
     def _finish(self, context: Context, state: State) -> None:
         if self._pending is None:
@@ -122,7 +176,7 @@ class GlobalMpc(LeafSystem):
         p = self._policy.parameters
         first = p.committed_steps
         plan = GlobalPlan(
-            context.get_time(),
+            context.get_time() if self._waits else self._begun_at + self._delay,
             p.time_step,
             decision.plan.velocity[first:],
             decision.plan.armhole[first - 1 :],
@@ -138,10 +192,14 @@ class GlobalMpc(LeafSystem):
                 [
                     [float(s) for s in stages],
                     decision.target[-1].ravel(),
-                    [finished.solve_time, shown[9] + 1.0],
+                    [finished.solve_time, shown[9] + 1.0, self._begun_at],
                 ]
             )
         )
+
+    def _calc_age(self, context: Context, output: BasicVector) -> None:
+        seen = float(context.get_discrete_state(self._shown).value()[10])
+        output.SetFromVector([context.get_time() - seen])
 
     def _show(self, rows: slice):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:

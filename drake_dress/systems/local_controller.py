@@ -15,11 +15,12 @@ from drake_dress.models.control.local_control import (
     LocalPlan,
     LocalState,
 )
+from drake_dress.models.immutable import Immutable
 from drake_dress.models.sides import SIDES
 
 
 @dataclass(frozen=True)
-class _Memory:
+class _Memory(Immutable):
     """What was solved last: of it the newest plan is handed out once its delay has passed."""
 
     state: LocalState

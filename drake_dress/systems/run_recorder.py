@@ -9,6 +9,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 
+from drake_dress.models.control.person_model import PersonModel, person_capsules
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
@@ -16,6 +17,9 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import ArmSample, RunLogWriter, Sample
+
+# In the order of `ArmSample`.
+_OF_ARM = ("position", "velocity", "command", "torque")
 
 
 class RunRecorder(LeafSystem):
@@ -43,25 +47,33 @@ class RunRecorder(LeafSystem):
         - left_arm_position
         - left_arm_velocity
         - left_arm_command
+        - left_arm_torque
         - right_arm_position
         - right_arm_velocity
         - right_arm_command
+        - right_arm_torque
         - clearance
+        - active
 
     Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
     samples nothing is lost: a sample holds all their flags. local_solve_time is there where there
     is a local controller; of what it solves between samples the last is kept. The ports after it
-    are there with arms; of their clearance the least between two samples is kept.
+    are there with arms; of their clearance the least between two samples is kept. contact,
+    contact_force, body_poses are there where truth is known; stage, solve_time, verdict, clearance
+    where there are controllers. Where something is connected to active (1,), samples are taken
+    while it is positive, and time counts from the first.
 
     Args:
         writer: the open log.
         mesh: the plant's garment.
         estimate_count: nodes of the controller's garment.
-        capsules: of the person, with the index of the body each is fixed in.
+        capsules: of the person, with the index of the body each is fixed in; or, where truth is
+            not known, the person as controllers know it.
         period: between samples, s.
         verdict_period: between verdicts, s.
         has_local: whether there is a local controller.
         has_arms: whether there are arms.
+        has_control: whether there are controllers.
     """
 
     def __init__(
@@ -69,16 +81,21 @@ class RunRecorder(LeafSystem):
         writer: RunLogWriter,
         mesh: GarmentMesh,
         estimate_count: int,
-        capsules: Sequence[tuple[int, Capsule]],
+        capsules: Sequence[tuple[int, Capsule]] | PersonModel,
         period: float,
         verdict_period: float,
         has_local: bool = False,
         has_arms: bool = False,
+        has_control: bool = True,
     ) -> None:
         super().__init__()
         self._writer = writer
         self._mesh = mesh
-        self._capsules = list(capsules)
+        self._model = capsules if isinstance(capsules, PersonModel) else None
+        self._capsules = [] if isinstance(capsules, PersonModel) else list(capsules)
+        self._has_control = has_control
+        self._begun: float | None = None
+        self._heard = False
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
         self._solves = {"solve_time": 0.0, "local_solve_time": 0.0}
         self._has_local = has_local
@@ -87,26 +104,31 @@ class RunRecorder(LeafSystem):
         self._verdict = np.zeros(2, dtype=int)
         n = len(mesh.rest_position)
         self.DeclareVectorInputPort("garment_position", 3 * n)
-        self.DeclareVectorInputPort("contact", n)
-        self.DeclareVectorInputPort("contact_force", 3 * n)
-        self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+        if self._model is None:
+            self.DeclareVectorInputPort("contact", n)
+            self.DeclareVectorInputPort("contact_force", 3 * n)
+            self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self.DeclareVectorInputPort("joint_position", 18)
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
             self.DeclareVectorInputPort(f"{side}_gripper_force", 3)
-        self.DeclareVectorInputPort("stage", 2)
-        self.DeclareVectorInputPort("solve_time", 2)
+        if has_control:
+            self.DeclareVectorInputPort("stage", 2)
+            self.DeclareVectorInputPort("solve_time", 2)
+            self.DeclareVectorInputPort("verdict", 2)
         if has_local:
             self.DeclareVectorInputPort("local_solve_time", 2)
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
-        self.DeclareVectorInputPort("verdict", 2)
         if has_arms:
             for side in SIDES:
-                for name in ("position", "velocity", "command"):
+                for name in _OF_ARM:
                     self.DeclareVectorInputPort(f"{side}_arm_{name}", 7)
-            self.DeclareVectorInputPort("clearance", 3)
-        self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
+            if has_control:
+                self.DeclareVectorInputPort("clearance", 3)
+        self.DeclareVectorInputPort("active", 1)
+        if has_control:
+            self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
 
     def _collect(self, context: Context) -> None:
@@ -119,9 +141,19 @@ class RunRecorder(LeafSystem):
         def value(name: str) -> np.ndarray:
             return self.GetInputPort(name).Eval(context)
 
+        active = self.GetInputPort("active")
+        if active.HasValue(context) and not active.Eval(context)[0] > 0.0:
+            return
+        if self._model is not None and not self._heard:
+            # of hardware nothing is known before its first messages
+            grippers = [value(f"{side}_gripper_position") for side in SIDES]
+            self._heard = bool(np.isfinite(grippers).all())
+            if not self._heard:
+                return
+        if self._begun is None:
+            self._begun = context.get_time() if active.HasValue(context) else 0.0
         x = value("garment_position").reshape(-1, 3)
         joints = value("joint_position").reshape(6, 3)
-        poses = self.GetInputPort("body_poses").Eval(context)
         interior = torso_interior(joints[0], joints[3])
         dressing = {}
         for i, side in enumerate(SIDES):
@@ -137,43 +169,52 @@ class RunRecorder(LeafSystem):
             )
             # a sleeve that does not cover its arm has no progress, wherever its centre is
             dressing[side] = (s if inside else 0.0, l, theta)
-        self._collect(context)
+        if self._has_control:
+            self._collect(context)
+        capsule_a, capsule_b = self._ends(context, joints)
         verdict, self._verdict = self._verdict, np.zeros(2, dtype=int)
         clearance, self._clearance = self._clearance, np.full(3, np.inf)
         arms = None
         if self._has_arms:
-            arms = {
-                side: ArmSample(
-                    *(value(f"{side}_arm_{n}") for n in ("position", "velocity", "command"))
-                )
-                for side in SIDES
-            }
+            arms = {side: ArmSample(*(value(f"{side}_arm_{n}") for n in _OF_ARM)) for side in SIDES}
         self._writer.append(
             Sample(
-                time=context.get_time(),
+                time=context.get_time() - self._begun,
                 garment_position=x,
-                contact=value("contact"),
-                contact_force=value("contact_force").reshape(-1, 3),
+                contact=value("contact") if self._model is None else None,
+                contact_force=(
+                    value("contact_force").reshape(-1, 3) if self._model is None else None
+                ),
                 joint_position=joints,
                 gripper_position={side: value(f"{side}_gripper_position") for side in SIDES},
                 gripper_force={side: value(f"{side}_gripper_force") for side in SIDES},
                 dressing=dressing,
-                stage=value("stage"),
+                stage=value("stage") if self._has_control else np.zeros(2),
                 safety=verdict,
                 global_solve_time=self._ended(context, "solve_time"),
                 local_solve_time=self._ended(context, "local_solve_time"),
                 estimate_garment_position=value("estimated_position").reshape(-1, 3),
                 estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
-                capsule_a=np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
-                capsule_b=np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
+                capsule_a=capsule_a,
+                capsule_b=capsule_b,
                 arms=arms,
-                clearance=clearance,
+                clearance=clearance if self._has_control else None,
             )
+        )
+
+    def _ends(self, context: Context, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if self._model is not None:
+            a, b, _ = person_capsules(self._model, joints)
+            return a, b
+        poses = self.GetInputPort("body_poses").Eval(context)
+        return (
+            np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
+            np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
         )
 
     def _ended(self, context: Context, name: str) -> float:
         """Returns the time of the last solve, s; NaN if none ended since the sample before."""
-        if name == "local_solve_time" and not self._has_local:
+        if not self._has_control or (name == "local_solve_time" and not self._has_local):
             return np.nan
         spent, count = self.GetInputPort(name).Eval(context)
         ended = count > self._solves[name]

@@ -29,6 +29,7 @@ class SafetyGovernor(LeafSystem):
         - right_gripper_position
         - left_gripper_force
         - right_gripper_force
+        - permission
         output_ports:
         - left_position_command
         - right_position_command
@@ -69,6 +70,7 @@ class SafetyGovernor(LeafSystem):
         for name in ("position", "force"):
             for side in SIDES:
                 self.DeclareVectorInputPort(f"{side}_gripper_{name}", 3)
+        self.DeclareVectorInputPort("permission", 1)
         ticket = {self.discrete_state_ticket(self._memory)}
         for offset, name in ((0, "position"), (6, "velocity")):
             for i, side in enumerate(SIDES):
@@ -96,6 +98,7 @@ class SafetyGovernor(LeafSystem):
             self._limits,
             context.get_time(),
             self._period,
+            bool(self.GetInputPort("permission").Eval(context)[0] > 0.5),
         )
         discrete.set_value(self._memory, state.packed())
         discrete.set_value(self._verdict, [float(v) for v in verdicts])

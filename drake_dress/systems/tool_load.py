@@ -23,11 +23,12 @@ class ToolLoad(LeafSystem):
         input_ports:
         - left_force
         - right_force
+        - push (optional)
         output_ports:
         - spatial_forces
 
-    Forces (3,) on the tools' origins, N, in W. spatial_forces: list of
-    ExternallyAppliedSpatialForce.
+    Forces (3,) on the tools' origins, N, in W; push (6,) what else pushes left and right.
+    spatial_forces: list of ExternallyAppliedSpatialForce.
 
     Args:
         tools: bodies of left and right tool.
@@ -38,17 +39,20 @@ class ToolLoad(LeafSystem):
         self._tools = list(tools)
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_force", 3)
+        self.DeclareVectorInputPort("push", 6)
         self.DeclareAbstractOutputPort(
             "spatial_forces", lambda: Value[list[ExternallyAppliedSpatialForce]]([]), self._calc
         )
 
     def _calc(self, context: Context, output: Value) -> None:
         forces = []
+        port = self.GetInputPort("push")
+        push = port.Eval(context) if port.HasValue(context) else np.zeros(6)
         for i, tool in enumerate(self._tools):
             applied = ExternallyAppliedSpatialForce()
             applied.body_index = tool
             applied.p_BoBq_B = np.zeros(3)
-            force = self.get_input_port(i).Eval(context)
+            force = self.get_input_port(i).Eval(context) + push[3 * i : 3 * i + 3]
             applied.F_Bq_W = SpatialForce(tau=np.zeros(3), f=force)
             forces.append(applied)
         output.set_value(forces)

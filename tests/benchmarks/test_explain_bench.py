@@ -4,13 +4,7 @@ import dataclasses
 
 import pytest
 
-from benchmarks.explain.__main__ import (
-    BEGIN,
-    END,
-    main,
-    name_of,
-    write_between,
-)
+from benchmarks.explain.__main__ import main, name_of
 from benchmarks.explain.cases import study
 from benchmarks.explain.tables import parameter_error, reliability, right, tables
 from benchmarks.kept import read_results, write_results
@@ -94,18 +88,6 @@ def test_reliability_counts_causes_by_their_confidence():
     by_range = {(low, high): hits for low, high, hits in reliability(found)}
     assert by_range[0.95, 1.0] == [True, False]
     assert by_range[0.0, 0.5] == [True]
-
-
-def test_tables_go_between_the_marks_of_a_file(tmp_path):
-    path = tmp_path / "page.md"
-    path.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
-    write_between(path, "new")
-    write_between(path, "newer")
-    assert path.read_text() == f"before\n{BEGIN}\n\nnewer\n\n{END}\nafter\n"
-    path.write_text("no marks")
-    with pytest.raises(UserError, match="expected one"):
-        write_between(path, "new")
-    assert path.read_text() == "no marks"
 
 
 def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):

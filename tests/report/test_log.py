@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -139,6 +140,7 @@ def test_killed_process_leaves_what_was_flushed(tmp_path):
     path = tmp_path / "run.h5"
     root = Path(__file__).resolve().parents[2]
     script = f"""
+import time
 import numpy as np
 from dataclasses import replace
 from drake_dress.report.log import RunLogWriter
@@ -150,7 +152,11 @@ writer = RunLogWriter({str(path)!r}, garment=garment, scenario_text="", version=
 for i in range(10**6):
     writer.append(replace(sample, time=0.01 * i))
     if i == 600:
+        time.sleep(0.1)
+    elif i == 601:
         print("written", flush=True)
+    elif i > 601:
+        time.sleep(1.0)
 """
     process = subprocess.Popen(
         [sys.executable, "-c", script],
@@ -167,7 +173,7 @@ for i in range(10**6):
     process.wait()
     process.stdout.close()
     with RunLog.open(path) as log:
-        assert len(log) >= 300
+        assert len(log) == 602
         assert np.isfinite(log.garment_position(len(log) - 1)).all()
 
 
@@ -263,3 +269,39 @@ def test_what_is_no_log_is_refused(tmp_path):
     for path in (tmp_path / "absent.h5", text, cut, tmp_path):
         with pytest.raises(UserError):
             RunLog.open(path)
+
+
+def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, monkeypatch):
+    """As `statvfs` tells of it; a disk that is really full is in the benchmark of hardware."""
+    path = tmp_path / "run.h5"
+    writer = RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.0,
+    )  # fmt: skip
+    for sample in samples[:3]:
+        writer.append(sample)
+    full = os.statvfs(tmp_path)
+    monkeypatch.setattr(
+        os, "statvfs", lambda _: SimpleNamespace(f_bavail=0, f_frsize=full.f_frsize)
+    )
+    with pytest.raises(OSError, match="No space left"):
+        writer.append(samples[3])
+    writer.note("ended_by", "log: cannot be written")
+    writer.close()
+    with RunLog.open(path) as log:
+        assert len(log) == 4
+        assert log.ended_by == "log: cannot be written"
+    assert [p.name for p in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
+    def none(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", none)
+    with pytest.raises(UserError, match="no room on the disk"):
+        RunLogWriter(
+            tmp_path / "run.h5", garment=garment, scenario_text="", version="", seed=0,
+            radius=np.ones(6),
+        )  # fmt: skip
+    assert not list(tmp_path.iterdir())

@@ -38,7 +38,12 @@ def pair() -> ArmPair:
     return ArmPair((panda(bases[0]), panda(bases[1])), (SHAPE, SHAPE), np.stack([HOME, HOME]))
 
 
-def run(velocity: np.ndarray, broken: bool = False) -> tuple[ArmController, np.ndarray, np.ndarray]:
+def run(
+    velocity: np.ndarray,
+    broken: bool = False,
+    stopped: float = 0.0,
+    elsewhere: np.ndarray | None = None,
+) -> tuple[ArmController, np.ndarray, np.ndarray]:
     """Returns the controller, its joint commands and shares after a second at (3,) m/s."""
     arms, start = pair(), np.stack([HOME, HOME])
     builder = DiagramBuilder()
@@ -57,6 +62,11 @@ def run(velocity: np.ndarray, broken: bool = False) -> tuple[ArmController, np.n
             )
     person = builder.AddSystem(ConstantVectorSource(JOINTS.ravel()))
     builder.Connect(person.get_output_port(), controller.GetInputPort("joint_position"))
+    for side in SIDES:
+        at = builder.AddSystem(ConstantVectorSource(HOME if elsewhere is None else elsewhere))
+        builder.Connect(at.get_output_port(), controller.GetInputPort(f"{side}_arm_position"))
+        flag = builder.AddSystem(ConstantVectorSource([stopped]))
+        builder.Connect(flag.get_output_port(), controller.GetInputPort(f"{side}_arm_stopped"))
     sinks = []
     for name, size in (("left_arm_position_command", 7), ("right_arm_position_command", 7)):
         sink = builder.AddSystem(VectorLogSink(size, PERIOD))
@@ -90,3 +100,15 @@ def test_a_command_that_is_no_number_moves_nothing() -> None:
     np.testing.assert_allclose(still, arms.arms[0].tool_position(HOME), atol=2e-3)
     moved = arms.arms[1].tool_position(q[-1, 1]) - arms.arms[1].tool_position(HOME)
     assert moved[0] == pytest.approx(0.06, abs=3e-3)
+
+
+def test_an_arm_that_stopped_elsewhere_is_commanded_to_be_there() -> None:
+    """One that follows is not, nor one that is almost where it was commanded to be."""
+    there = HOME + 0.1
+    _, held, _ = run(np.zeros(3), stopped=1.0, elsewhere=there)
+    # the gripper's own command draws it back, slowly, from where it is
+    assert np.abs(held[1] - there).max() < 0.02
+    _, permitted, _ = run(np.zeros(3), stopped=0.0, elsewhere=there)
+    np.testing.assert_allclose(permitted[-1], np.stack([HOME, HOME]), atol=0.01)
+    _, lagging, _ = run(np.zeros(3), stopped=1.0, elsewhere=HOME + 0.01)
+    np.testing.assert_allclose(lagging[-1], np.stack([HOME, HOME]), atol=0.01)

@@ -48,12 +48,15 @@ def simulate(
     duration: float,
     limits: SafetyLimits = LIMITS,
     alive: float = np.inf,
+    permission: float = 1.0,
 ) -> dict[str, np.ndarray]:
     """Returns logs of the left gripper, (T,k), at every 2 ms, and of the verdicts."""
     builder = DiagramBuilder()
     governor = builder.AddSystem(SafetyGovernor(START, PERIOD, limits))
     clock = builder.AddSystem(Clock(alive))
     builder.Connect(clock.get_output_port(), governor.GetInputPort("request_time"))
+    allowed = builder.AddSystem(ConstantVectorSource([permission]))
+    builder.Connect(allowed.get_output_port(), governor.GetInputPort("permission"))
     ports = {"verdict": governor.GetOutputPort("verdict")}
     for i, side in enumerate(SIDES):
         gripper = builder.AddSystem(FloatingGripper(START[i], 0.002, GRIPPER_SPEED, 2.0))
@@ -126,3 +129,10 @@ def test_controller_that_dies_leaves_grippers_at_rest() -> None:
 def test_start_outside_the_limits_is_refused() -> None:
     with pytest.raises(ValueError, match="apart"):
         SafetyGovernor(START, PERIOD, replace(LIMITS, largest_distance=0.4))
+
+
+@pytest.mark.parametrize("permission", [0.0, np.nan])
+def test_without_permission_nothing_moves(permission: float) -> None:
+    log = simulate([0.1, 0.0, 0.0], 0.0, 0.5, permission=permission)
+    np.testing.assert_array_equal(log["command"], np.broadcast_to(START[0], log["command"].shape))
+    assert int(log["verdict"][-1][0]) & Verdict.HELD

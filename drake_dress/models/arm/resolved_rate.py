@@ -58,7 +58,7 @@ class RateParameters:
     max_turning: float = 0.5
     rotation_weight: float = 20.0
     slowdown_weight: float = 50.0
-    least_distance: float = 0.05
+    least_distance: float = 0.06
     seen_distance: float = 0.25
     approach_acceleration: float = 1.0
 

@@ -4,6 +4,12 @@ The step runs: sticking → modes and friction → motion → velocity. The adjo
 same solves; every inner iteration is symmetric, so they are solves of the same system. Beyond the
 paper it carries how friction follows the sticking force, the projection on the surface, how normals
 and gaps follow nodes and bodies, and how the system follows positions where it does.
+
+With `frozen_contact` surfaces stay where each node met them, and slipping nodes keep the direction
+of their friction. That is not the derivative of the step, and it is the one to descend by: through
+several steps in contact the exact one grows tenfold with each, for a node that is a millimetre
+nearer to a limb has its stiff neighbours moved by a millimetre, and what they carry by their lever.
+Motions of a centimetre know nothing of it (docs/control.md has the figures).
 """
 
 from __future__ import annotations
@@ -60,6 +66,7 @@ def run_adjoint(
     v_bar: FloatArray,
     held_reaction_bar: FloatArray,
     by_material: bool,
+    frozen_contact: bool = False,
 ) -> Gradient:
     """Returns the derivative by the inputs; see `ExplicitBiasCloth.vector_jacobian_product`."""
     h, held, mass = cloth.time_step, cloth.held, cloth.mass[:, None]
@@ -67,6 +74,7 @@ def run_adjoint(
     nodes, normal, mode = contacts.nodes, contacts.normal, friction.mode
     slip = mode == SLIP
     touching = len(nodes) > 0
+    follows = touching and not frozen_contact
 
     # layers kept apart after the solves
     motion_in = x_bar
@@ -104,7 +112,7 @@ def run_adjoint(
         pull, _ = system.hold(back_motion, mode, normal, zero, friction.push, backward=True)
         prescribed_in = -pull
         normal_in = np.zeros_like(prescribed_in)
-        if slip.any():
+        if slip.any() and follows:
             by_row, by_binding = system.by_directions(
                 t.motion_unknown, back_motion, t.prescribed, slip
             )
@@ -135,11 +143,11 @@ def run_adjoint(
     v_in -= (0.5 * h * h) * by_rate
 
     bodies = np.zeros((4, t.obstacles.count, 3))
-    if touching:
+    if follows:
         x_in[nodes] += _contact_derivative(cloth, t, prescribed_in, target_in, normal_in, bodies)
 
     solves = [(1.0, t.motion_unknown, back_motion), (1.0, t.change_unknown, back_change)]
-    if t.stick_unknown is not None and slip.any():
+    if t.stick_unknown is not None and slip.any() and follows:
         solves.append((-1.0, t.stick_unknown, back_stick))
     if cloth.inner.depends_on_position:
         for sign, forward, backward in solves:

@@ -339,6 +339,7 @@ class ExplicitBiasCloth:
         v_bar: FloatArray,
         held_reaction_bar: FloatArray,
         by_material: bool = False,
+        frozen_contact: bool = False,
     ) -> Gradient:
         """Returns the derivative of L with respect to the inputs of the taped step.
 
@@ -348,8 +349,16 @@ class ExplicitBiasCloth:
             v_bar: (n,3) ∂L/∂ of the step's velocities.
             held_reaction_bar: (k,3) ∂L/∂ of the reaction at the held nodes.
             by_material: also by the material's values, which takes two more solves.
+            frozen_contact: surfaces stay where nodes met them: not exact, and bounded over many
+                steps in contact, where the exact derivative is not (adjoint.py). Nothing is then
+                known of obstacles.
+
+        Raises:
+            ValueError: both `by_material` and `frozen_contact` are asked for.
         """
-        return run_adjoint(self, tape, x_bar, v_bar, held_reaction_bar, by_material)
+        if by_material and frozen_contact:
+            raise ValueError("frozen_contact has no derivative by_material")
+        return run_adjoint(self, tape, x_bar, v_bar, held_reaction_bar, by_material, frozen_contact)
 
     def _who_touches(
         self, system: StepSystem, unknown: Unknown, near: Contacts

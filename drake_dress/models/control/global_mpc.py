@@ -2,8 +2,9 @@
 
 A plan is a velocity of each gripper for each of N steps. The garment model rolls it out against
 the predicted person; sleeve states, stage costs and gripper forces of every step give the cost;
-the adjoint of the rollout gives its gradient. The descent is projected on the speed limit, each
-velocity is scaled by the time it has to act, and a step is accepted only if it lowers the cost.
+the adjoint of the rollout, contact frozen, gives its gradient. The descent is projected on the
+speed limit, each velocity is scaled by the time it has to act, and a step is accepted only if it
+lowers the cost.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.control.corridor import Corridor, corridor_cost
 from drake_dress.models.dressing.sleeve import (
     Entry,
     SleeveState,
@@ -43,8 +45,13 @@ class Weights:
         entering_spread: takes the place of `least_spread` while a sleeve is entered: an armhole is
             held open and turned toward the hand by the garment between the grippers, if it is
             stretched out; a slack one hangs, and is pushed away by the hand.
+        level: on what the left gripper is short of being `least_level` of the grippers' distance at
+            rest further left than the right one, as the person sees it, 1/m². A garment on edge
+            has its openings turned away from both hands, and no way back on its own.
         clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
         free_clearance: distance of a gripper to the person's skin that costs nothing, m.
+        corridor: on what hangs ahead of a hand that is to go in, 1/m²; see corridor.py.
+        corridor_radius, corridor_length: of the cylinder ahead of it, m.
     """
 
     position: float = 1.0
@@ -55,8 +62,13 @@ class Weights:
     separation: float = 10.0
     least_spread: float = 0.5
     entering_spread: float = 0.85
+    level: float = 20.0
+    least_level: float = 0.5
     clearance: float = 10.0
     free_clearance: float = 0.05
+    corridor: float = 3.0
+    corridor_radius: float = 0.06
+    corridor_length: float = 0.12
 
 
 @dataclass(frozen=True)
@@ -68,6 +80,7 @@ class SleeveTarget:
         position_weight, direction_weight: factors on W and Q; 0 leaves the sleeve alone.
         entering: the direction asked for is that from the armhole to the garment's entry, not the
             armhole's own.
+        corridor: ahead of the hand that is to go in, if it is near.
     """
 
     position: FloatArray
@@ -75,6 +88,7 @@ class SleeveTarget:
     position_weight: float = 1.0
     direction_weight: float = 1.0
     entering: bool = False
+    corridor: Corridor | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +140,8 @@ class GlobalController:
         max_iterations: gradient steps per solve.
         span: distance of the grippers at rest, m.
         entry: where arms come into the garment.
+        frozen_contact: the gradient takes contact as frozen; the exact one does not descend once
+            cloth lies on a limb (see cloth/adjoint.py).
     """
 
     def __init__(
@@ -140,12 +156,14 @@ class GlobalController:
         max_iterations: int,
         span: float,
         entry: Entry,
+        frozen_contact: bool = True,
     ) -> None:
         self.cloth = cloth
         self.horizon = horizon
         self.weights = weights
         self.max_speed = max_speed
         self.max_iterations = max_iterations
+        self.frozen_contact = frozen_contact
         self._span = span
         self._entry = entry
         self._armholes = armholes
@@ -161,6 +179,7 @@ class GlobalController:
         obstacles: Sequence[Obstacles],
         guess: FloatArray,
         committed_steps: int = 0,
+        leftward: FloatArray | None = None,
     ) -> Plan:
         """Returns the plan that gradient descent reaches from `guess`.
 
@@ -171,17 +190,18 @@ class GlobalController:
             obstacles: the predicted person at the start of each of the N steps.
             guess: (N,2,3) velocities to start from, m/s.
             committed_steps: the first steps of `guess` that are on their way already and stay.
+            leftward: (N,3) horizontal unit vectors to the person's left; None: nothing is level.
         """
         h, n = self.cloth.time_step, self.horizon
         velocity = _limited(guess, self.max_speed)
-        now = self._rollout(x, v, velocity, targets, obstacles)
+        now = self._rollout(x, v, velocity, targets, obstacles, leftward)
         initial, evaluations, iterations, reason = now.cost, 1, 0, "iterations"
         # A velocity at step j moves every later state: curvature of the position cost.
         remaining = np.arange(n, 0, -1.0)
         scale = 1.0 / (2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed))
         length = 1.0
         while iterations < self.max_iterations:
-            gradient = self._gradient(now, velocity, targets, obstacles)
+            gradient = self._gradient(now, velocity, targets, obstacles, leftward)
             gradient[:committed_steps] = 0.0
             descent = scale[:, None, None] * gradient
             accepted = False
@@ -190,7 +210,7 @@ class GlobalController:
                 moved = trial_velocity - velocity
                 if np.abs(moved).max() < 1e-3 * self.max_speed:
                     break
-                trial = self._rollout(x, v, trial_velocity, targets, obstacles)
+                trial = self._rollout(x, v, trial_velocity, targets, obstacles, leftward)
                 evaluations += 1
                 if trial.cost < now.cost + 1e-4 * float(np.sum(gradient * moved)):
                     accepted = True
@@ -219,6 +239,7 @@ class GlobalController:
         velocity: FloatArray,
         targets: tuple[SleeveTarget, SleeveTarget],
         obstacles: Sequence[Obstacles],
+        leftward: FloatArray | None = None,
     ) -> _Rollout:
         h, n, w = self.cloth.time_step, self.horizon, self.weights
         cost = float(w.speed * h * h * np.sum(velocity**2))
@@ -244,11 +265,14 @@ class GlobalController:
                 )
                 d = entry_direction(x, sleeve.p_c, self._entry) if t.entering else sleeve.v_c
                 cost += w.direction * t.direction_weight * float(np.sum((d - t.direction[j]) ** 2))
+                if t.corridor is not None:
+                    cost += w.corridor * self._corridor(x, t.corridor, j)[0]
                 force[j, i] = np.linalg.norm(held[self._split[i]].sum(axis=0))
                 cost += w.safety * max(0.0, force[j, i] - w.free_force) ** 2
             sleeves.append((pair[0], pair[1]))
             apart = self._apart(x)
             cost += w.separation * self._spread_error(float(np.linalg.norm(apart)), targets) ** 2
+            cost += w.level * self._level_error(apart, leftward, j) ** 2
             cost += self._clearance(x, obstacles[j])[0]
         return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
 
@@ -264,6 +288,16 @@ class GlobalController:
         entering = any(t.entering and t.position_weight > 0.0 for t in targets)
         short = distance - (w.entering_spread if entering else w.least_spread) * self._span
         return max(0.0, distance - self._span) + min(0.0, short)
+
+    def _level_error(self, apart: FloatArray, leftward: FloatArray | None, j: int) -> float:
+        """Returns how far, m, the left gripper is short of being left of the right one."""
+        if leftward is None:
+            return 0.0
+        return max(0.0, self.weights.least_level * self._span - float(apart @ leftward[j]))
+
+    def _corridor(self, x: FloatArray, way: Corridor, j: int) -> tuple[float, FloatArray]:
+        w = self.weights
+        return corridor_cost(x, way.hand[j], way.into[j], w.corridor_radius, w.corridor_length)
 
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
         """Returns the cost of grippers close to the person, and its derivative by held nodes."""
@@ -281,6 +315,7 @@ class GlobalController:
         velocity: FloatArray,
         targets: tuple[SleeveTarget, SleeveTarget],
         obstacles: Sequence[Obstacles],
+        leftward: FloatArray | None = None,
     ) -> FloatArray:
         h, n, w = self.cloth.time_step, self.horizon, self.weights
         gradient = 2.0 * w.speed * h * h * velocity
@@ -303,6 +338,8 @@ class GlobalController:
                     d_bar = np.zeros(3)
                 else:
                     d_bar = scale * (sleeve.v_c - t.direction[j])
+                if t.corridor is not None:
+                    x_bar += w.corridor * self._corridor(rollout.states[j], t.corridor, j)[1]
                 loop = self._armholes[i]
                 np.add.at(
                     x_bar,
@@ -318,13 +355,18 @@ class GlobalController:
             apart = self._apart(rollout.states[j])
             distance = float(np.linalg.norm(apart))
             error = self._spread_error(distance, targets)
-            if error != 0.0:
+            tilt = self._level_error(apart, leftward, j)
+            if error != 0.0 or tilt != 0.0:
                 pull = 2.0 * w.separation * error * apart / distance
+                if leftward is not None:
+                    pull -= 2.0 * w.level * tilt * leftward[j]
                 for i, sign in ((0, 1.0), (1, -1.0)):
                     nodes = self.cloth.held[self._split[i]]
                     x_bar[nodes] += sign * pull / len(nodes)
             x_bar[self.cloth.held] += self._clearance(rollout.states[j], obstacles[j])[1]
-            back = self.cloth.vector_jacobian_product(rollout.tapes[j], x_bar, v_bar, held_bar)
+            back = self.cloth.vector_jacobian_product(
+                rollout.tapes[j], x_bar, v_bar, held_bar, frozen_contact=self.frozen_contact
+            )
             x_bar, v_bar = back.x, back.v
             for i in (0, 1):
                 gradient[j, i] += h * back.held_motion[self._split[i]].sum(axis=0)

@@ -27,12 +27,13 @@ from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import Task
 from drake_dress.models.garment.geodesics import Reach, reach
+from drake_dress.models.immutable import Immutable
 
 Solver = Callable[[LocalProblem, LocalSolution | None], LocalSolution]
 
 
 @dataclass(frozen=True)
-class GlobalPlan:
+class GlobalPlan(Immutable):
     """A global plan in time.
 
     Attributes:
@@ -53,7 +54,7 @@ class GlobalPlan:
 
 
 @dataclass(frozen=True)
-class LocalPlan:
+class LocalPlan(Immutable):
     """Gripper velocities for the next steps, and how to correct them meanwhile.
 
     Attributes:
@@ -93,7 +94,7 @@ class LocalPlan:
 
 
 @dataclass(frozen=True)
-class LocalState:
+class LocalState(Immutable):
     """What is carried from one solve to the next: the solution, and whether sleeves are coupled."""
 
     solution: LocalSolution | None = None

@@ -15,6 +15,8 @@ from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPla
 from drake_dress.models.dressing.sleeve import find_entry
 from drake_dress.models.dressing.stages import StageState
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.heading import heading
+from drake_dress.models.immutable import Immutable
 from drake_dress.models.sides import SIDES
 
 
@@ -45,7 +47,7 @@ class PolicyParameters:
 
 
 @dataclass(frozen=True)
-class PolicyState:
+class PolicyState(Immutable):
     """What is carried from one decision to the next."""
 
     stages: StageState
@@ -142,7 +144,8 @@ class DressingPolicy:
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
-        plan = self.controller.solve(x, v, targets, obstacles, guess, p.committed_steps)
+        leftward = np.stack([heading(q).leftward for q in joints[1:]])
+        plan = self.controller.solve(x, v, targets, obstacles, guess, p.committed_steps, leftward)
         return replace(state, stages=stages, velocity=plan.velocity), Decision(
             plan, assignment, target
         )

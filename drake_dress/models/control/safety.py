@@ -38,6 +38,7 @@ filter hides it, and n·v falls to 0 by max_braking dt a step.
     request that is no number, or 10 × max_speed    both come to rest by max_acceleration
     request older than stale_time, made later than
       now, or before one that was obeyed            the same
+    no permission of the station                    the same
 
 A latched stop ends by itself once the force on both grippers is under the soft limit; until then
 the gripper that is pulled gives way, so that it ends and nobody is left held fast. It needs no
@@ -82,6 +83,7 @@ class Verdict(IntFlag):
     UNMEASURED = 256  # force or position of a gripper is no number
     STOPPED = 512  # force was over the hard limit too long
     BRAKING = 1024  # more than max_acceleration was needed
+    HELD = 2048  # the station does not permit motion: something it needs is not there
 
 
 @dataclass(frozen=True)
@@ -232,6 +234,7 @@ def step(
     limits: SafetyLimits,
     now: float,
     dt: float,
+    permitted: bool = True,
 ) -> tuple[GovernorState, tuple[Verdict, Verdict]]:
     """Returns the state after `dt`, whose position is the command, and what was cut.
 
@@ -242,6 +245,7 @@ def step(
         limits: which are kept.
         now: s; must not go back.
         dt: since the step before, s.
+        permitted: whether the station lets grippers move; they yield to force in any case.
     """
     entries = np.hstack([measured.position, measured.force])
     seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(entries).all(axis=1))
@@ -255,6 +259,8 @@ def step(
         stopped = False
 
     fault = _request_fault(state, request, limits, now)
+    if not permitted:
+        fault |= Verdict.HELD
     both = fault | (Verdict.STOPPED if stopped else Verdict.NONE)
     velocity = np.empty((2, 3))
     verdicts = []

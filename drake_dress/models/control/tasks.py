@@ -8,12 +8,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.control.corridor import Corridor
 from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
-from drake_dress.models.dressing.sight import free_sight, move_into_sight
+from drake_dress.models.dressing.sight import (
+    distance_to_opening,
+    free_sight,
+    move_into_sight,
+)
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.dressing.stages import (
+    Place,
     SleeveFacts,
     StageParameters,
     StageState,
@@ -63,7 +69,6 @@ class TaskParameters:
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         widening: growth of the cap of l_h with each attempt that missed the hand.
-        least_sight: share of an opening that the hand has to see for it to be drawn over.
         outlook_distance: from the hand, within which a tethered sleeve goes where it is seen, m.
         outlook_reach: share of the distance between both armholes at rest at which it stays then.
         clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
@@ -75,11 +80,17 @@ class TaskParameters:
         aside_free: distance beside that does not count, m.
         overshoot: how far past the hand an armhole in line is asked to go, m.
         inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
+        touch_distance: a hand this close to the surface that spans an armhole is about to go in:
+            the armhole is drawn along the forearm, whatever bars the hand's sight of it, m.
+        near_distance: from the hand, from which on an armhole's place counts more than its
+            direction, m.
+        near_position, near_direction: factors on W and Q then.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
-            armpit, and both sleeves would pull against each other.
+            armpit, and both sleeves would pull against each other. A sleeve whose other one is not
+            there yet stays where it just counts as done, and leaves the garment to it.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
     """
@@ -104,7 +115,6 @@ class TaskParameters:
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     widening: float = 0.1
-    least_sight: float = 0.5
     outlook_distance: float = 0.35
     outlook_reach: float = 1.04
     clear_sight: float = 0.9
@@ -114,6 +124,10 @@ class TaskParameters:
     aside_free: float = 0.02
     overshoot: float = 0.12
     inside_radius: float = 0.08
+    touch_distance: float = 0.03
+    near_distance: float = 0.2
+    near_position: float = 3.0
+    near_direction: float = 0.3
     dressing_direction: float = 0.1
     waiting_reach: float = 0.9
     final_progress: float = 1.99
@@ -306,16 +320,20 @@ class TaskPlanner:
         s, _, _ = axis.coordinates(sleeve.p_c)
         offset = hand - sleeve.p_c
         aside = _aside(offset, way.direction(axis, to, side))
-        sight = free_sight(x, self.mesh.faces, self.armholes[side], hand)
+        loop = self.armholes[side]
+        sight = free_sight(x, self.mesh.faces, loop, hand)
+        touches = not linked and distance_to_opening(x[loop], hand) < self.parameters.touch_distance
         return SleeveFacts(
             linked=linked,
-            in_sight=sight >= self.parameters.least_sight,
-            clear=_ramp(sight, self.parameters.least_sight, self.parameters.clear_sight),
+            sight=1.0 if touches else sight,
             s=float(s) if linked else 0.0,
             hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
             opening=float(axis.D(0.0) @ _inward(to, side)),
+            touches=touches,
+            hand=_place(hand),
+            away=_place(offset / max(float(np.linalg.norm(offset)), 1e-12)),
         )
 
     def _prepared(
@@ -348,27 +366,29 @@ class TaskPlanner:
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
         beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
-        facing = _ramp(beside, 1.5 * p.inside_radius, p.inside_radius) if fact.in_sight else 0.0
+        barred = _ramp(fact.sight, p.stages.least_sight, p.stages.lost_sight)
+        facing = (1.0 - barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
         if tethered:
-            facing = max(facing, fact.clear)
+            facing = max(facing, _ramp(fact.sight, p.stages.least_sight, p.clear_sight))
         inside = facing * _ramp(depth, -0.02, 0.02)
         aside = (1.0 - facing) * _aside(offset, direction)
         cap = p.tethered_approach_distance if tethered else p.approach_distance
         cap *= 1.0 + p.widening * min(attempts, 3)
         distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
-        if not fact.in_sight:
-            distance = cap
+        distance = max(distance, barred * cap)
         if retreat:
             return hand - cap * direction - p.retreat_distance * to.front
+        # not over the hand before it is in line: what is beside goes first
+        ahead = _ramp(beside, p.funnel_wide, p.funnel_narrow) if depth < 0.0 else 1.0
         if outlook is not None:
-            # not over the hand before it is in line: what is beside goes first
-            ahead = _ramp(beside, p.funnel_wide, p.funnel_narrow) if depth < 0.0 else 1.0
             onward = (1.0 - inside) * sleeve.v_c + inside * axis.D(0.0)
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
             there: FloatArray = hand + (1.0 - facing) * outlook + facing * onward
             return there
-        onward = (1.0 - facing) * direction + (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
-        goal = hand - distance * direction + p.overshoot * onward
+        onward = (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
+        onward = p.overshoot * ((1.0 - facing) * direction + ahead * onward)
+        onward = onward - (1.0 - ahead) * facing * p.funnel_distance * sleeve.v_c
+        goal = hand - distance * direction + (1.0 - barred) * onward
         behind = p.tethered_behind_distance if tethered else p.behind_distance
         if distance == cap:
             error = sleeve.p_c - (hand - cap * direction)
@@ -395,9 +415,12 @@ class TaskPlanner:
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
             if entering:
-                position[j] = self._prepared(
-                    given, side, axis, to, sleeves[side], given.retreat[side]
-                )
+                if facts[side].touches and not given.retreat[side]:
+                    position[j] = axis.G((j + 1) * time_step * p.progress_rate)
+                else:
+                    position[j] = self._prepared(
+                        given, side, axis, to, sleeves[side], given.retreat[side]
+                    )
                 direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
                 continue
             if task == Task.DRESS:
@@ -405,6 +428,8 @@ class TaskPlanner:
                 other_fact = facts[1 - side]
                 if other_fact.linked:
                     s = min(s, max(facts[side].s, other_fact.s + p.largest_lead))
+                    if other_fact.s < p.stages.kept_progress:
+                        s = min(s, p.stages.done_progress)
             else:
                 k = 1 - side
                 other = self._prepared(given, k, axes[j + 1][k], to, sleeves[k])
@@ -413,8 +438,17 @@ class TaskPlanner:
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
-        if entering:
+        if entering and (given.retreat[side] or facts[side].hand_distance > p.near_distance):
             return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
+        if entering:
+            return SleeveTarget(
+                position,
+                direction,
+                p.near_position,
+                p.near_direction * way.emphasis,
+                entering=True,
+                corridor=_ahead([a[side] for a in axes[1:]]),
+            )
         return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
@@ -431,6 +465,16 @@ class TaskPlanner:
             ):
                 return float(s)
         return least
+
+
+def _ahead(axes: Sequence[ArmAxis]) -> Corridor:
+    """Returns the way ahead of a hand whose arm is predicted."""
+    return Corridor(np.stack([a.G(0.0) for a in axes]), -np.stack([a.D(0.0) for a in axes]))
+
+
+def _place(point: FloatArray) -> Place:
+    x, y, z = (float(value) for value in point)
+    return x, y, z
 
 
 def _inward(to: Heading, side: int) -> FloatArray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 import numpy.typing as npt
+from trimesh.triangles import closest_point
 
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 
@@ -54,6 +55,21 @@ def free_sight(
         barred,
     )
     return 1.0 - float(barred.mean())
+
+
+def distance_to_opening(rim: FloatArray, point: FloatArray) -> float:
+    """Returns how far a point is from the fan that spans an opening, m.
+
+    A hand that a panel keeps out of an opening stays as far from it as the hand is thick.
+
+    Args:
+        rim: (k,3) nodes around the opening, in order, m.
+        point: (3,) m.
+    """
+    center = np.broadcast_to(rim.mean(axis=0), rim.shape)
+    fan = np.stack([center, rim, np.roll(rim, -1, axis=0)], axis=1)
+    nearest = closest_point(fan, np.broadcast_to(point, rim.shape))
+    return float(np.linalg.norm(nearest - point, axis=1).min())
 
 
 def move_into_sight(

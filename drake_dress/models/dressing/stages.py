@@ -36,6 +36,9 @@ class Task(IntEnum):
     WAIT = 3  # J_w
 
 
+Place = tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class SleeveFacts:
     """What the stages depend on, for one sleeve.
@@ -47,10 +50,11 @@ class SleeveFacts:
         prepared_error: distance of the armhole centre to where preparing ends, m.
         passed: how far the armhole centre has gone past the hand toward the shoulder beside
             the arm, along the arm, m; 0 or less before the hand.
-        in_sight: nothing of the garment hangs between hand and armhole.
-        clear: 0 to 1, how much more than that the hand sees of the opening.
+        sight: share of the opening that the hand sees, nothing of the garment in between.
         opening: inward part of the forearm's direction from hand to elbow, -1 to 1: how far the arm
             opens sideways.
+        touches: the hand is at the opening already, about to go in.
+        hand: its place, m; away: unit vector from the armhole's centre to it.
     """
 
     linked: bool
@@ -58,9 +62,11 @@ class SleeveFacts:
     hand_distance: float
     prepared_error: float
     passed: float
-    in_sight: bool = True
-    clear: float = 0.0
+    sight: float = 1.0
     opening: float = 0.0
+    touches: bool = False
+    hand: Place = (0.0, 0.0, 0.0)
+    away: Place = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,9 @@ class StageParameters:
 
     Attributes:
         prepared_distance: a sleeve this close to its prepared position may be dressed, m (φ_p).
+        least_sight: share of the opening that a hand has to see for it to be drawn over it.
+        lost_sight: share below which the garment bars the hand: sight goes to and fro while cloth
+            moves, and an armhole that turned back each time would never get there.
         missed_distance: an armhole that has gone this far past the hand without the arm in it
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
@@ -76,9 +85,13 @@ class StageParameters:
         kept_progress: s down to which it stays done, and from which one that does not come any
             further is done.
         reach: distance two armholes can be apart, m (φ_c).
+        meeting_distance: an armhole this close to a hand meets it, m.
+        pushed_distance: a hand that has gone this far before an armhole that meets it is pushed by
+            the garment, not entered: the armhole is taken back before the arm, which follows, is
+            where no hand can go in, m.
         insertion_timeout: time after which a dressing without insertion is taken back, s.
-        barred_distance: an armhole this close to a hand that does not see it is barred, m.
-        barred_timeout: time after which a barred sleeve is taken back, s.
+        barred_distance: an armhole this close to a hand that it is barred from is taken back, m.
+        barred_timeout: not before a sleeve was prepared for this long, s.
         stall_timeout: time without progress after which a sleeve gives way, s.
         stall_progress: advance of s that counts as progress.
         easing_time: for which it gives way, s.
@@ -87,11 +100,15 @@ class StageParameters:
     """
 
     prepared_distance: float = 0.03
+    least_sight: float = 0.5
+    lost_sight: float = 0.25
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
     done_progress: float = 1.925
     kept_progress: float = 1.91
     reach: float = 0.45
+    meeting_distance: float = 0.2
+    pushed_distance: float = 0.06
     insertion_timeout: float = 8.0
     barred_distance: float = 0.4
     barred_timeout: float = 5.0
@@ -111,6 +128,8 @@ class StageState:
         first: sleeve that goes first, -1 before it is known.
         attempts: how often each sleeve missed the hand.
         best: greatest s since the last stall; best_time: when it was reached, s.
+        met: where the hand was when the armhole met it, m, or nearer to it since; None while it
+            does not meet it.
     """
 
     stage: tuple[Stage, Stage] = (Stage.PREPARE, Stage.PREPARE)
@@ -119,6 +138,7 @@ class StageState:
     attempts: tuple[int, int] = (0, 0)
     best: tuple[float, float] = (0.0, 0.0)
     best_time: tuple[float, float] = (0.0, 0.0)
+    met: tuple[Place | None, Place | None] = (None, None)
 
 
 def advance_stages(
@@ -138,6 +158,7 @@ def advance_stages(
         time: now, s.
     """
     for side in (0, 1):
+        state = _meet(state, side, facts[side], parameters)
         state = _advance(state, side, facts[side], parameters, time)
         state = _remember(state, side, facts, parameters, time)
     on_arm = [facts[i].linked and state.stage[i] != Stage.PREPARE for i in (0, 1)]
@@ -185,14 +206,16 @@ def _advance(
         settled = stage == Stage.DONE or time - state.best_time[side] > p.stall_timeout
         enough = p.kept_progress if settled else p.done_progress
         new = Stage.DONE if fact.s >= enough else Stage.DRESS
+    elif _pushed(state, side, fact) > p.pushed_distance:
+        return _again(state, side, time)
     elif stage == Stage.PREPARE:
-        if fact.prepared_error < p.prepared_distance and fact.in_sight:
+        if fact.prepared_error < p.prepared_distance and fact.sight >= p.least_sight:
             new = Stage.DRESS
         elif _stuck(fact, p, time - state.since[side]):
             return _again(state, side, time)
     elif (
         fact.passed > p.missed_distance
-        or not fact.in_sight
+        or fact.sight < p.lost_sight
         or time - state.since[side] > p.insertion_timeout
         or stage == Stage.DONE
     ):
@@ -203,6 +226,24 @@ def _advance(
     stages[side], since[side] = new, time
     state = replace(state, stage=(stages[0], stages[1]), since=(since[0], since[1]))
     return _again(state, side, time) if new == Stage.PREPARE else state
+
+
+def _meet(state: StageState, side: int, fact: SleeveFacts, p: StageParameters) -> StageState:
+    """Returns the state with where a hand was met; one that comes nearer by itself is met there."""
+    met = list(state.met)
+    if fact.linked or fact.hand_distance > p.meeting_distance:
+        met[side] = None
+    elif met[side] is None or _pushed(state, side, fact) < 0.0:
+        met[side] = fact.hand
+    return replace(state, met=(met[0], met[1]))
+
+
+def _pushed(state: StageState, side: int, fact: SleeveFacts) -> float:
+    """Returns how far, m, a hand has gone before the armhole that meets it."""
+    met = state.met[side]
+    if met is None:
+        return 0.0
+    return sum((h - m) * a for h, m, a in zip(fact.hand, met, fact.away, strict=True))
 
 
 def _remember(
@@ -234,7 +275,7 @@ def eases(state: StageState, side: int, parameters: StageParameters, time: float
 
 def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
     """Returns whether a sleeve has been prepared for too long, near the hand or barred from it."""
-    barred = not fact.in_sight and fact.hand_distance < p.barred_distance
+    barred = fact.sight < p.lost_sight and fact.hand_distance < p.barred_distance
     return (barred and duration > p.barred_timeout) or (
         fact.hand_distance < p.reach and duration > 2.0 * p.insertion_timeout
     )
@@ -242,10 +283,17 @@ def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
 
 def _again(state: StageState, side: int, time: float) -> StageState:
     """Returns the state in which a sleeve that missed the hand begins anew."""
-    since, attempts = list(state.since), list(state.attempts)
-    since[side] = time
+    stage, since, attempts = list(state.stage), list(state.since), list(state.attempts)
+    met = list(state.met)
+    stage[side], since[side], met[side] = Stage.PREPARE, time, None
     attempts[side] += 1
-    return replace(state, since=(since[0], since[1]), attempts=(attempts[0], attempts[1]))
+    return replace(
+        state,
+        stage=(stage[0], stage[1]),
+        since=(since[0], since[1]),
+        attempts=(attempts[0], attempts[1]),
+        met=(met[0], met[1]),
+    )
 
 
 def retreats(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:

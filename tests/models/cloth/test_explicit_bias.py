@@ -113,6 +113,31 @@ def test_derivative_of_a_contact_step_matches_finite_differences(
         assert np.linalg.norm(a - b) < 1e-3 * np.linalg.norm(a), name
 
 
+def test_frozen_contact_is_exact_without_contact_and_bounded_with_it() -> None:
+    rng = np.random.default_rng(3)
+    cloth, x, v, motion, limb = _in_contact(0.1)
+    weight_x, weight_v = rng.normal(size=x.shape), 0.1 * rng.normal(size=x.shape)
+    weight_r = 1e-3 * rng.normal(size=motion.shape)
+    for bodies, equal in ((Obstacles.none(), True), (limb, False)):
+        tape = cloth.step(x, v, motion, bodies)[3]
+        exact, frozen = (
+            cloth.vector_jacobian_product(tape, weight_x, weight_v, weight_r, frozen_contact=f)
+            for f in (False, True)
+        )
+        assert np.allclose(exact.x, frozen.x) == equal
+        assert np.allclose(exact.v, frozen.v) == equal
+        assert np.linalg.norm(frozen.x) < 3.0 * np.linalg.norm(weight_x)
+        # what slipping nodes take from friction alone is left out
+        assert np.linalg.norm(frozen.held_motion - exact.held_motion) < 0.3 * np.linalg.norm(
+            exact.held_motion
+        )
+        assert not frozen.origin.any()
+    with pytest.raises(ValueError, match="frozen_contact"):
+        cloth.vector_jacobian_product(
+            tape, weight_x, weight_v, weight_r, by_material=True, frozen_contact=True
+        )
+
+
 SETTLING = 130
 
 

@@ -1,5 +1,8 @@
 """The plan's gradient and descent, on a small coat."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,12 +10,17 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.corridor import Corridor
 from drake_dress.models.control.global_mpc import GlobalController, SleeveTarget, Weights
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
 HORIZON = 3
+# The armhole of an overcoat at a hand, about a hundred nodes on the arm: 44 s into a dressing;
+# python -m benchmarks.plan_gradient run.h5 --at 44 --save tests/models/control/data/entering.npz
+ENTERING = Path(__file__).parent / "data" / "entering.npz"
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +53,17 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
                 np.tile(state.p_c + np.array([0.05, 0.02, 0.03]), (HORIZON, 1)),
                 np.tile([0.6, 0.0, 0.8], (HORIZON, 1)),
                 entering=i == 1,
+                corridor=_ahead(x[loops[i][0]]) if i == 1 else None,
             )
         )
     return controller, x, (targets[0], targets[1])
+
+
+def _ahead(point: FloatArray) -> Corridor:
+    """Returns a way on which `point` hangs."""
+    return Corridor(
+        np.tile(point - [0.01, 0.02, 0.05], (HORIZON, 1)), np.tile([0.0, 0.6, 0.8], (HORIZON, 1))
+    )
 
 
 def _beside(point: FloatArray) -> Obstacles:
@@ -66,7 +82,7 @@ def test_gradient_of_the_plan_matches_finite_differences(
     span: float,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Grippers beyond their span, and closer than a garment that is entered wants them."""
+    """Grippers beyond their span, closer than a garment that is entered wants them, on edge."""
     controller, x, targets = setting
     monkeypatch.setattr(controller, "_span", span)
     rng = np.random.default_rng(0)
@@ -74,15 +90,19 @@ def test_gradient_of_the_plan_matches_finite_differences(
     grip = x[controller.cloth.held[controller._split[0]]].mean(axis=0)
     person = [_beside(grip) if beside else Obstacles.none()] * HORIZON
     rest = np.zeros_like(x)
-    rollout = controller._rollout(x, rest, velocity, targets, person)
+    left = np.tile([0.6, 0.8, 0.0], (HORIZON, 1))
+    rollout = controller._rollout(x, rest, velocity, targets, person, left)
+    assert (controller._level_error(controller._apart(x), left, 0) > 0.0) == (span == 1.0)
+    assert targets[1].corridor is not None
+    assert controller._corridor(x, targets[1].corridor, 0)[0] > 0.0
     if beside:
         assert controller._clearance(x, person[0])[0] > 0.0
-    gradient = controller._gradient(rollout, velocity, targets, person)
+    gradient = controller._gradient(rollout, velocity, targets, person, left)
     for _ in range(5):
         d = rng.normal(size=velocity.shape)
         step = 1e-6
-        high = controller._rollout(x, rest, velocity + step * d, targets, person).cost
-        low = controller._rollout(x, rest, velocity - step * d, targets, person).cost
+        high = controller._rollout(x, rest, velocity + step * d, targets, person, left).cost
+        low = controller._rollout(x, rest, velocity - step * d, targets, person, left).cost
         assert np.sum(gradient * d) == pytest.approx((high - low) / (2 * step), rel=1e-4)
 
 
@@ -96,3 +116,99 @@ def test_plan_lowers_its_cost_and_keeps_the_speed_limit(
     assert plan.cost < 0.9 * plan.initial_cost
     assert np.linalg.norm(plan.velocity, axis=2).max() <= 0.15 + 1e-12
     assert plan.reason in ("small_step", "no_descent", "iterations")
+
+
+def test_plan_turns_a_garment_back_that_is_on_edge(
+    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
+) -> None:
+    """The left gripper goes to the person's left of the right one, whatever sleeves are asked."""
+    controller, x, targets = setting
+    across = controller._apart(x) / np.linalg.norm(controller._apart(x))
+    left = np.tile(np.cross(across, [0.0, 0.0, 1.0]), (HORIZON, 1))
+    idle = tuple(replace(t, position_weight=0.0, direction_weight=0.0) for t in targets)
+    start = np.zeros((HORIZON, 2, 3))
+    person = [Obstacles.none()] * HORIZON
+    plan = controller.solve(x, np.zeros_like(x), (idle[0], idle[1]), person, start, 0, left)
+    moved = controller.cloth.time_step * (plan.velocity[:, 0] - plan.velocity[:, 1]).sum(axis=0)
+    assert left[0] @ moved > 0.03
+
+
+@pytest.fixture(scope="module")
+def entering() -> tuple[GlobalController, dict[str, FloatArray], list[SleeveTarget]]:
+    with np.load(ENTERING) as file:
+        kept = {name: np.asarray(file[name]) for name in file.files}
+    mesh = GarmentMesh(
+        kept["rest_position"].astype(np.float64),
+        kept["faces"].astype(np.int32),
+        {name[5:]: nodes for name, nodes in kept.items() if name.startswith("loop_")},
+        {name[6:]: nodes for name, nodes in kept.items() if name.startswith("grasp_")},
+        kept["region"],
+    )
+    cloth = ExplicitBiasCloth(
+        make_elements(mesh.rest_position, mesh.faces),
+        Material(),
+        0.2,
+        np.concatenate([mesh.grasp[s] for s in SIDES]),
+        tolerance=1e-2,
+        iterations=8,
+    )
+    controller = GlobalController(
+        cloth,
+        (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
+        (mesh.loops["left_armhole"], mesh.loops["right_armhole"]),
+        (loop_orientation(mesh, "left"), loop_orientation(mesh, "right")),
+        len(kept["start"]),
+        Weights(),
+        0.12,
+        3,
+        0.44,
+        find_entry(mesh),
+    )
+    targets = []
+    for side in SIDES:
+        place, (position, direction, enters) = kept[f"target_{side}"], kept[f"weights_{side}"]
+        targets.append(SleeveTarget(place[:, :3], place[:, 3:], position, direction, bool(enters)))
+    for name in ("x", "v"):
+        kept[name] = kept[name].astype(np.float64)
+    return controller, kept, targets
+
+
+def test_gradient_with_frozen_contact_tells_what_motions_of_a_centimetre_do(
+    entering: tuple[GlobalController, dict[str, FloatArray], list[SleeveTarget]],
+) -> None:
+    """The exact one does not, from the third last step back: the reason for the other."""
+    controller, seen, (left, right) = entering
+    person = [Obstacles.resting(seen["a"], seen["b"], seen["radius"])] * len(seen["start"])
+    at = (seen["x"], seen["v"])
+
+    def cost(velocity: FloatArray) -> float:
+        return controller._rollout(*at, velocity, (left, right), person).cost
+
+    start = seen["start"]
+    slope = np.zeros_like(start)
+    for index in np.ndindex(start[1:].shape):
+        step = np.zeros_like(start)
+        step[1:][index] = 0.01
+        slope[1:][index] = (cost(start + step) - cost(start - step)) / 0.02
+    rollout = controller._rollout(*at, start, (left, right), person)
+    assert max(len(tape.contacts.nodes) for tape in rollout.tapes) > 50
+    cosine, ratio = {}, {}
+    for frozen in (True, False):
+        controller.frozen_contact = frozen
+        gradient = controller._gradient(rollout, start, (left, right), person)[1:]
+        size, wanted = (np.linalg.norm(g, axis=(1, 2)) for g in (gradient, slope[1:]))
+        cosine[frozen] = np.sum(gradient * slope[1:], axis=(1, 2)) / (size * wanted)
+        ratio[frozen] = size / wanted
+    controller.frozen_contact = True
+    assert cosine[True].min() > 0.8 and ratio[True].max() < 2.0
+    assert cosine[False][0] < 0.5 and ratio[False][0] > 3.0
+
+
+def test_plan_among_contacts_lowers_its_cost(
+    entering: tuple[GlobalController, dict[str, FloatArray], list[SleeveTarget]],
+) -> None:
+    controller, seen, (left, right) = entering
+    person = [Obstacles.resting(seen["a"], seen["b"], seen["radius"])] * len(seen["start"])
+    plan = controller.solve(seen["x"], seen["v"], (left, right), person, seen["start"], 1)
+    assert plan.cost < 0.8 * plan.initial_cost
+    np.testing.assert_allclose(plan.velocity[0], seen["start"][0], atol=1e-12)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts, StageState, Task
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
+from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
 
 M = BodyMeasures()
@@ -129,11 +132,11 @@ def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
     outlook = (away, None) if side == 0 else (None, away)
     rows = np.stack([joints()] * (HORIZON + 1))
 
-    def asked(clear: float, retreats: bool, beside: float = 0.2) -> np.ndarray:
+    def asked(sight: float, retreats: bool, beside: float = 0.2) -> np.ndarray:
         # the hand is beside the opening's axis, on the side from which it is entered
         sleeve = SleeveState(hand - 0.1 * normal + [0.0, beside, 0.0], normal)
         sleeves = [sleeve, SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))]
-        off = SleeveFacts(False, 0.0, 0.2, 0.2, 0.0, in_sight=clear > 0.0, clear=clear)
+        off = SleeveFacts(False, 0.0, 0.2, 0.2, 0.0, sight=sight)
         order = (off, on) if side == 0 else (on, off)
         given = Assignment(
             (Task.PREPARE, Task.PREPARE), order, (retreats, retreats), outlook=outlook
@@ -146,9 +149,95 @@ def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
     p = planner.parameters
     before, beyond = -p.funnel_distance * normal, p.overshoot * normal
     np.testing.assert_allclose(asked(1.0, False), hand + before)
-    np.testing.assert_allclose(asked(0.5, False), hand + 0.5 * (away + before))
+    half = 0.5 * (p.stages.least_sight + p.clear_sight)
+    np.testing.assert_allclose(asked(half, False), hand + 0.5 * (away + before))
     np.testing.assert_allclose(asked(1.0, False, p.funnel_narrow), hand + beyond)
     between = 0.5 * (p.funnel_narrow + p.funnel_wide)
     np.testing.assert_allclose(asked(1.0, False, between), hand + 0.5 * (before + beyond))
     # one that has just missed the hand keeps away first, seen or not
     assert np.linalg.norm(asked(1.0, True) - hand) > planner.parameters.retreat_distance
+
+
+def test_the_first_sleeve_comes_in_line_before_it_is_drawn_over_the_hand(
+    planner: TaskPlanner,
+) -> None:
+    q, to = np.stack([joints()] * (HORIZON + 1)), heading(joints())
+    axis, p = arm_axes(joints())[0], planner.parameters
+    normal = p.approaches[0].direction(axis, to, 0)
+    across = np.cross(normal, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    facts = SleeveFacts(False, 0.0, 0.12, 0.06, 0.0)
+    given = Assignment((Task.PREPARE, Task.REST), (facts, facts))
+
+    def ahead(beside: float, depth: float = -0.1) -> float:
+        sleeve = SleeveState(axis.G(0.0) + depth * normal + beside * across, normal)
+        goal = planner.targets(given, [sleeve, sleeve], q, STEP)[0].position[0]
+        return float(normal @ (goal - axis.G(0.0)))
+
+    assert ahead(p.funnel_wide) == pytest.approx(-p.funnel_distance)
+    assert ahead(p.funnel_narrow) == pytest.approx(p.overshoot)
+    assert ahead(0.5 * (p.funnel_narrow + p.funnel_wide)) == pytest.approx(
+        0.5 * (p.overshoot - p.funnel_distance)
+    )
+    # the hand is in the opening: it goes on, along the forearm
+    assert ahead(p.funnel_wide, depth=0.05) > 0.0
+
+
+def test_a_sleeve_goes_back_as_far_as_its_hand_is_barred_from_it(planner: TaskPlanner) -> None:
+    """Without a leap: an armhole that turned round with each line of sight would get nowhere."""
+    q, to = np.stack([joints()] * (HORIZON + 1)), heading(joints())
+    axis, p = arm_axes(joints())[0], planner.parameters
+    way = p.approaches[0].direction(axis, to, 0)
+    near = SleeveState(axis.G(0.0) - 0.12 * way, way)
+
+    def ahead(sight: float) -> float:
+        facts = SleeveFacts(False, 0.0, 0.12, 0.06, 0.0, sight=sight)
+        given = Assignment((Task.PREPARE, Task.REST), (facts, facts))
+        goal = planner.targets(given, [near, near], q, STEP)[0].position[0]
+        return float(way @ (goal - axis.G(0.0)))
+
+    found = [ahead(sight) for sight in np.linspace(0.0, 1.0, 41)]
+    assert found[0] < -0.9 * p.approach_distance
+    assert found[-1] == pytest.approx(p.overshoot)
+    assert np.all(np.diff(found) > -1e-12)
+    assert np.diff(found).max() < 0.25 * (found[-1] - found[0])
+
+
+def test_a_sleeve_that_is_up_leaves_the_garment_to_the_other(planner: TaskPlanner) -> None:
+    q = np.stack([joints()] * (HORIZON + 1))
+    p, axes = planner.parameters, arm_axes(joints())
+
+    def asked(s: tuple[float, float]) -> list[np.ndarray]:
+        sleeves = [SleeveState(a.G(x), a.D(x)) for a, x in zip(axes, s, strict=True)]
+        facts = [SleeveFacts(True, x, 0.5, 0.5, 0.0) for x in s]
+        given = Assignment((Task.DRESS, Task.DRESS), (facts[0], facts[1]))
+        return [t.position[-1] for t in planner.targets(given, sleeves, q, STEP)]
+
+    left, right = asked((1.95, 1.89))
+    np.testing.assert_allclose(left, axes[0].G(p.stages.done_progress))
+    np.testing.assert_allclose(right, axes[1].G(p.final_progress))
+    # with both nearly there both go on
+    left, _ = asked((1.95, p.stages.kept_progress + 0.005))
+    np.testing.assert_allclose(left, axes[0].G(p.final_progress))
+
+
+def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner) -> None:
+    """Whatever bars its sight, and with more weight on where the armhole is."""
+    q = np.stack([joints()] * (HORIZON + 1))
+    axis = arm_axes(joints())[0]
+    away = SleeveState(axis.G(0.0) - 0.3 * axis.D(0.0), axis.D(0.0))
+    off = SleeveFacts(linked=False, s=0.0, hand_distance=0.5, prepared_error=0.2, passed=0.0)
+    near = replace(off, hand_distance=0.1, sight=0.0)
+    p = planner.parameters
+    for facts, retreat in ((near, False), (replace(near, touches=True), False), (near, True)):
+        given = Assignment((Task.PREPARE, Task.REST), (facts, off), (retreat, False))
+        target = planner.targets(given, [away, away], q, STEP)[0]
+        if retreat:
+            assert target.corridor is None and target.position_weight == 1.0
+            continue
+        assert target.position_weight == p.near_position
+        assert target.corridor is not None
+        np.testing.assert_allclose(target.corridor.hand[0], axis.G(0.0))
+        np.testing.assert_allclose(target.corridor.into[-1], -axis.D(0.0))
+        onward = np.stack([axis.G((j + 1) * STEP * p.progress_rate) for j in range(HORIZON)])
+        assert np.allclose(target.position, onward) == facts.touches

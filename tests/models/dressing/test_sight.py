@@ -2,8 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from drake_dress.models.dressing.sight import free_sight, move_into_sight
+from drake_dress.models.dressing.sight import (
+    distance_to_opening,
+    free_sight,
+    move_into_sight,
+)
 
 # A ring of nodes in the plane z = 0, and a curtain (two triangles) in the plane z = 1.
 ANGLE = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -92,3 +98,13 @@ def test_the_move_turns_with_its_frame() -> None:
     turned = move_into_sight(x @ q.T, FACES, LOOP, q @ UP, q @ EYE, q @ FAR, 1.0, q.T)
     assert np.linalg.norm(straight) > 0.0
     np.testing.assert_allclose(turned, q @ straight, atol=1e-9)
+
+
+@given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
+def test_distance_to_an_opening_is_that_to_its_disc(x: float, y: float, z: float) -> None:
+    """A circle of 24 nodes is a disc but for 1 % of its radius."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    rim = 0.1 * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    beyond = max(0.0, float(np.hypot(x, y)) - 0.1)
+    found = distance_to_opening(rim, np.array([x, y, z]))
+    assert found == pytest.approx(float(np.hypot(beyond, z)), abs=1.1e-3)

@@ -1,5 +1,7 @@
 from dataclasses import replace
 
+import numpy as np
+
 from drake_dress.models.dressing.stages import (
     SleeveFacts,
     Stage,
@@ -81,7 +83,7 @@ def test_a_sleeve_that_misses_the_hand_keeps_away_before_it_tries_again() -> Non
 
 def test_an_opening_that_the_hand_does_not_see_is_not_dressed() -> None:
     seen = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0)
-    barred = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0, in_sight=False)
+    barred = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0, sight=0.0)
     state, _ = advance_stages(StageState(), (barred, facts()), P, FAR, 0.0)
     assert state.stage[0] == Stage.PREPARE
     state, _ = advance_stages(state, (seen, facts()), P, FAR, 0.5)
@@ -91,8 +93,76 @@ def test_an_opening_that_the_hand_does_not_see_is_not_dressed() -> None:
     assert state.attempts == (1, 0)
 
 
+def test_a_hand_that_loses_part_of_its_sight_is_not_given_up() -> None:
+    """Less than begins a dressing does not end it: sight goes to and fro while cloth moves."""
+    middle = 0.5 * (P.least_sight + P.lost_sight)
+    seen, half = (SleeveFacts(False, 0.0, 0.05, 0.01, 0.0, sight=s) for s in (1.0, middle))
+    state, _ = advance_stages(StageState(), (half, facts()), P, FAR, 0.0)
+    assert state.stage[0] == Stage.PREPARE
+    state, _ = advance_stages(state, (seen, facts()), P, FAR, 0.5)
+    state, _ = advance_stages(state, (half, facts()), P, FAR, 1.0)
+    assert state.stage[0] == Stage.DRESS
+    assert state.attempts == (0, 0)
+    # nor is one taken back that is prepared for long
+    state, _ = advance_stages(StageState(), (half, facts()), P, FAR, 0.0)
+    state, _ = advance_stages(state, (half, facts()), P, FAR, P.barred_timeout + 0.1)
+    assert state.attempts == (0, 0)
+
+
+def _meeting(hand: float, armhole: float) -> SleeveFacts:
+    """Returns what is seen of an armhole that comes along +x to a hand at `hand`, m."""
+    ahead = hand - armhole
+    return SleeveFacts(
+        False,
+        0.0,
+        abs(ahead),
+        0.1,
+        0.0,
+        hand=(hand, 0.0, 1.0),
+        away=(float(np.sign(ahead)), 0.0, 0.0),
+    )
+
+
+def test_an_armhole_that_pushes_the_hand_along_is_taken_back() -> None:
+    state = StageState()
+    for k, pushed in enumerate([0.0, 0.5, 0.9]):
+        hand = pushed * P.pushed_distance
+        state, _ = advance_stages(state, (_meeting(hand, hand - 0.1), facts()), P, FAR, 0.1 * k)
+        assert state.attempts == (0, 0)
+    hand = 1.1 * P.pushed_distance
+    state, _ = advance_stages(state, (_meeting(hand, hand - 0.1), facts()), P, FAR, 0.3)
+    assert state.attempts == (1, 0)
+    assert retreats(state, 0, P, 0.4)
+    # the arm stays where it was left: that is no second push
+    state, _ = advance_stages(state, (_meeting(hand, hand - 0.1), facts()), P, FAR, 0.4)
+    assert state.attempts == (1, 0)
+
+
+def test_a_hand_that_comes_to_the_armhole_is_pushed_from_where_it_came_to() -> None:
+    state, _ = advance_stages(StageState(), (_meeting(0.0, -0.15), facts()), P, FAR, 0.0)
+    state, _ = advance_stages(state, (_meeting(-0.08, -0.15), facts()), P, FAR, 0.1)
+    back = -0.08 + 0.9 * P.pushed_distance
+    state, _ = advance_stages(state, (_meeting(back, back - 0.1), facts()), P, FAR, 0.2)
+    assert state.attempts == (0, 0)
+    back = -0.08 + 1.1 * P.pushed_distance
+    state, _ = advance_stages(state, (_meeting(back, back - 0.1), facts()), P, FAR, 0.3)
+    assert state.attempts == (1, 0)
+
+
+def test_a_hand_that_moves_far_from_the_armhole_or_in_it_is_not_pushed() -> None:
+    far = 1.5 * P.meeting_distance
+    state = StageState()
+    for k in range(5):
+        hand = 0.05 * k
+        state, _ = advance_stages(state, (_meeting(hand, hand - far), facts()), P, FAR, 0.1 * k)
+    on = SleeveFacts(True, 0.3, 0.1, 0.1, 0.0, hand=(1.0, 0.0, 1.0), away=(1.0, 0.0, 0.0))
+    state, _ = advance_stages(state, (on, facts()), P, FAR, 1.0)
+    assert state.attempts == (0, 0)
+    assert state.met == (None, None)
+
+
 def test_a_sleeve_that_is_barred_for_long_is_taken_back() -> None:
-    barred = SleeveFacts(False, 0.0, 0.2, 0.2, passed=0.0, in_sight=False)
+    barred = SleeveFacts(False, 0.0, 0.2, 0.2, passed=0.0, sight=0.0)
     state, _ = advance_stages(StageState(), (barred, facts()), P, FAR, 0.0)
     assert state.attempts == (0, 0)
     state, _ = advance_stages(state, (barred, facts()), P, FAR, P.barred_timeout + 0.1)

@@ -1,0 +1,201 @@
+"""One fault in one run, and whether the reaction to it was the stated one."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hardware.two_processes import Plan, play
+from drake_dress.errors import UserError
+from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
+
+# Coarse: what is asked is how arms react, not how a coat is put on.
+COARSE = [
+    "plant.spacing=0.05",
+    "controller.spacing=0.06",
+    "log.rate=100",
+    "lab.rest=1.0",
+]
+CAMERA = (
+    "station.cameras=[{name: front, position: [2.2, 0.8, 1.6], target: [0.0, 0.0, 1.1], "
+    "width: 160, height: 120}]"
+)
+# A fault that passes lasts this long, s; then what is left of the run.
+LASTING, AFTER = 0.8, 1.0
+# A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
+# that slips tugs at an arm that holds for one or two samples of the log, by half a millimetre.
+STILL, STILL_OVER = 0.015, 0.06
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """What is stated about a fault.
+
+    Attributes:
+        source: which may have it; one is drawn.
+        within: from its start until both grippers hold, s; None where they do not.
+        ends: what the run ends with; None where it goes on.
+    """
+
+    source: tuple[str, ...]
+    within: float | None
+    ends: str | None
+
+
+_ARMS = ("left_arm", "right_arm")
+_ALL = (*_ARMS, "garment", "person")
+# A status is stale at 50 ms, an estimate at 200 ms; then 20 ms until the governor has it, 10 ms
+# until the arms have, 60 ms of braking, 100 ms of the drives' own.
+_HOLD, _HOLD_ESTIMATE = 0.25, 0.45
+REACTIONS = {
+    "stale": Reaction(_ARMS, _HOLD, None),
+    "stale_estimate": Reaction(("garment", "person"), _HOLD_ESTIMATE, None),
+    # an image at 0.5 s; they come five times a second, and one may still be on its way
+    "stale_camera": Reaction(("camera_front",), 1.2, None),
+    "bus_lost": Reaction(("left_arm",), _HOLD, None),
+    "arm_lost": Reaction(_ARMS, _HOLD, None),
+    "malformed": Reaction(_ALL, _HOLD, None),
+    "nan": Reaction(_ALL, _HOLD, None),
+    "time_back": Reaction(_ALL, _HOLD, "time back"),
+    "clock_jump": Reaction(_ALL, _HOLD, "clock jump"),
+    "joint_limit": Reaction(_ARMS, _HOLD, "joint limit"),
+    "push": Reaction(_ARMS, None, None),
+    # from the run's last command: 100 ms until it is missed, and the joints' own braking
+    "killed": Reaction(("",), 0.45, None),
+    # a log is written each second; then as if it were killed
+    "disk_full": Reaction(("",), 1.6, "log: cannot be written"),
+}
+
+
+@dataclass(frozen=True)
+class FaultCase:
+    """One fault: its kind and what seeds the moment and the source."""
+
+    kind: str
+    seed: int
+
+
+def name_of(case: dict[str, Any]) -> str:
+    """Returns a case's name from its fields."""
+    return f"{case['kind']}-{case['seed']:04d}"
+
+
+def run_case(case: FaultCase, scenario: str, out: Path, rate: float = 1.0) -> dict[str, Any]:
+    """Returns what a fault did, and under "wrong" what was not as stated.
+
+    Args:
+        case: the fault.
+        scenario: file of both processes.
+        out: directory of both.
+        rate: simulated seconds per second. A machine that does other work too is late by
+            milliseconds of its own; at a slower rate they are fewer of those that are judged.
+    """
+    rng = np.random.default_rng([case.seed, *case.kind.encode()])
+    stated = REACTIONS[case.kind]
+    start = float(rng.uniform(1.0, 4.0))
+    source = str(rng.choice(stated.source))
+    kind = case.kind.split("_")[0] if case.kind.startswith("stale") else case.kind
+    lasting = 1.5 if case.kind == "stale_camera" else LASTING
+    lab = []
+    if kind not in ("killed", "disk_full"):
+        lab = [
+            f"lab.faults=[{{kind: {kind}, source: {source or 'left_arm'}, start: {start}, "
+            f"duration: {lasting}}}]"
+        ]
+    plan = Plan(
+        scenario,
+        str(out),
+        [
+            *COARSE,
+            *([CAMERA] if case.kind == "stale_camera" else []),
+            f"duration={start + lasting + AFTER + 1.0}",
+        ],
+        lab,
+        rate=rate,
+        kill_at=start / rate if kind == "killed" else None,
+        fill_at=start / rate if kind == "disk_full" else None,
+        timeout=120.0 / rate,
+    )
+    outcome = play(plan)
+    found = _judged(case.kind, stated, start, lasting, out)
+    wrong: list[str] = found["wrong"]
+    expected = -9 if kind == "killed" else 1
+    if outcome.run_status != expected:
+        wrong.append(f"run ended with {outcome.run_status}, expected {expected}")
+    if outcome.lab_status != 1:
+        wrong.append(f"lab ended with {outcome.lab_status}, expected 1")
+    return {"case": asdict(case), "source": source, "start": start, **found}
+
+
+def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path) -> dict[str, Any]:
+    wrong: list[str] = []
+    held: float | None = None
+    share = {"speed": float("nan"), "torque": float("nan")}
+    try:
+        with RunLog.open(out / "lab" / "run.h5") as log:
+            held, share = _lab_facts(log, kind, stated, start, lasting, wrong)
+    except UserError as error:
+        wrong.append(f"lab's log: {error}")
+    kept = out / ("run-kept" if kind == "disk_full" else "run")
+    ended: str | None = None
+    try:
+        with RunLog.open(kept / "run.h5") as log:
+            ended = log.ended_by
+            # what was flushed a second before it was killed is there
+            if log.time[-1] < start - 1.5:
+                wrong.append(f"run's log ends at {log.time[-1]:.2f} s")
+    except UserError as error:
+        wrong.append(f"run's log: {error}")
+    if kind not in ("killed", "disk_full"):
+        if stated.ends is None and ended is not None:
+            wrong.append(f"ended by {ended}")
+        if stated.ends is not None and (ended is None or stated.ends not in ended):
+            wrong.append(f"ended by {ended}, expected {stated.ends}")
+    if kind == "disk_full" and stated.ends not in (out / "run.log").read_text():
+        wrong.append("does not tell that its log cannot be written")
+    return {"held_after": held, **share, "ended": ended, "wrong": wrong}
+
+
+def _lab_facts(
+    log: RunLog, kind: str, stated: Reaction, start: float, lasting: float, wrong: list[str]
+) -> tuple[float | None, dict[str, float]]:
+    time = log.time
+    speed = np.maximum(*(_speed(time, log.gripper_position[side]) for side in SIDES))
+    share = {"speed": 0.0, "torque": 0.0}
+    for side in SIDES:
+        q, v, torque = (np.asarray(log.file[f"/arm/{side}/{n}"]) for n in ("q", "v", "torque"))
+        if np.any((q < LIMITS.lower) | (q > LIMITS.upper)):
+            wrong.append(f"{side} arm beyond a joint's limit")
+        share["speed"] = max(share["speed"], float((np.abs(v) / LIMITS.speed).max()))
+        share["torque"] = max(share["torque"], float((np.abs(torque) / LIMITS.torque).max()))
+    wrong += [f"{name} at {x:.2f} of its limit" for name, x in share.items() if x > 1.0]
+    if not speed[(time > 0.5) & (time < start)].max(initial=0.0) > 0.03:
+        wrong.append("nothing moved before the fault")
+    end = time[-1] if kind in ("killed", "disk_full") or stated.ends else start + lasting
+    during = (time >= start) & (time <= end)
+    moving = time[during & (speed > STILL)]
+    held = float(moving.max() - start) if len(moving) else 0.0
+    if stated.within is not None and held > stated.within:
+        wrong.append(f"held after {held:.2f} s, stated {stated.within:g} s")
+    return held, share
+
+
+def _speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Returns the speed of a point over the STILL_OVER from each time on, m/s.
+
+    Args:
+        time: (T,) s, increasing.
+        position: (T, 3) m.
+    """
+    end = np.minimum(time + STILL_OVER, time[-1])
+    begin = np.minimum(time, time[-1] - STILL_OVER)
+
+    def at(when: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(when, time, x) for x in position.T], axis=1)
+
+    return np.linalg.norm(at(end) - at(begin), axis=1) / (end - begin)

@@ -1,0 +1,194 @@
+"""Starts a lab and a run in a network namespace that has a loopback alone.
+
+Nothing reaches any other address. It takes `unshare` and the right to use it; `available` tells.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+_ROOT = Path(__file__).parents[2]
+_NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
+_BEGUN = "commands come"
+_POLL = 0.02
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is started, and what is done to it.
+
+    Attributes:
+        scenario: file.
+        out: directory of both.
+        settings: of both processes. lab_settings: of the lab. run_settings: of the run.
+        rate: simulated seconds per second.
+        kill_at: SIGKILL to the run, s after the first command.
+        fill_at: when the run's disk is filled, s after the first command.
+        timeout: for all of it, s.
+        sampled: whether memory is sampled, each second.
+    """
+
+    scenario: str
+    out: str
+    settings: list[str] = field(default_factory=list)
+    lab_settings: list[str] = field(default_factory=list)
+    run_settings: list[str] = field(default_factory=list)
+    rate: float = 1.0
+    kill_at: float | None = None
+    fill_at: float | None = None
+    timeout: float = 600.0
+    sampled: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How both ended, what they said, and memory of the lab and of the run, MB, each second."""
+
+    lab_status: int
+    run_status: int
+    lab_words: str
+    run_words: str
+    lab_memory: list[float]
+    run_memory: list[float]
+
+
+def available() -> bool:
+    """Returns whether this user may have a network of their own here."""
+    probe = ["unshare", "-nm", "sh", "-c", _NETWORK]
+    try:
+        return subprocess.run(probe, capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def play(plan: Plan) -> Outcome:
+    """Returns how a lab and a run went.
+
+    Raises:
+        RuntimeError: they could not be started.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        paper, answer = Path(place) / "plan.json", Path(place) / "outcome.json"
+        paper.write_text(json.dumps(asdict(plan)), encoding="utf-8")
+        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer}"
+        done = subprocess.run(
+            ["unshare", "-nm", "sh", "-c", inside],
+            cwd=_ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if not answer.exists():
+            raise RuntimeError(f"lab and run could not be started: {done.stderr.strip()}")
+        return Outcome(**json.loads(answer.read_text(encoding="utf-8")))
+
+
+def _inside(plan: Plan) -> Outcome:
+    out = Path(plan.out)
+    run_out = out / "run"
+    run_out.mkdir(parents=True, exist_ok=True)
+    if plan.fill_at is not None:
+        # a disk of its own, that can be full
+        subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=48m", "tmpfs", str(run_out)], check=True
+        )
+    files = {name: (out / f"{name}.log").open("w") for name in ("lab", "run")}
+    rate = ["--realtime-rate", str(plan.rate)]
+    words = {
+        "lab": ["sim-station", plan.scenario, "--out", str(out / "lab"), *rate],
+        "run": ["run", plan.scenario, "--no-meshcat", "--out", str(run_out), *rate],
+    }
+    sets = {
+        "lab": [*plan.settings, *plan.lab_settings],
+        "run": [*plan.settings, "station.kind=hardware", *plan.run_settings],
+    }
+    # each has a core; libraries that take more slow both
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    process = {
+        name: subprocess.Popen(
+            [sys.executable, "-m", "drake_dress", *words[name], *_set(sets[name])],
+            stdout=files[name],
+            stderr=subprocess.STDOUT,
+            env=environment,
+        )
+        for name in ("lab", "run")
+    }
+    memory: dict[str, list[float]] = {"lab": [], "run": []}
+    begin, begun, filled, sampled = time.monotonic(), None, False, 0.0
+    while any(p.poll() is None for p in process.values()):
+        time.sleep(_POLL)
+        now = time.monotonic()
+        if now - begin > plan.timeout:
+            for p in process.values():
+                p.kill()
+        if process["run"].poll() is not None and begun is None and now - begin > 5.0:
+            # it did not come so far; the lab need not wait for it
+            process["lab"].send_signal(signal.SIGINT)
+        if begun is None and _BEGUN in (out / "lab.log").read_text():
+            begun = now
+        if begun is not None and plan.kill_at is not None and now - begun >= plan.kill_at:
+            process["run"].kill()
+        if begun is not None and plan.fill_at is not None and not filled:
+            if now - begun >= plan.fill_at:
+                filled = True
+                _fill(run_out / "filler")
+        if plan.sampled and now - sampled >= 1.0:
+            sampled = now
+            for name, p in process.items():
+                memory[name].append(_memory(p.pid))
+    for file in files.values():
+        file.close()
+    if plan.fill_at is not None:
+        (run_out / "filler").unlink(missing_ok=True)
+        kept = out / "run-kept"
+        kept.mkdir(exist_ok=True)
+        for path in run_out.iterdir():
+            (kept / path.name).write_bytes(path.read_bytes())
+    return Outcome(
+        process["lab"].returncode,
+        process["run"].returncode,
+        (out / "lab.log").read_text(),
+        (out / "run.log").read_text(),
+        memory["lab"],
+        memory["run"],
+    )
+
+
+def _set(values: list[str]) -> list[str]:
+    return [word for value in values for word in ("--set", value)]
+
+
+def _fill(path: Path) -> None:
+    try:
+        with path.open("wb") as file:
+            while True:
+                file.write(bytes(1 << 20))
+                file.flush()
+    except OSError:
+        pass
+
+
+def _memory(pid: int) -> float:
+    """Returns the memory of a process that is its own, MB."""
+    try:
+        text = Path(f"/proc/{pid}/smaps_rollup").read_text()
+        return sum(
+            float(line.split()[1]) / 1024.0
+            for line in text.splitlines()
+            if line.startswith("Private_")
+        )
+    except (OSError, IndexError):
+        return float("nan")
+
+
+if __name__ == "__main__":
+    given = Plan(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
+    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given))), encoding="utf-8")

@@ -1,0 +1,118 @@
+"""Cameras that look at the person, in a simulated station."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.systems.garment_geometry import GarmentGeometry
+
+_RENDERER = "vtk"
+_NEAR, _FAR = 0.05, 6.0  # what is drawn, m
+_DEPTH = (0.1, 5.0)  # what is measured, m
+# Ports of an RgbdSensor, and what they are exported as.
+IMAGES = {"color_image": "color_image", "depth_image_32f": "depth_image"}
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera for colour and depth, at one place.
+
+    Attributes:
+        name: of its ports and channel.
+        position: p_WC (3,), m.
+        target: that is in the middle of its image (3,), m.
+        width, height: of the image, pixels.
+        fov: vertical, rad.
+        rate: of images, Hz.
+    """
+
+    name: str
+    position: np.ndarray
+    target: np.ndarray
+    width: int
+    height: int
+    fov: float
+    rate: float
+
+    @property
+    def info(self) -> CameraInfo:
+        """Its intrinsics."""
+        return CameraInfo(self.width, self.height, self.fov)
+
+    @property
+    def pose(self) -> RigidTransform:
+        """X_WC: z to the target, y down, x to the right."""
+        return RigidTransform(RotationMatrix(looking(self.position, self.target)), self.position)
+
+
+def looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Returns R_WC (3,3) of a camera at `position` that has `target` in the middle, (3,) m.
+
+    Raises:
+        ValueError: the one is straight above the other, or both are one.
+    """
+    ahead = np.asarray(target, dtype=float) - position
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    if np.linalg.norm(right) < 1e-6:
+        raise ValueError("looks straight up or down, or nowhere")
+    z, x = ahead / np.linalg.norm(ahead), right / np.linalg.norm(right)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def export_cameras(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    mesh: GarmentMesh,
+    garment_position: OutputPort,
+    cameras: Sequence[Camera],
+) -> None:
+    """Adds cameras, shows them the garment, and exports `NAME.color_image`, `NAME.depth_image`.
+
+    Args:
+        builder: of the station.
+        scene_graph: with the person and what else is seen.
+        mesh: the true garment.
+        garment_position: its nodes, (3n,) m.
+        cameras: with different names; none leaves the scene graph as it is.
+    """
+    if not cameras:
+        return
+    scene_graph.AddRenderer(_RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
+    garment = builder.AddNamedSystem("garment_geometry", GarmentGeometry(scene_graph, mesh))
+    builder.Connect(garment_position, garment.get_input_port())
+    builder.Connect(
+        garment.get_output_port(), scene_graph.get_source_configuration_port(garment.source)
+    )
+    for camera in cameras:
+        core = RenderCameraCore(
+            _RENDERER, camera.info, ClippingRange(_NEAR, _FAR), RigidTransform()
+        )
+        sensor = builder.AddNamedSystem(
+            f"camera_{camera.name}",
+            RgbdSensor(
+                scene_graph.world_frame_id(),
+                camera.pose,
+                ColorRenderCamera(core, False),
+                DepthRenderCamera(core, DepthRange(*_DEPTH)),
+            ),
+        )
+        builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+        for port, name in IMAGES.items():
+            builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")

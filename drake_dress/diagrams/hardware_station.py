@@ -1,0 +1,451 @@
+"""The station over LCM: the same ports as the simulated one, with messages behind them.
+
+    PANDA_STATUS_LEFT, _RIGHT     lcmt_panda_status    from the arms' drivers
+    PANDA_COMMAND_LEFT, _RIGHT    lcmt_panda_command   to them, at a fixed rate
+    GARMENT_ESTIMATE              lcmt_point_cloud     nodes of the controller's garment, m, m/s
+    PERSON_ESTIMATE               lcmt_point_cloud     shoulder, elbow, hand of left, then right, m
+    CAMERA_<NAME>                 lcmt_image_array     of each camera
+
+`drake-dress sim-station` sends and takes the same. Each source is watched: see
+`models/supervision/`.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from drake import lcmt_image_array, lcmt_panda_command, lcmt_panda_status, lcmt_point_cloud
+from pydrake.lcm import DrakeLcm
+from pydrake.manipulation import PandaCommandSender, PandaControlMode, PandaStatusReceiver
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.lcm import LcmInterfaceSystem, LcmPublisherSystem, LcmSubscriberSystem
+from pydrake.systems.sensors import LcmImageArrayToImages
+
+from drake_dress.diagrams.arms import ArmSetup
+from drake_dress.diagrams.person import Person
+from drake_dress.diagrams.station import ARM_STATUS, Station
+from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.arm.status_check import joint_fault
+from drake_dress.models.sides import SIDES
+from drake_dress.models.supervision.supervision import Patience
+from drake_dress.models.supervision.watch import Fault, WatchSettings
+from drake_dress.systems.arm_measurement import ArmMeasurement
+from drake_dress.systems.command_meter import CommandMeter
+from drake_dress.systems.lcm_inbox import (
+    Check,
+    Decoder,
+    GuardedSerializer,
+    InboxSerializer,
+    cpp_serializer,
+)
+from drake_dress.systems.point_messages import PointReceiver, check_points, decode_points
+from drake_dress.systems.station_watch import StationWatch
+
+FloatArray = np.ndarray
+
+_JOINT_POINTS = 6
+# An arm in one of these does not follow commands.
+_STOPPED_MODES = (
+    lcmt_panda_status.kGuiding,
+    lcmt_panda_status.kReflex,
+    lcmt_panda_status.kUserStopped,
+    lcmt_panda_status.kAutomaticErrorRecovery,
+)
+# Of looking at what has come, s.
+_WATCH_PERIOD = 0.005
+_LISTENING_STEP = 0.05
+# Of taking what has piled up, and something new of each source, s.
+_CATCHING_UP = 0.2
+
+
+@dataclass(frozen=True)
+class Links:
+    """Where messages go, and how often.
+
+    Attributes:
+        lcm_url: of the bus.
+        status, command: channels of the arms; _LEFT and _RIGHT are appended.
+        garment, person: channels of the estimates.
+        camera: channels of images; _NAME is appended.
+        command_period: s. command_offset: of the first command, s.
+    """
+
+    lcm_url: str = "udpm://239.255.76.67:7667?ttl=0"
+    status: str = "PANDA_STATUS"
+    command: str = "PANDA_COMMAND"
+    garment: str = "GARMENT_ESTIMATE"
+    person: str = "PERSON_ESTIMATE"
+    camera: str = "CAMERA"
+    command_period: float = 0.005
+    command_offset: float = 0.001
+
+    def of_arm(self, kind: str, side: str) -> str:
+        """Returns the channel of an arm's status or command."""
+        return f"{getattr(self, kind)}_{side.upper()}"
+
+    def of_camera(self, name: str) -> str:
+        """Returns the channel of a camera."""
+        return f"{self.camera}_{name.upper()}"
+
+
+@dataclass(frozen=True)
+class HardwareParameters:
+    """What the hardware station is made of.
+
+    Attributes:
+        links: of the messages.
+        mode: of `panda_driver.MODES`.
+        node_count: of the controller's garment.
+        cameras: their names.
+        stale_status, stale_estimate, stale_camera: age at which a source is stale, s.
+        patience: with faults.
+        wait: for the first messages, s.
+        start_distance: of a gripper from where the run begins, at most, m.
+        start_angle: of a joint, rad.
+        wall: whether staleness is measured by this machine's clock, and not by the diagram's.
+    """
+
+    links: Links
+    mode: str
+    node_count: int
+    cameras: tuple[str, ...] = ()
+    stale_status: float = 0.05
+    stale_estimate: float = 0.2
+    stale_camera: float = 0.5
+    patience: Patience = field(default_factory=Patience)
+    wait: float = 10.0
+    start_distance: float = 0.02
+    start_angle: float = 0.1
+    wall: bool = True
+
+
+class StationSilentError(RuntimeError):
+    """Something that the station needs was not heard."""
+
+
+class NoBusError(RuntimeError):
+    """There is no bus at a URL."""
+
+
+class NotAtStartError(RuntimeError):
+    """An arm is not where the run begins."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What sources said first: joints (2,7) rad, garment (m,3) m, person's joints (6,3) m."""
+
+    joints: FloatArray
+    garment: FloatArray
+    person: FloatArray
+
+
+@dataclass(frozen=True)
+class HardwareStation(Station):
+    """A station over LCM.
+
+    Attributes:
+        watch: of its sources.
+        meter: of its commands.
+        lcm: its bus, which must live as long.
+    """
+
+    watch: StationWatch
+    meter: CommandMeter
+    lcm: DrakeLcm
+
+    def catch_up(self) -> None:
+        """Takes what has come while the diagram was made, so that a run begins with the newest."""
+        # a bus keeps the oldest messages of those that do not fit, so what is there now is old
+        end = clock.monotonic() + _CATCHING_UP
+        while clock.monotonic() < end:
+            self.lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
+
+
+@dataclass(frozen=True)
+class _Source:
+    channel: str
+    lcm_type: Any
+    check: Check
+    max_age: float
+
+    @cached_property
+    def decoder(self) -> Decoder:
+        """Shared by all who take the messages."""
+        return Decoder(self.lcm_type, self.check)
+
+
+def status_fault(message: Any) -> Fault:
+    """Returns what is wrong with a `lcmt_panda_status`."""
+    given = (message.joint_position, message.joint_velocity, message.joint_torque_external)
+    if message.num_joints != len(LIMITS.lower):
+        return Fault.WRONG_SIZE
+    fault = joint_fault(*given, LIMITS)
+    return fault | Fault.STOPPED if message.robot_mode in _STOPPED_MODES else fault
+
+
+def _image_fault(message: Any) -> Fault:
+    sizes = [image.width * image.height for image in message.images]
+    return Fault.NONE if sizes and min(sizes) > 0 else Fault.WRONG_SIZE
+
+
+def _sources(p: HardwareParameters) -> dict[str, _Source]:
+    sources = {
+        f"{side}_arm": _Source(
+            p.links.of_arm("status", side), lcmt_panda_status, status_fault, p.stale_status
+        )
+        for side in SIDES
+    }
+    for name, channel, count in (
+        ("garment", p.links.garment, p.node_count),
+        ("person", p.links.person, _JOINT_POINTS),
+    ):
+        sources[name] = _Source(channel, lcmt_point_cloud, check_points(count), p.stale_estimate)
+    for name in p.cameras:
+        sources[f"camera_{name}"] = _Source(
+            p.links.of_camera(name), lcmt_image_array, _image_fault, p.stale_camera
+        )
+    return sources
+
+
+def open_bus(url: str) -> DrakeLcm:
+    """Returns a bus.
+
+    Raises:
+        NoBusError: there is none at this URL.
+    """
+    try:
+        lcm = DrakeLcm(url)
+    except RuntimeError as error:
+        raise NoBusError(f"is {url}: {error}") from error
+    if not lcm.available():
+        raise NoBusError(
+            f"is {url}, where no bus can be opened; a multicast route may be missing: "
+            "ip route add 239.255.76.67 dev lo"
+        )
+    return lcm
+
+
+def listen(
+    p: HardwareParameters,
+    lcm: DrakeLcm,
+    told: Callable[[str], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Heard:
+    """Waits until every source has said something sound, and returns what.
+
+    Args:
+        p: of the station.
+        lcm: a bus that is used for nothing else.
+        told: is called with the name of a source when it is heard.
+        stopped: whether to give up.
+
+    Raises:
+        StationSilentError: not all were heard in time; the message tells which, and what came
+            instead.
+    """
+    sources = _sources(p)
+    first: dict[str, Any] = {}
+    wrong: dict[str, Fault] = {}
+
+    def take(name: str, raw: bytes) -> None:
+        if name in first:
+            return
+        message, fault = sources[name].decoder(raw)
+        if fault:
+            wrong[name] = fault
+        else:
+            first[name] = message
+            told(name)
+
+    for name, source in sources.items():
+        lcm.Subscribe(source.channel, partial(take, name))
+    end = clock.monotonic() + p.wait
+    while len(first) < len(sources) and clock.monotonic() < end and not stopped():
+        lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
+    missing = [n for n in sources if n not in first]
+    if missing:
+        parts = []
+        for n in missing:
+            why = f"came {wrong[n].name.lower().replace('_', ' ')}" if n in wrong else "is silent"  # type: ignore[union-attr]
+            parts.append(f"{sources[n].channel} {why}")
+        raise StationSilentError(f"{', '.join(parts)} for {p.wait:g} s")
+    points = {n: decode_points(first[n]) for n in ("garment", "person")}
+    return Heard(
+        np.array([first[f"{side}_arm"].joint_position for side in SIDES]),
+        points["garment"][:, :3],  # type: ignore[index]
+        points["person"][:, :3],  # type: ignore[index]
+    )
+
+
+def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> ArmSetup:
+    """Returns the arms as they are, which must be near to where the run begins.
+
+    Args:
+        p: of the station.
+        planned: where the run begins.
+        joints: (2,7) where the arms are, rad.
+
+    Raises:
+        NotAtStartError: an arm is too far; the message tells which, by how much, and where to.
+    """
+    for i, side in enumerate(SIDES):
+        arm = planned.pair.arms[i]
+        off = float(
+            np.linalg.norm(arm.tool_position(joints[i]) - arm.tool_position(planned.start[i]))
+        )
+        angle = float(np.abs(joints[i] - planned.start[i]).max())
+        if off > p.start_distance or angle > p.start_angle:
+            raise NotAtStartError(
+                f"the {side} arm is {100.0 * off:.1f} cm and {angle:.2f} rad from where the run "
+                f"begins, expected {100.0 * p.start_distance:g} cm and {p.start_angle:g} rad at "
+                f"most; move its joints to {np.round(planned.start[i], 3).tolist()} rad"
+            )
+    # a joint that begins at a limit may be reported a little beyond
+    inside = [
+        np.clip(q, arm.limits.lower, arm.limits.upper)
+        for q, arm in zip(joints, planned.pair.arms, strict=True)
+    ]
+    return replace(planned, start=np.stack(inside))
+
+
+def make_hardware_station(
+    p: HardwareParameters, lcm: DrakeLcm, person: Person, robots: ArmSetup, heard: Heard
+) -> HardwareStation:
+    """Returns a station whose arms, garment and person are behind messages.
+
+    Args:
+        p: what it is made of.
+        lcm: its bus.
+        person: as it is described.
+        robots: the arms where they are.
+        heard: what sources said first.
+    """
+    builder = DiagramBuilder()
+    bus = builder.AddNamedSystem("lcm", LcmInterfaceSystem(lcm))
+    sources = _sources(p)
+    watch = builder.AddNamedSystem(
+        "station_watch",
+        StationWatch(
+            {n: WatchSettings(s.max_age) for n, s in sources.items()},
+            p.patience,
+            _WATCH_PERIOD,
+            p.wall,
+        ),
+    )
+    inboxes = {}
+    for name, source in sources.items():
+        inboxes[name] = builder.AddNamedSystem(
+            f"{name}_inbox",
+            LcmSubscriberSystem(
+                channel=source.channel,
+                serializer=InboxSerializer(source.decoder),
+                lcm=bus,
+            ),
+        )
+        builder.Connect(inboxes[name].get_output_port(), watch.GetInputPort(name))
+    builder.ExportOutput(watch.GetOutputPort("permission"), "permission")
+
+    measure = builder.AddNamedSystem("arm_measurement", ArmMeasurement(robots.pair.arms))
+    for side in SIDES:
+        _wire_arm(builder, p, bus, side, sources[f"{side}_arm"])
+        status = builder.GetSubsystemByName(f"{side}_arm_status")
+        for name, port in (
+            ("position", "position_measured"),
+            ("velocity", "velocity_measured"),
+            ("torque_external", "torque_external"),
+        ):
+            builder.Connect(status.GetOutputPort(port), measure.GetInputPort(f"{side}_{name}"))
+        builder.Connect(
+            watch.GetOutputPort(f"{side}_arm_valid"), measure.GetInputPort(f"{side}_valid")
+        )
+        builder.ExportOutput(watch.GetOutputPort(f"{side}_arm_stopped"), f"{side}_arm.stopped")
+        for quantity in ("position", "velocity", "force"):
+            builder.ExportOutput(
+                measure.GetOutputPort(f"{side}_gripper_{quantity}"),
+                f"{side}_gripper.{quantity}_measured",
+            )
+    meter = builder.AddNamedSystem(
+        "command_meter", CommandMeter(p.links.command_period, p.links.command_offset)
+    )
+    for side in SIDES:
+        builder.Connect(inboxes[f"{side}_arm"].get_output_port(), meter.GetInputPort(side))
+    starts: Mapping[str, FloatArray] = {"garment": heard.garment, "person": heard.person}
+    for name, exported in (
+        ("garment", {"position": "garment_position", "velocity": "garment_velocity"}),
+        ("person", {"position": "joint_position"}),
+    ):
+        points = builder.AddNamedSystem(f"{name}_points", PointReceiver(starts[name]))
+        builder.Connect(inboxes[name].get_output_port(), points.get_input_port())
+        for port, out in exported.items():
+            builder.ExportOutput(points.GetOutputPort(port), f"estimate.{out}")
+    for name in p.cameras:
+        _wire_camera(builder, bus, name, sources[f"camera_{name}"])
+    diagram = builder.Build()
+    diagram.set_name("station")
+    grippers = np.stack(
+        [arm.tool_position(q) for arm, q in zip(robots.pair.arms, robots.start, strict=True)]
+    )
+    return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm)
+
+
+def _guarded(
+    builder: DiagramBuilder, bus: LcmInterfaceSystem, name: str, source: _Source
+) -> LcmSubscriberSystem:
+    return builder.AddNamedSystem(
+        name,
+        LcmSubscriberSystem(
+            channel=source.channel,
+            serializer=GuardedSerializer(source.decoder, cpp_serializer(source.lcm_type)),
+            lcm=bus,
+        ),
+    )
+
+
+def _wire_arm(
+    builder: DiagramBuilder, p: HardwareParameters, bus: LcmInterfaceSystem, side: str, s: _Source
+) -> None:
+    sound = _guarded(builder, bus, f"{side}_arm_messages", s)
+    status = builder.AddNamedSystem(f"{side}_arm_status", PandaStatusReceiver())
+    builder.Connect(sound.get_output_port(), status.get_input_port())
+    for name in ARM_STATUS:
+        builder.ExportOutput(status.GetOutputPort(name), f"{side}_arm.{name}")
+    wanted = control_modes(p.mode)
+    command = builder.AddNamedSystem(
+        f"{side}_arm_command", PandaCommandSender(7, sum(wanted.values()))
+    )
+    for name in wanted:
+        builder.ExportInput(command.GetInputPort(name), f"{side}_arm.{name}")
+    publisher = builder.AddNamedSystem(
+        f"{side}_arm_publisher",
+        LcmPublisherSystem.Make(
+            channel=p.links.of_arm("command", side),
+            lcm_type=lcmt_panda_command,
+            lcm=bus,
+            publish_period=p.links.command_period,
+            publish_offset=p.links.command_offset,
+            use_cpp_serializer=True,
+        ),
+    )
+    builder.Connect(command.get_output_port(), publisher.get_input_port())
+
+
+def control_modes(mode: str) -> dict[str, int]:
+    """Returns Drake's bits of a mode of `panda_driver.MODES`, by the name of their port."""
+    both = {"position": PandaControlMode.kPosition, "velocity": PandaControlMode.kVelocity}
+    return {name: one for name, one in both.items() if name in mode}
+
+
+def _wire_camera(
+    builder: DiagramBuilder, bus: LcmInterfaceSystem, name: str, source: _Source
+) -> None:
+    sound = _guarded(builder, bus, f"camera_{name}_messages", source)
+    images = builder.AddNamedSystem(f"camera_{name}_images", LcmImageArrayToImages())
+    builder.Connect(sound.get_output_port(), images.get_input_port())
+    for kind in ("color", "depth"):
+        builder.ExportOutput(images.GetOutputPort(f"{kind}_image"), f"{name}.{kind}_image")

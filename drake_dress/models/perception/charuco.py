@@ -1,0 +1,260 @@
+"""Where a camera is, from pictures of a ChArUco board that an arm holds.
+
+An arm holds the board in many poses; each picture shows the corners of the board at pixels
+
+    u = π(K, d, X_CW X_WT(q) X_TB p_B)
+
+with X_WT from the arm's joints. The camera's pose X_WC and the board's pose in the tool X_TB, which
+nobody can measure well, are those for which all pixels fit best (least squares, robust against a
+corner that was taken for another). A first guess comes from each picture's own board pose and the
+closed form of Shah (2013) for two unknown transforms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
+Image = npt.NDArray[np.uint8]
+
+# Of corners in a picture that counts, of pictures, and of the turns between them, rad.
+LEAST_CORNERS, LEAST_PICTURES, LEAST_TURN = 6, 5, 0.15
+# Beyond which a pixel is not believed as much, px.
+_ROBUST = 1.0
+
+
+class CalibrationError(ValueError):
+    """Pictures from which no pose can be found."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A ChArUco board: `columns` by `rows` squares of `square`, with markers of `marker`, m."""
+
+    columns: int = 7
+    rows: int = 5
+    square: float = 0.03
+    marker: float = 0.022
+    dictionary: str = "DICT_4X4_50"
+
+    def made(self) -> cv2.aruco.CharucoBoard:
+        """Returns OpenCV's board.
+
+        Raises:
+            CalibrationError: there is no such dictionary, or no such board.
+        """
+        number = getattr(cv2.aruco, self.dictionary, None)
+        if number is None:
+            raise CalibrationError(f"dictionary {self.dictionary!r} is none of OpenCV's")
+        if min(self.columns, self.rows) < 3 or not 0.0 < self.marker < self.square:
+            raise CalibrationError(
+                "no such board, expected 3 × 3 squares at least and markers smaller than squares"
+            )
+        return cv2.aruco.CharucoBoard(
+            (self.columns, self.rows),
+            self.square,
+            self.marker,
+            cv2.aruco.getPredefinedDictionary(number),
+        )
+
+    def picture(self, pixels_per_square: int) -> Image:
+        """Returns the board to print, without a border."""
+        size = (self.columns * pixels_per_square, self.rows * pixels_per_square)
+        picture: Image = np.asarray(self.made().generateImage(size), dtype=np.uint8)
+        return picture
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Corners of the board in one picture: (k,3) p_B, m, and (k,2) pixels."""
+
+    points: FloatArray
+    pixels: FloatArray
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Of a camera: K (3,3), pixels, and distortion (5,) as OpenCV has it."""
+
+    matrix: FloatArray
+    distortion: FloatArray
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """Where a camera is.
+
+    Attributes:
+        camera: X_WC (4,4); z ahead, y down.
+        board: X_TB (4,4) of the board in the tool.
+        intrinsics: that were given or found.
+        residuals: of each picture, root mean square over its corners, px.
+        rms: over all corners, px.
+        position_std: of the camera's position (3,), m.
+        rotation_std: of its rotation (3,), rad.
+    """
+
+    camera: FloatArray
+    board: FloatArray
+    intrinsics: Intrinsics
+    residuals: FloatArray
+    rms: float
+    position_std: FloatArray
+    rotation_std: FloatArray
+
+
+def find_corners(image: Image, board: Board) -> Corners | None:
+    """Returns the board's corners in a picture (h,w) or (h,w,3); None where there are too few."""
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    made = board.made()
+    pixels, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(grey)
+    if ids is None or len(ids) < LEAST_CORNERS:
+        return None
+    points = np.asarray(made.getChessboardCorners(), dtype=np.float64)[ids.ravel()]
+    # corners on one line leave the pose open
+    if np.linalg.matrix_rank(points[:, :2] - points[0, :2], tol=1e-6) < 2:
+        return None
+    return Corners(points, np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
+
+
+def find_intrinsics(corners: Sequence[Corners], width: int, height: int) -> Intrinsics:
+    """Returns the camera's own parameters, from its pictures of the board."""
+    _, matrix, distortion, _, _ = cv2.calibrateCamera(
+        [c.points.astype(np.float32) for c in corners],
+        [c.pixels.astype(np.float32) for c in corners],
+        (width, height),
+        None,
+        None,
+    )
+    return Intrinsics(
+        np.asarray(matrix, dtype=np.float64),
+        np.asarray(distortion, dtype=np.float64).ravel()[:5],
+    )
+
+
+def calibrate(
+    corners: Sequence[Corners], tools: FloatArray, intrinsics: Intrinsics
+) -> CameraCalibration:
+    """Returns where the camera is.
+
+    Args:
+        corners: of N pictures.
+        tools: (N,4,4) X_WT of the tool that holds the board, in each.
+        intrinsics: of the camera.
+
+    Raises:
+        CalibrationError: too few pictures, or too much alike.
+    """
+    if len(corners) < LEAST_PICTURES:
+        raise CalibrationError(
+            f"the board is seen in {len(corners)} pictures, expected {LEAST_PICTURES} at least"
+        )
+    turns = tools[:, :3, :3] @ tools[0, :3, :3].T
+    vectors = np.array([cv2.Rodrigues(r)[0].ravel() for r in turns])
+    spread = np.linalg.svd(vectors - vectors.mean(axis=0), compute_uv=False)
+    if spread[1] < LEAST_TURN:
+        raise CalibrationError(
+            "the board is turned about one axis alone, expected it to be turned about two"
+        )
+    first = np.concatenate(_first_guess(corners, tools, intrinsics))
+    found = least_squares(
+        lambda x: _residuals(x, corners, tools, intrinsics),
+        first,
+        loss="soft_l1",
+        f_scale=_ROBUST,
+        x_scale=np.tile([0.1] * 3 + [0.1] * 3, 2),
+    )
+    rest = _residuals(found.x, corners, tools, intrinsics)
+    counts = [len(c.points) for c in corners]
+    of_each = np.split(rest.reshape(-1, 2), np.cumsum(counts)[:-1])
+    freedom = max(1, len(rest) - len(first))
+    covariance = np.linalg.pinv(found.jac.T @ found.jac) * float(rest @ rest) / freedom
+    std = np.sqrt(np.diag(covariance))
+    return CameraCalibration(
+        camera=np.asarray(np.linalg.inv(_pose(found.x[:6])), dtype=np.float64),
+        board=_pose(found.x[6:]),
+        intrinsics=intrinsics,
+        residuals=np.array([np.sqrt((r**2).sum(axis=1).mean()) for r in of_each]),
+        rms=float(np.sqrt((rest.reshape(-1, 2) ** 2).sum(axis=1).mean())),
+        position_std=std[3:6],
+        rotation_std=std[:3],
+    )
+
+
+def _first_guess(
+    corners: Sequence[Corners], tools: FloatArray, intrinsics: Intrinsics
+) -> tuple[FloatArray, FloatArray]:
+    """Returns X_CW and X_TB as (6,) rotation vectors and translations."""
+    boards = []
+    for seen in corners:
+        ok, turn, shift = cv2.solvePnP(
+            seen.points, seen.pixels, intrinsics.matrix, intrinsics.distortion
+        )
+        if not ok:
+            raise CalibrationError("the board's pose in a picture cannot be found")
+        boards.append(_pose(np.concatenate([turn.ravel(), shift.ravel()])))
+    camera, board = _two_transforms(np.stack(boards), tools)
+    return _packed(camera), _packed(board)
+
+
+def _two_transforms(seen: FloatArray, tools: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns X_CW and X_TB (4,4) with seen_i ≈ X_CW tools_i X_TB (Shah 2013).
+
+    Rotations: R_i R_TB' = R_CW T_i for all i, whose two unknowns are the left and right singular
+    vectors of Σ T_i ⊗ R_i that belong to its largest singular value. Positions are linear then.
+    """
+    both = sum(np.kron(t[:3, :3], r[:3, :3]) for t, r in zip(tools, seen, strict=True))
+    u, _, vt = np.linalg.svd(both)
+    # columns one after the other
+    r_cw = _nearest_rotation(u[:, 0].reshape(3, 3, order="F"))
+    r_tb = _nearest_rotation(vt[0].reshape(3, 3, order="F")).T
+    # t_i = R_CW T_i t_TB + R_CW p_i + t_CW
+    rows = np.concatenate([np.hstack([r_cw @ t[:3, :3], np.eye(3)]) for t in tools])
+    rest = np.concatenate([r[:3, 3] - r_cw @ t[:3, 3] for r, t in zip(seen, tools, strict=True)])
+    shifts, *_ = np.linalg.lstsq(rows, rest, rcond=None)
+    camera, board = np.eye(4), np.eye(4)
+    camera[:3, :3], camera[:3, 3] = r_cw, shifts[3:]
+    board[:3, :3], board[:3, 3] = r_tb, shifts[:3]
+    return camera, board
+
+
+def _nearest_rotation(matrix: FloatArray) -> FloatArray:
+    """Returns the rotation nearest to a matrix that may have the wrong sign."""
+    u, _, vt = np.linalg.svd(matrix * np.sign(np.linalg.det(matrix)))
+    rotation: FloatArray = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return rotation
+
+
+def _residuals(
+    x: FloatArray, corners: Sequence[Corners], tools: FloatArray, intrinsics: Intrinsics
+) -> FloatArray:
+    """Returns how far all corners are from where they should be seen, (2K,) px."""
+    camera, board = _pose(x[:6]), _pose(x[6:])
+    rest = []
+    for seen, tool in zip(corners, tools, strict=True):
+        pose = _packed(camera @ tool @ board)
+        pixels, _ = cv2.projectPoints(
+            seen.points, pose[:3], pose[3:], intrinsics.matrix, intrinsics.distortion
+        )
+        rest.append(pixels.reshape(-1, 2) - seen.pixels)
+    residuals: FloatArray = np.concatenate(rest).ravel()
+    return residuals
+
+
+def _pose(vector: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, :3] = cv2.Rodrigues(vector[:3])[0]
+    pose[:3, 3] = vector[3:]
+    return pose
+
+
+def _packed(pose: FloatArray) -> FloatArray:
+    packed: FloatArray = np.concatenate([cv2.Rodrigues(pose[:3, :3])[0].ravel(), pose[:3, 3]])
+    return packed

@@ -1,0 +1,1 @@
+"""What a station hears, whether it may be believed, and what follows if not."""

@@ -1,0 +1,93 @@
+"""What follows from faults: arms hold at once; the run goes on, or ends.
+
+    any source has a fault                     arms come to rest and hold
+    all have been sound for settle_time        they go on
+    a fault has lasted for its patience        the run ends
+    a fault is fatal                           the run ends once arms have come to rest
+
+When a run ends, commands end, and the arms' own drivers hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drake_dress.models.supervision.watch import FATAL, Fault
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long is waited.
+
+    Attributes:
+        settle_time: for which all must have been sound before arms go on, s.
+        fault: that a fault may last, s. fatal: until arms have come to rest, s.
+    """
+
+    settle_time: float = 0.2
+    fault: float = 3.0
+    fatal: float = 0.3
+
+
+@dataclass(frozen=True)
+class SupervisionState:
+    """What is remembered.
+
+    Attributes:
+        faults: of each source, gathered since it was sound last.
+        since: when each source's fault began, s; None where it is sound.
+        sound: since when all are sound, s; None while one is not.
+        permitted: whether arms may move.
+        ended_by: the source whose fault ends the run; None while it goes on.
+    """
+
+    faults: tuple[Fault, ...]
+    since: tuple[float | None, ...]
+    sound: float | None = None
+    permitted: bool = False
+    ended_by: int | None = None
+
+    @staticmethod
+    def of(count: int) -> SupervisionState:
+        """Returns the state before anything has been heard of so many sources."""
+        return SupervisionState((Fault.NONE,) * count, (None,) * count)
+
+
+def supervise(
+    state: SupervisionState, faults: Sequence[Fault], now: float, patience: Patience
+) -> SupervisionState:
+    """Returns what follows from the sources' faults at `now`, s.
+
+    Before all have been sound once, nothing is permitted, and patience runs from time 0.
+    """
+    since: list[float | None] = []
+    gathered: list[Fault] = []
+    ended_by = state.ended_by
+    for i, fault in enumerate(faults):
+        if not fault:
+            since.append(None)
+            gathered.append(Fault.NONE)
+            continue
+        began = state.since[i]
+        began = now if began is None else began
+        all_of_it = state.faults[i] | fault
+        since.append(began)
+        gathered.append(all_of_it)
+        allowed = patience.fatal if all_of_it & FATAL else patience.fault
+        if ended_by is None and now - began >= allowed:
+            ended_by = i
+    sound = None
+    if all(x is None for x in since):
+        sound = now if state.sound is None else state.sound
+    settled = sound is not None and now - sound >= patience.settle_time - 1e-9
+    permitted = ended_by is None and sound is not None and (state.permitted or settled)
+    return SupervisionState(tuple(gathered), tuple(since), sound, permitted, ended_by)
+
+
+def told(source: str, fault: Fault) -> str:
+    """Returns a line about what is wrong with a source."""
+    words = [
+        name.lower().replace("_", " ") for name, f in Fault.__members__.items() if f and f & fault
+    ]
+    return f"{source}: {', '.join(words)}"

@@ -1,0 +1,109 @@
+"""How arms did in a run, measured from their joints in the log and not by their controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.arm.clearance import Capsules, clearance
+from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
+
+FloatArray = npt.NDArray[np.float64]
+
+# Links that may be near to the person: the last one and the hand, which hold the garment on it.
+_NEAR_LINKS = 2
+
+
+@dataclass(frozen=True)
+class ArmMeasures:
+    """What arms did; of T samples, left and right.
+
+    Attributes:
+        speed_share: (T,2) of a joint's limit of speed, the largest.
+        torque_share: (T,2) of a joint's limit of torque; NaN where not logged.
+        margin: (T,2) of a joint to its nearest limit, the least, rad; negative beyond.
+        off: (T,2) of the gripper from where its joints are commanded to be, m.
+        apart: (T,) of the arms' capsules, m.
+        to_person: (T,2) of an arm without its last link and hand to the person's capsules, m.
+    """
+
+    speed_share: FloatArray
+    torque_share: FloatArray
+    margin: FloatArray
+    off: FloatArray
+    apart: FloatArray
+    to_person: FloatArray
+
+    @property
+    def kept(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether no joint was beyond a limit."""
+        torque = np.nan_to_num(self.torque_share)
+        inside = (self.speed_share <= 1.0) & (torque <= 1.0) & (self.margin >= 0.0)
+        return np.asarray(inside.all(axis=1), dtype=bool)
+
+
+def arm_capsules(
+    log: RunLog, samples: npt.NDArray[np.integer]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns both arms as capsules: ends (k,c,3), (k,c,3) and radii (c,), m; c = 0 without arms.
+
+    Args:
+        log: of the run.
+        samples: (k,) which are wanted.
+    """
+    if "/arm/left/base" not in log.file:
+        none = np.zeros((len(samples), 0, 3))
+        return none, none, np.zeros(0)
+    placed = []
+    for side in SIDES:
+        arm = panda(np.asarray(log.file[f"/arm/{side}/base"]))
+        q = np.asarray(log.file[f"/arm/{side}/q"], dtype=np.float64)[samples]
+        placed.append([SHAPE.placed(arm.links(row)) for row in np.nan_to_num(q)])
+    a, b = (
+        np.concatenate([np.stack([getattr(c, end) for c in arm]) for arm in placed], axis=1)
+        for end in ("first", "second")
+    )
+    return a, b, np.concatenate([arm[0].radius for arm in placed])
+
+
+def measure_arms(log: RunLog) -> ArmMeasures | None:
+    """Returns what arms did; None where there are none."""
+    if "/arm/left/base" not in log.file:
+        return None
+    count = len(log)
+    speed, torque, margin, off, near = np.full((5, count, 2), np.nan)
+    apart = np.full(count, np.nan)
+    first, second, radius = log.capsules
+    arms = [panda(np.asarray(log.file[f"/arm/{side}/base"])) for side in SIDES]
+    series = {
+        (side, name): np.asarray(log.file[f"/arm/{side}/{name}"], dtype=np.float64)
+        for side in SIDES
+        for name in ("q", "v", "q_commanded", "torque")
+    }
+    all_of = np.arange(len(SHAPE.link))
+    both = _pairs(all_of, all_of)
+    far = _pairs(np.flatnonzero(SHAPE.link <= arms[0].count - _NEAR_LINKS), np.arange(len(radius)))
+    for k, side in enumerate(SIDES):
+        q, v = series[side, "q"], series[side, "v"]
+        speed[:, k] = (np.abs(v) / LIMITS.speed).max(axis=1)
+        torque[:, k] = (np.abs(series[side, "torque"]) / LIMITS.torque).max(axis=1)
+        margin[:, k] = np.minimum(q - LIMITS.lower, LIMITS.upper - q).min(axis=1)
+    for i in range(count):
+        placed = []
+        for k, side in enumerate(SIDES):
+            links = arms[k].links(series[side, "q"][i])
+            asked = arms[k].tool_position(series[side, "q_commanded"][i])
+            off[i, k] = np.linalg.norm(links[-1, :3, 3] - asked)
+            placed.append(SHAPE.placed(links))
+            person = Capsules(first[i], second[i], radius)
+            near[i, k] = clearance(placed[k], person, far).distance.min(initial=np.inf)
+        apart[i] = clearance(placed[0], placed[1], both).distance.min()
+    return ArmMeasures(speed, torque, margin, off, apart, near)
+
+
+def _pairs(first: npt.NDArray[np.int64], second: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    return np.stack([np.repeat(first, len(second)), np.tile(second, len(first))], axis=1)

@@ -1,0 +1,61 @@
+"""Work that is done in a process of its own, so that it takes no time from who waits for it."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from typing import Any
+
+_PR_SET_PDEATHSIG = 1
+_NICENESS = 5
+_worker: Callable[..., Any] | None = None
+
+
+class Apart:
+    """Calls `work` in another process, one call at a time.
+
+    The process begins at once, ends with this one however that ends, and leaves Ctrl-C to it.
+
+    Args:
+        work: can be pickled, as can what it takes and returns.
+    """
+
+    def __init__(self, work: Callable[..., Any]) -> None:
+        # forked from a process with threads, Numba and BLAS may hang
+        self._pool = ProcessPoolExecutor(
+            max_workers=1,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_begin,
+            initargs=(work, os.getpid()),
+        )
+        self._pool.submit(_ready)
+
+    def submit(self, *arguments: Any) -> Future[Any]:
+        """Returns what will be the result."""
+        return self._pool.submit(_work, *arguments)
+
+
+def _begin(work: Callable[..., Any], parent: int) -> None:
+    global _worker
+    _worker = work
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # who sends commands goes first where cores are few
+    os.nice(_NICENESS)
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        # it ended before the kernel was told
+        os._exit(1)
+
+
+def _ready() -> None:
+    """Does nothing: the process is there when it has returned."""
+
+
+def _work(*arguments: Any) -> Any:
+    if _worker is None:
+        raise RuntimeError("the process has not begun")
+    return _worker(*arguments)

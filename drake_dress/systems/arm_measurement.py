@@ -1,0 +1,88 @@
+"""Where grippers are and what pulls at them, from what arms report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, ValueProducer
+
+from drake_dress.models.arm.chain import SerialArm
+from drake_dress.models.arm.external_load import tool_force
+from drake_dress.models.sides import SIDES
+
+_QUANTITIES = ("position", "velocity", "force")
+
+
+class ArmMeasurement(LeafSystem):
+    """Turns joint measurements of two arms into those of their grippers.
+
+    .. pydrake_system::
+
+        name: ArmMeasurement
+        input_ports:
+        - left_position
+        - left_velocity
+        - left_torque_external
+        - left_valid (optional)
+        - right_position
+        - right_velocity
+        - right_torque_external
+        - right_valid (optional)
+        output_ports:
+        - left_gripper_position
+        - left_gripper_velocity
+        - left_gripper_force
+        - right_gripper_position
+        - right_gripper_velocity
+        - right_gripper_force
+
+    Inputs (7,) rad, rad/s, N·m; valid (1,), positive while what an arm reports counts. Outputs
+    (3,) p_WG, m, v_WG, m/s, and the force of the garment on the gripper, N, in W: NaN where the
+    arm's reports do not count.
+
+    Args:
+        arms: left, then right.
+    """
+
+    def __init__(self, arms: Sequence[SerialArm]) -> None:
+        super().__init__()
+        self._arms = list(arms)
+        for side in SIDES:
+            for name in ("position", "velocity", "torque_external"):
+                self.DeclareVectorInputPort(f"{side}_{name}", 7)
+            self.DeclareVectorInputPort(f"{side}_valid", 1)
+        self._measured = [
+            self.DeclareCacheEntry(
+                f"{side}_gripper",
+                ValueProducer(allocate=Value(np.zeros((3, 3))).Clone, calc=self._measure(i, side)),
+            )
+            for i, side in enumerate(SIDES)
+        ]
+        for i, side in enumerate(SIDES):
+            for row, name in enumerate(_QUANTITIES):
+                self.DeclareVectorOutputPort(f"{side}_gripper_{name}", 3, self._show(i, row))
+
+    def _measure(self, i: int, side: str):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: AbstractValue) -> None:
+            valid = self.GetInputPort(f"{side}_valid")
+            if valid.HasValue(context) and not valid.Eval(context)[0] > 0.5:
+                output.set_value(np.full((3, 3), np.nan))
+                return
+            q, v, torque = (
+                self.GetInputPort(f"{side}_{name}").Eval(context)
+                for name in ("position", "velocity", "torque_external")
+            )
+            arm = self._arms[i]
+            links = arm.links(q)
+            moves = arm.tool_jacobian(links)[:3]
+            output.set_value(np.stack([links[-1, :3, 3], moves @ v, tool_force(moves, torque)]))
+
+        return calc
+
+    def _show(self, i: int, row: int):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(self._measured[i].Eval(context)[row])
+
+        return calc

@@ -1,0 +1,88 @@
+"""What a simulated lab sends of its cameras, taken elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+
+import numpy as np
+from drake import lcmt_image_array
+from pydrake.lcm import DrakeLcmInterface
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+from drake_dress.models.supervision.injection import InjectedFault, kinds_at
+from drake_dress.systems.outbox import spoiled
+
+# Of looking whether a picture is there, s.
+_LOOKING_PERIOD = 0.01
+# Takes a camera's picture: its name, time, the plant's state, and the garment.
+Take = Callable[[str, float, np.ndarray, np.ndarray], "Future[bytes]"]
+
+
+class CameraOutbox(LeafSystem):
+    """Has a camera's picture taken at a fixed rate, and publishes it when it is there.
+
+    .. pydrake_system::
+
+        name: CameraOutbox
+        input_ports:
+        - plant_state
+        - garment_position
+        - since
+        output_ports: []
+
+    plant_state: of the station's plant. garment_position: (3n,) m. since: (1,) time since the first
+    command, s, to which faults are timed. A picture is late by what it takes; none is begun before
+    the one before is done.
+
+    Args:
+        name: of the camera.
+        channel: where to.
+        take: its pictures.
+        sizes: of the plant's state, and of the garment's.
+        lcm: bus.
+        period: s.
+        faults: what goes wrong, and when.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        channel: str,
+        take: Take,
+        sizes: tuple[int, int],
+        lcm: DrakeLcmInterface,
+        period: float,
+        faults: Sequence[InjectedFault] = (),
+    ) -> None:
+        super().__init__()
+        self._name, self._channel, self._take, self._lcm = name, channel, take, lcm
+        self._faults = tuple(faults)
+        self._rng = np.random.default_rng(0)
+        self._pending: Future[bytes] | None = None
+        for port, size in zip(("plant_state", "garment_position"), sizes, strict=True):
+            self.DeclareVectorInputPort(port, size)
+        self.DeclareVectorInputPort("since", 1)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._begin)
+        self.DeclarePeriodicPublishEvent(_LOOKING_PERIOD, 0.0, self._look)
+
+    def _begin(self, context: Context) -> EventStatus:
+        if self._pending is not None:
+            return EventStatus.DidNothing()
+        seen = [
+            self.GetInputPort(port).Eval(context).copy()
+            for port in ("plant_state", "garment_position")
+        ]
+        self._pending = self._take(self._name, context.get_time(), seen[0], seen[1])
+        return EventStatus.Succeeded()
+
+    def _look(self, context: Context) -> EventStatus:
+        if self._pending is None or not self._pending.done():
+            return EventStatus.DidNothing()
+        picture, self._pending = self._pending.result(), None
+        since = float(self.GetInputPort("since").Eval(context)[0])
+        on = kinds_at(self._faults, f"camera_{self._name}", since)
+        encoded = spoiled(picture, on, lcmt_image_array, {}, self._rng)
+        if encoded is not None:
+            self._lcm.Publish(self._channel, encoded)
+        return EventStatus.Succeeded()

@@ -1,0 +1,94 @@
+"""What an arm's driver makes of its commands."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from drake_dress.models.arm.chain import JointLimits
+from drake_dress.models.arm.command_guard import DriveState, Stop, follow
+
+
+class CommandGuard(LeafSystem):
+    """Follows joint commands that are sound, and brakes by itself where they are not.
+
+    .. pydrake_system::
+
+        name: CommandGuard
+        input_ports:
+        - position (where the mode has it)
+        - velocity (where the mode has it)
+        - fresh (optional)
+        output_ports:
+        - desired_state
+        - position_commanded
+        - velocity_commanded
+        - stop
+
+    Commands (7,) rad, rad/s. fresh: (1,) positive while commands still come; taken as so where
+    nothing is connected. desired_state: (14,) for a plant's drives. *_commanded: (7,) the halves
+    of it. stop: (1,) of `models.arm.command_guard.Stop`. Outputs are of the state alone.
+
+    Args:
+        start: (7,) joints at time 0, rad.
+        limits: of the joints.
+        period: s.
+        has_position, has_velocity: what the mode has.
+    """
+
+    def __init__(
+        self,
+        start: np.ndarray,
+        limits: JointLimits,
+        period: float,
+        has_position: bool = True,
+        has_velocity: bool = True,
+    ) -> None:
+        super().__init__()
+        if not (has_position or has_velocity):
+            raise ValueError("neither position nor velocity is commanded, expected one at least")
+        self._limits, self._period = limits, period
+        self._given = [
+            name for name, has in (("position", has_position), ("velocity", has_velocity)) if has
+        ]
+        for name in self._given:
+            self.DeclareVectorInputPort(name, 7)
+        self.DeclareVectorInputPort("fresh", 1)
+        # position, velocity, stop, last command, its age
+        self._state = self.DeclareDiscreteState(np.concatenate([start, np.zeros(8), start, [0.0]]))
+        ticket = {self.discrete_state_ticket(self._state)}
+        for name, rows in (
+            ("desired_state", slice(0, 14)),
+            ("position_commanded", slice(0, 7)),
+            ("velocity_commanded", slice(7, 14)),
+            ("stop", slice(14, 15)),
+        ):
+            self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), ticket)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        values = context.get_discrete_state(self._state).value()
+        given = {name: self.GetInputPort(name).Eval(context) for name in self._given}
+        fresh = self.GetInputPort("fresh")
+        after = follow(
+            DriveState(
+                values[:7], values[7:14], Stop(int(values[14])), values[15:22], float(values[22])
+            ),
+            given.get("position"),
+            given.get("velocity"),
+            not fresh.HasValue(context) or bool(fresh.Eval(context)[0] > 0.5),
+            self._limits,
+            self._period,
+        )
+        discrete.set_value(
+            self._state,
+            np.concatenate(
+                [after.position, after.velocity, [float(after.stop)], after.command, [after.age]]
+            ),
+        )
+
+    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state(self._state).value()[rows])
+
+        return calc

@@ -1,0 +1,147 @@
+"""Looks after what a station hears, and says whether arms may move."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+
+from drake_dress.models.immutable import Immutable
+from drake_dress.models.supervision.supervision import (
+    Patience,
+    SupervisionState,
+    supervise,
+    told,
+)
+from drake_dress.models.supervision.watch import Fault, WatchSettings, WatchState, watch
+from drake_dress.systems.lcm_inbox import Received
+
+# Changes that are remembered, from the first on; a source that flaps must not fill the memory.
+_REMEMBERED = 10_000
+
+
+@dataclass(frozen=True)
+class _Memory(Immutable):
+    watched: tuple[WatchState, ...]
+    supervised: SupervisionState
+
+
+class StationWatch(LeafSystem):
+    """Watches sources of messages; see `models/supervision/`.
+
+    .. pydrake_system::
+
+        name: StationWatch
+        input_ports:
+        - source (one for each, of its name)
+        output_ports:
+        - permission
+        - faults
+        - ended_by
+        - source_valid (one for each)
+        - source_stopped (one for each)
+
+    Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) of each source, flags
+    of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
+    while none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it
+    reports that it does not follow. Beside the ports, `events` tells
+    what changed.
+
+    Args:
+        sources: by name, what is asked of each.
+        patience: with faults.
+        period: of looking, s.
+        wall: whether to take time from this machine's monotonic clock and not from the diagram,
+            which falls behind while a step takes long.
+    """
+
+    def __init__(
+        self,
+        sources: Mapping[str, WatchSettings],
+        patience: Patience,
+        period: float,
+        wall: bool = False,
+    ) -> None:
+        super().__init__()
+        self._wall = wall
+        self.sources = tuple(sources)
+        self._settings = tuple(sources.values())
+        self._patience = patience
+        # what changed, when: s and a line
+        self.events: list[tuple[float, str]] = []
+        count = len(self.sources)
+        self._memory = self.DeclareAbstractState(
+            Value(_Memory((WatchState(),) * count, SupervisionState.of(count)))
+        )
+        for name in self.sources:
+            self.DeclareAbstractInputPort(name, Value(Received()))
+        ticket = {self.abstract_state_ticket(self._memory)}
+
+        def declare(name: str, size: int, of: Callable[[_Memory], list[float]]) -> None:
+            def calc(context: Context, output: BasicVector) -> None:
+                output.SetFromVector(of(context.get_abstract_state(self._memory).get_value()))
+
+            self.DeclareVectorOutputPort(name, size, calc, ticket)
+
+        declare("permission", 1, lambda m: [float(m.supervised.permitted)])
+        declare("faults", count, lambda m: [float(w.fault) for w in m.watched])
+        declare("ended_by", 1, lambda m: [_number(m.supervised.ended_by)])
+        for i, name in enumerate(self.sources):
+            declare(f"{name}_valid", 1, partial(_valid, i))
+            declare(f"{name}_stopped", 1, partial(_stopped, i))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+
+    def _update(self, context: Context, state: State) -> None:
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        now = clock.monotonic() if self._wall else context.get_time()
+        watched = tuple(
+            watch(w, self.get_input_port(i).Eval(context).arrival, now, self._settings[i])
+            for i, w in enumerate(memory.watched)
+        )
+        supervised = supervise(memory.supervised, [w.fault for w in watched], now, self._patience)
+        self._note(memory, watched, supervised, context.get_time())
+        state.get_mutable_abstract_state(self._memory).set_value(_Memory(watched, supervised))
+
+    def _note(
+        self,
+        before: _Memory,
+        watched: tuple[WatchState, ...],
+        supervised: SupervisionState,
+        now: float,
+    ) -> None:
+        lines = [
+            told(self._told(i), w.fault) if w.fault else f"{self._told(i)}: sound"
+            for i, (old, w) in enumerate(zip(before.watched, watched, strict=True))
+            if old.fault != w.fault
+        ]
+        if before.supervised.permitted != supervised.permitted:
+            lines.append("arms may move" if supervised.permitted else "arms hold")
+        if len(self.events) < _REMEMBERED:
+            self.events += [(now, line) for line in lines]
+
+    def _told(self, i: int) -> str:
+        return self.sources[i].replace("_", " ")
+
+    def conclusion(self, context: Context) -> str | None:
+        """Returns why the run ends, in its own context; None while it goes on."""
+        supervised: SupervisionState = (
+            context.get_abstract_state(self._memory).get_value().supervised
+        )
+        i = supervised.ended_by
+        return None if i is None else told(self._told(i), supervised.faults[i])
+
+
+def _valid(i: int, memory: _Memory) -> list[float]:
+    return [float(not memory.watched[i].fault)]
+
+
+def _stopped(i: int, memory: _Memory) -> list[float]:
+    return [float(bool(memory.watched[i].fault & Fault.STOPPED))]
+
+
+def _number(index: int | None) -> float:
+    return -1.0 if index is None else float(index)

@@ -1,0 +1,111 @@
+"""What a log tells of arms, and when a dressing does not count for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import arm_capsules, measure_arms
+from drake_dress.report.log import ArmSample, RunLog, RunLogWriter, Sample
+from drake_dress.report.replay_html import write_replay_html
+from drake_dress.report.summary import SuccessRules, summarize
+from tests.report import synthetic
+
+HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
+STILL = np.zeros(7)
+
+
+def bases(spread: float = 1.0) -> dict[str, np.ndarray]:
+    both = {}
+    for side, y in zip(SIDES, (0.5 * spread, -0.5 * spread), strict=True):
+        both[side] = np.eye(4)
+        both[side][:3, 3] = [-1.3, y, 0.9]
+    return both
+
+
+def summary(
+    path: Path, arm: ArmSample, spread: float = 1.0
+) -> tuple[dict[str, object], list[Sample]]:
+    garment = synthetic.coat()
+    samples = synthetic.dressing(garment)
+    with RunLogWriter(
+        path / "run.h5",
+        garment=garment,
+        scenario_text="",
+        version="",
+        seed=0,
+        radius=np.ones(6),
+        capsule_radius=synthetic.capsules(samples[0].joint_position)[2],
+        bases=bases(spread),
+    ) as writer:
+        for i, sample in enumerate(samples):
+            odd = arm if i == 3 else ArmSample(HOME, STILL, HOME, STILL)
+            both = {"left": odd, "right": ArmSample(HOME, STILL, HOME, STILL)}
+            writer.append(replace(sample, arms=both, clearance=np.zeros(3)))
+    with RunLog.open(path / "run.h5") as log:
+        # the made-up garment goes through the made-up trunk
+        rules = SuccessRules(max_penetration=1.0, max_edge_strain=1.0)
+        return summarize(log, wall_time=1.0, rules=rules), samples
+
+
+def test_arms_at_rest_are_as_placed(tmp_path: Path) -> None:
+    found, _ = summary(tmp_path, ArmSample(HOME, STILL, HOME + 0.001, STILL))
+    assert found["success"] is True, found["reason"]
+    assert found["max_joint_speed_share"] == 0.0
+    assert found["min_joint_margin_rad"] == pytest.approx(
+        np.minimum(HOME - LIMITS.lower, LIMITS.upper - HOME).min()
+    )
+    with RunLog.open(tmp_path / "run.h5") as log:
+        measures = measure_arms(log)
+    assert measures is not None
+    arm = panda(bases()["left"])
+    off = np.linalg.norm(arm.tool_position(HOME + 0.001) - arm.tool_position(HOME))
+    assert measures.off[3, 0] == pytest.approx(off)
+    # 1 m between bases, less what reaches inward
+    assert 0.6 < measures.apart[0] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("arm", "spread", "expected"),
+    [
+        (ArmSample(LIMITS.upper + 0.01, STILL, HOME, STILL), 1.0, "beyond its limits"),
+        (ArmSample(HOME, 1.01 * LIMITS.speed, HOME, STILL), 1.0, "beyond its limits"),
+        (ArmSample(HOME, STILL, HOME, -1.01 * LIMITS.torque), 1.0, "beyond its limits"),
+        (ArmSample(HOME, STILL, HOME, STILL), 0.2, "arms too near"),
+    ],
+)
+def test_a_dressing_by_arms_that_broke_a_rule_is_none(
+    arm: ArmSample, spread: float, expected: str, tmp_path: Path
+) -> None:
+    found, _ = summary(tmp_path, arm, spread)
+    assert found["success"] is False
+    assert expected in str(found["reason"])
+
+
+def test_arms_are_seen_where_their_joints_put_them(tmp_path: Path) -> None:
+    summary(tmp_path, ArmSample(HOME + 0.3, STILL, HOME, STILL))
+    with RunLog.open(tmp_path / "run.h5") as log:
+        first, second, radius = arm_capsules(log, np.array([2, 3]))
+        body = len(log.capsules[2])
+        write_replay_html(log, tmp_path / "replay.html")
+    count = len(radius) // 2
+    placed = SHAPE.placed(panda(bases()["left"]).links(HOME + 0.3))
+    np.testing.assert_allclose(first[1, :count], placed.first)
+    np.testing.assert_allclose(second[1, :count], placed.second)
+    # the other arm did not move
+    np.testing.assert_array_equal(first[0, count:], first[1, count:])
+    assert f'"body": {body},' in (tmp_path / "replay.html").read_text(encoding="utf-8")
+
+
+def test_a_log_without_arms_has_no_such_figures(tmp_path: Path) -> None:
+    garment = synthetic.coat()
+    synthetic.write(tmp_path / "run.h5", garment, synthetic.dressing(garment))
+    with RunLog.open(tmp_path / "run.h5") as log:
+        assert measure_arms(log) is None
+        assert arm_capsules(log, np.arange(3))[0].shape == (3, 0, 3)
+        assert "arm_tracking_mm" not in summarize(log, wall_time=1.0)
