@@ -15,6 +15,8 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from drake_dress.diagrams.lab import OPEN
+
 _ROOT = Path(__file__).parents[2]
 _NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
 _BEGUN = "commands come"
@@ -32,7 +34,7 @@ class Plan:
         rate: simulated seconds per second.
         kill_at: SIGKILL to the run, s after the first command.
         fill_at: when the run's disk is filled, s after the first command.
-        timeout: for all of it, s.
+        timeout: for the lab to open, and then for all of it, s.
         sampled: whether memory is sampled, each second.
     """
 
@@ -112,15 +114,22 @@ def _inside(plan: Plan) -> Outcome:
     }
     # each has a core; libraries that take more slow both
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    process = {
-        name: subprocess.Popen(
+
+    def started(name: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
             [sys.executable, "-m", "drake_dress", *words[name], *_set(sets[name])],
             stdout=files[name],
             stderr=subprocess.STDOUT,
             env=environment,
         )
-        for name in ("lab", "run")
-    }
+
+    process = {"lab": started("lab")}
+    opening = time.monotonic()
+    while OPEN not in (out / "lab.log").read_text() and process["lab"].poll() is None:
+        time.sleep(_POLL)
+        if time.monotonic() - opening > plan.timeout:
+            process["lab"].kill()
+    process["run"] = started("run")
     memory: dict[str, list[float]] = {"lab": [], "run": []}
     begin, begun, filled, sampled = time.monotonic(), None, False, 0.0
     while any(p.poll() is None for p in process.values()):

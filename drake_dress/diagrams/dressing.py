@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.hardware_station import HardwareStation
 from drake_dress.diagrams.station import Station
-from drake_dress.models.control.local_control import LocalController
+from drake_dress.models.control.local_control import LocalController, LocalState
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
@@ -76,11 +77,43 @@ class LocalSetup:
 
 @dataclass(frozen=True)
 class Dressing:
-    """The whole diagram, and the systems that a run asks for results."""
+    """The whole diagram, and of what it is made that a run asks for something.
+
+    Attributes:
+        diagram: the whole.
+        station: with people, arms and garment, or the messages of these.
+        mpc: the global controller.
+        local: the local controller, if there is one.
+    """
 
     diagram: Diagram
     station: Station
     mpc: GlobalMpc
+    local: LocalSetup | None
+
+    def rehearse(
+        self, garment: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Has each controller solve once, so that nothing is compiled when time counts.
+
+        Args:
+            garment: (m,3) of the controller's garment, m.
+            joints: (6,3) of the person, m.
+            stopped: whether to give up.
+        """
+        plan = self.mpc.rehearse(garment, joints, stopped)
+        if plan is None or self.local is None:
+            return
+        still = np.tile(joints, (self.local.joints_count + 1, 1, 1))
+        self.local.controller.solve(
+            LocalState(),
+            plan,
+            garment,
+            self.station.start_grippers,
+            still,
+            self.local.joints_step,
+            0.0,
+        )
 
 
 def make_dressing(
@@ -243,7 +276,7 @@ def make_dressing(
         connect(mpc, "stage", shown, "stage")
     diagram = builder.Build()
     diagram.set_name("dressing")
-    return Dressing(diagram, station, mpc)
+    return Dressing(diagram, station, mpc, local)
 
 
 def is_finished(stage: np.ndarray) -> bool:

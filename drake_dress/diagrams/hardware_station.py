@@ -153,11 +153,13 @@ class HardwareStation(Station):
         watch: of its sources.
         meter: of its commands.
         lcm: its bus, which must live as long.
+        heard: what its sources said first.
     """
 
     watch: StationWatch
     meter: CommandMeter
     lcm: DrakeLcm
+    heard: Heard
 
     def catch_up(self) -> None:
         """Takes what has come while the diagram was made, so that a run begins with the newest."""
@@ -391,7 +393,7 @@ def make_hardware_station(
     grippers = np.stack(
         [arm.tool_position(q) for arm, q in zip(robots.pair.arms, robots.start, strict=True)]
     )
-    return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm)
+    return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm, heard)
 
 
 def _guarded(

@@ -57,6 +57,8 @@ from drake_dress.systems.point_messages import PointSender
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.station_watch import StationWatch
 
+# Is said when statuses come.
+OPEN = "the lab is open"
 _CHUNK = 0.05
 # What pictures are taken of.
 _PICTURED = ("cheat_plant_state", "cheat_garment_position")
@@ -114,7 +116,6 @@ def run_lab(scenario: Scenario, source: Path, out: Path, realtime_rate: float = 
         bases=arm_bases(station.robots),
     ) as writer:
         lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
-        print(f"the lab is open: {url}", flush=True)
         heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer)
     if not heard:
         (out / "run.h5").unlink()
@@ -335,7 +336,6 @@ def _play(
     """
     simulator = Simulator(lab.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
-    simulator.Initialize()
     root = simulator.get_context()
     at = lab.player.GetMyContextFromRoot(root)
     station = lab.station.diagram
@@ -346,9 +346,14 @@ def _play(
     events: list[tuple[float, str]] = []
     ended: str | None = None
     with caught_interrupt() as interrupt:
+        simulator.Initialize()
         while not interrupt.is_set() and ended is None:
             now += _CHUNK
             simulator.AdvanceTo(now)
+            if now == _CHUNK:
+                # not before: the very first step anywhere may take a minute, to compile kernels
+                print(f"{OPEN}: {scenario.station.hardware.lcm_url}", flush=True)
+                simulator.ResetStatistics()
             since = float(lab.player.GetOutputPort("since").Eval(at)[0])
             idle = float(lab.player.GetOutputPort("idle").Eval(at)[0])
             if since < 0.0:

@@ -161,8 +161,10 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
     """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
     simulator = Simulator(dressing.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
-    if isinstance(dressing.station, HardwareStation):
-        dressing.station.catch_up()
+    if isinstance(dressing.station, HardwareStation) and not _made_ready(
+        dressing, dressing.station
+    ):
+        return Ending(interrupted=True)
     simulator.Initialize()
     context = dressing.mpc.GetMyContextFromRoot(simulator.get_context())
     stage_port = dressing.mpc.GetOutputPort("stage")
@@ -203,6 +205,16 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
             if now - done_since >= _STAY:
                 break
         return Ending(interrupt.is_set(), fault)
+
+
+def _made_ready(dressing: Dressing, station: HardwareStation) -> bool:
+    """Has controllers solve once and takes what comes meanwhile; returns whether to go on."""
+    with caught_interrupt() as interrupt:
+        print("rehearsing: each controller solves once", flush=True)
+        garment, joints = station.heard.garment, station.heard.person
+        dressing.rehearse(garment, joints, interrupt.is_set)
+        station.catch_up()
+        return not interrupt.is_set()
 
 
 def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:

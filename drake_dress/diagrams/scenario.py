@@ -423,7 +423,7 @@ class Lab:
 
     faults: list[LabFault] = field(default_factory=list)
     stale_command: float = 0.1  # age of commands at which arms stop by themselves, s
-    wait: float = 60.0  # for the first command, s
+    wait: float = 300.0  # for the first command, s
     rest: float = 3.0  # after the last command, before the lab closes, s
     push: float = 60.0  # of a fault of kind push, N
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,6 +20,8 @@ from drake_dress.systems.apart import Apart
 
 # Between looks for a plan where the world does not wait, s.
 _LOOKING_PERIOD = 0.01
+# Between looks whether to give up a rehearsal, s.
+_REHEARSAL_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,45 @@ class GlobalMpc(LeafSystem):
         else:
             self.DeclarePeriodicUnrestrictedUpdateEvent(_LOOKING_PERIOD, 0.0, self._look)
 
+    def rehearse(
+        self, x: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool]
+    ) -> GlobalPlan | None:
+        """Returns a plan of where a run begins, of which the run does not know.
+
+        The first solve anywhere may take a minute, in which its kernels are compiled.
+
+        Args:
+            x: (m,3) of the controller's garment, m.
+            joints: (6,3) where they stay, m.
+            stopped: whether to give up; None is returned then.
+        """
+        p = self._policy.parameters
+        solving = self._submit(
+            self._policy.initial_state(),
+            x,
+            np.zeros_like(x),
+            np.tile(joints, (p.horizon + 1, 1, 1)),
+            0.0,
+            round(self._period / p.time_step),
+        )
+        while not wait([solving], _REHEARSAL_STEP).done:
+            if stopped():
+                return None
+        return self._plan_of(solving.result(), 0.0)
+
+    def _plan_of(self, finished: _Finished, start: float) -> GlobalPlan:
+        """Returns the plan from the end of its committed steps on, which is at `start`."""
+        decision, p = finished.decision, self._policy.parameters
+        first = p.committed_steps
+        return GlobalPlan(
+            start,
+            p.time_step,
+            decision.plan.velocity[first:],
+            decision.plan.armhole[first - 1 :],
+            decision.assignment,
+            finished.joints[first:] if p.plans else None,
+        )
+
     def _begin(self, context: Context, state: State) -> None:
         if self._pending is not None:
             return
@@ -172,17 +213,8 @@ class GlobalMpc(LeafSystem):
             return
         finished = self._pending.result()
         self._pending = None
-        decision = finished.decision
-        p = self._policy.parameters
-        first = p.committed_steps
-        plan = GlobalPlan(
-            context.get_time() if self._waits else self._begun_at + self._delay,
-            p.time_step,
-            decision.plan.velocity[first:],
-            decision.plan.armhole[first - 1 :],
-            decision.assignment,
-            finished.joints[first:] if p.plans else None,
-        )
+        now = context.get_time()
+        plan = self._plan_of(finished, now if self._waits else self._begun_at + self._delay)
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)
         shown = context.get_discrete_state(self._shown).value()
@@ -191,7 +223,7 @@ class GlobalMpc(LeafSystem):
             np.concatenate(
                 [
                     [float(s) for s in stages],
-                    decision.target[-1].ravel(),
+                    finished.decision.target[-1].ravel(),
                     [finished.solve_time, shown[9] + 1.0, self._begun_at],
                 ]
             )

@@ -23,7 +23,7 @@ def test_a_run_drives_a_lab_of_another_process(tmp_path: Path) -> None:
             SCENARIO,
             str(tmp_path),
             ["plant.spacing=0.05", "controller.spacing=0.06", "duration=4", "lab.rest=1.0"],
-            timeout=120.0,
+            timeout=400.0,
         )
     )
     assert (done.run_status, done.lab_status) == (1, 1), done.run_words + done.lab_words

@@ -25,6 +25,9 @@ from drake_dress.models.cloth.vectors import add, dot, turn
 FREE, STICK, SLIP, HELD = 0, 1, 2, 3
 # Weight of motion across the cloth beside P⁻¹ in the preconditioner: smooth motion is in both.
 _ACROSS = 0.3
+# Of the residual at the start, what rounding leaves over. Where all but nothing drives the free
+# part by itself, a tolerance of that is beyond it, and what iterations go on with is noise.
+_ROUNDING = 1e-12
 
 
 class SystemMatrix:
@@ -93,6 +96,8 @@ class SystemMatrix:
         across: tuple[FloatArray, FloatArray] | None = None,
     ) -> tuple[int, float]:
         """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
+
+        Or until ‖r‖ is what rounding leaves of it; the tolerance counts as met then, too.
 
         `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
         stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
@@ -279,8 +284,9 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     left = dot(residual, preconditioned)
     rho = left + _go_across(facing, give, mode, normal, residual, preconditioned)
     direction[:] = preconditioned
+    goal = max(tolerance * tolerance * floor, _ROUNDING * _ROUNDING * left)
     iterations = 0
-    while iterations < max_iterations and left > tolerance * tolerance * floor:
+    while iterations < max_iterations and left > goal:
         _apply(operator, direction, product)
         _resist(resistance, direction, product)
         project(product, mode, normal)
@@ -298,7 +304,8 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
         turn(direction, beta, preconditioned)
         iterations += 1
     z[:] = solution[:, :3]
-    return iterations, np.sqrt(max(left, 0.0) / floor)
+    relative = np.sqrt(max(left, 0.0) / floor)
+    return iterations, min(relative, tolerance) if left <= goal else relative
 
 
 @nb.njit(cache=True, nogil=True)

@@ -104,6 +104,31 @@ def test_solution_is_that_of_the_free_motions(helped, resisted):
     np.testing.assert_allclose(z.ravel(), expected, atol=1e-8 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("drive", [0.0, 1e-18])
+def test_what_nothing_but_prescribed_motion_drives_is_solved(drive):
+    """A right-hand side of rounding errors alone: no tolerance of it can be met, nor need be."""
+    s = System(3)
+    mode = np.zeros(s.n, dtype=np.int32)
+    mode[:6], mode[6:42] = HELD, SLIP
+    normal = s.rng.normal(size=(s.n, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    start = np.zeros((s.n, 3))
+    start[:6] = [0.0, 0.0, 0.1]
+    rhs = drive * s.rng.normal(size=(s.n, 3))
+    factor = s.symbolic.factorize(mode == HELD)
+    found = []
+    for most in (100, 1000):
+        z = start.copy()
+        iterations, residual = s.system.solve(
+            factor, s.block, mode, normal, rhs, z, 1e-6, most, None, s.across
+        )
+        assert iterations < 100
+        assert residual <= 1e-6
+        found.append(z)
+    np.testing.assert_array_equal(*found)
+    assert 0.05 < np.abs(found[0]).max() < 0.2
+
+
 def test_motion_across_the_cloth_costs_fewer_iterations():
     s = System(2)
     mode = np.zeros(s.n, dtype=np.int32)
