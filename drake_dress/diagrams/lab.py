@@ -346,12 +346,13 @@ def _play(
     events: list[tuple[float, str]] = []
     ended: str | None = None
     with caught_interrupt() as interrupt:
+        # before statuses are sent: what steps first anywhere may take a minute, to be compiled
+        lab.station.cloth.rehearse(lab.station.cloth.GetMyContextFromRoot(root))
         simulator.Initialize()
         while not interrupt.is_set() and ended is None:
             now += _CHUNK
             simulator.AdvanceTo(now)
             if now == _CHUNK:
-                # not before: the very first step anywhere may take a minute, to compile kernels
                 print(f"{OPEN}: {scenario.station.hardware.lcm_url}", flush=True)
                 simulator.ResetStatistics()
             since = float(lab.player.GetOutputPort("since").Eval(at)[0])

@@ -12,6 +12,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
@@ -19,6 +20,9 @@ from drake_dress.models.effects.mounts import Mounts, MountState, displaced, lim
 from drake_dress.models.human.body import Capsule
 
 FloatArray = np.ndarray
+
+# By which a rehearsal lets the garment into the person, m.
+_REHEARSED_DEPTH = 2e-3
 
 
 class ClothPlant(LeafSystem):
@@ -141,13 +145,27 @@ class ClothPlant(LeafSystem):
         velocity = twist[:, 3:] + np.cross(omega, to_a)
         return Obstacles(origin + to_a, origin + to_b, self._radius, velocity, omega)
 
+    def rehearse(self, context: Context) -> None:
+        """Steps the garment as it would lie on the person, so that nothing is compiled later."""
+        bodies = self.obstacles(context)
+        if not bodies.count:
+            return
+        near = find_proximity(self.start_position, bodies, self.cloth.material.margin)
+        first = int(np.argmin(near.gap))
+        down = (near.gap[first] + _REHEARSED_DEPTH) * near.normal[first]
+        state = ClothState.at_rest(self.start_position - down)
+        still = np.zeros((len(self.cloth.held), 3))
+        for _ in range(2):
+            state, _ = self.cloth.step(state, bodies, still)
+
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         n, h = self._n, self.cloth.time_step
+        # copies: of what may not be written, kernels would be compiled once more
         state = ClothState(
-            context.get_discrete_state(self._x).value().reshape(n, 3),
-            context.get_discrete_state(self._v).value().reshape(n, 3),
+            context.get_discrete_state(self._x).value().reshape(n, 3).copy(),
+            context.get_discrete_state(self._v).value().reshape(n, 3).copy(),
             context.get_discrete_state(self._mode).value().astype(np.int32),
-            context.get_discrete_state(self._reaction).value().reshape(n, 3),
+            context.get_discrete_state(self._reaction).value().reshape(n, 3).copy(),
             context.get_discrete_state(self._owner).value().astype(np.int32),
         )
         held = state.x[self.cloth.held]
