@@ -177,7 +177,8 @@ def _lab_facts(
     if not speed[(time > 0.5) & (time < start)].max(initial=0.0) > 0.03:
         wrong.append("nothing moved before the fault")
     end = time[-1] if kind in ("killed", "disk_full") or stated.ends else start + lasting
-    during = (time >= start) & (time <= end)
+    # what is looked ahead at must not be what comes after the fault
+    during = (time >= start) & (time <= end - STILL_OVER)
     moving = time[during & (speed > STILL)]
     held = float(moving.max() - start) if len(moving) else 0.0
     if stated.within is not None and held > stated.within:

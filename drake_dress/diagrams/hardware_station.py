@@ -188,7 +188,10 @@ def status_fault(message: Any) -> Fault:
     if message.num_joints != len(LIMITS.lower):
         return Fault.WRONG_SIZE
     fault = joint_fault(*given, LIMITS)
-    return fault | Fault.STOPPED if message.robot_mode in _STOPPED_MODES else fault
+    if message.robot_mode in _STOPPED_MODES:
+        fault |= Fault.STOPPED
+    # idle, it takes up commands that go on from where it is
+    return fault | Fault.IDLE if message.robot_mode == lcmt_panda_status.kIdle else fault
 
 
 def _image_fault(message: Any) -> Fault:
@@ -259,7 +262,8 @@ def listen(
         if name in first:
             return
         message, fault = sources[name].decoder(raw)
-        if fault:
+        # before the first command, an arm is idle
+        if fault & ~Fault.IDLE:
             wrong[name] = fault
         else:
             first[name] = message

@@ -17,7 +17,7 @@ from drake_dress.models.supervision.supervision import (
     supervise,
     told,
 )
-from drake_dress.models.supervision.watch import Fault, WatchSettings, WatchState, watch
+from drake_dress.models.supervision.watch import TELLING, WatchSettings, WatchState, watch
 from drake_dress.systems.lcm_inbox import Received
 
 # Changes that are remembered, from the first on; a source that flaps must not fill the memory.
@@ -140,7 +140,7 @@ def _valid(i: int, memory: _Memory) -> list[float]:
 
 
 def _stopped(i: int, memory: _Memory) -> list[float]:
-    return [float(bool(memory.watched[i].fault & Fault.STOPPED))]
+    return [float(bool(memory.watched[i].fault & TELLING))]
 
 
 def _number(index: int | None) -> float:

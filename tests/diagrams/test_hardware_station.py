@@ -273,6 +273,25 @@ def test_arms_stop_by_themselves_when_commands_end() -> None:
         assert speed[(since > 1.2) & (since < 1.7)].max() < 0.02
 
 
+def test_an_arm_whose_commands_went_astray_meanwhile_follows_again() -> None:
+    """A driver takes up only commands that begin where it holds."""
+    pair = Pair(LabFault("bus_lost", "", 0.8, 0.6))
+    pair.run(1.2)
+    controller = pair.dressing.diagram.GetSubsystemByName("arm_controller")
+    context = controller.GetMyMutableContextFromRoot(pair.root)
+    commands = context.get_mutable_discrete_state(0)
+    commands.SetAtIndex(7 + 3, commands.GetAtIndex(7 + 3) + 0.06)
+    rows = pair.run(2.0)
+    limits_are_kept(rows)
+    assert pair.conclusion() is None
+    for side in SIDES:
+        stop = np.array([r[f"{side}_stop"][0] for r in rows])
+        assert Stop.ENDED in stop
+        assert stop[-1] == Stop.NONE
+    speed = [np.linalg.norm(r["right_gripper"]) for r in rows[-60:]]
+    assert max(speed) > 0.01
+
+
 def test_a_run_does_not_start_from_elsewhere() -> None:
     scenario = load()
     meshes, _ = garments(scenario, SOURCE)

@@ -133,12 +133,16 @@ def test_a_message_that_cannot_be_true_does_not_get_through(
     np.testing.assert_array_equal(seen, HOME)
 
 
-def test_an_arm_in_reflex_tells_where_it_is_and_that_it_does_not_follow() -> None:
+@pytest.mark.parametrize(
+    ("mode", "fault"),
+    [(lcmt_panda_status.kReflex, Fault.STOPPED), (lcmt_panda_status.kIdle, Fault.IDLE)],
+)
+def test_an_arm_that_does_not_follow_tells_so_and_where_it_is(mode: int, fault: Fault) -> None:
     ear = Ear()
     message = status(9, HOME + 0.01)
-    message.robot_mode = lcmt_panda_status.kReflex
+    message.robot_mode = mode
     received, seen = ear.hear(message.encode())
-    assert received.arrival.fault is Fault.STOPPED
+    assert received.arrival.fault is fault
     np.testing.assert_array_equal(seen, HOME + 0.01)
 
 

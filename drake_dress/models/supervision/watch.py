@@ -24,6 +24,7 @@ class Fault(IntFlag):
     JOINT_LIMIT = 64  # a joint outside what its maker allows
     SPEED_LIMIT = 128  # a joint faster than that
     STOPPED = 256  # the source itself reports that it does not follow
+    IDLE = 512  # it reports that it follows no command yet, or no longer
 
 
 # After these nothing that follows can be put in order: the run ends.
@@ -31,7 +32,7 @@ FATAL = Fault.TIME_BACK | Fault.CLOCK_JUMP | Fault.JOINT_LIMIT | Fault.SPEED_LIM
 
 
 # With these a message still tells where its source is.
-TELLING = Fault.STOPPED
+TELLING = Fault.STOPPED | Fault.IDLE
 
 
 @dataclass(frozen=True)
