@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from drake_dress.models.cloth.contact.detection import known_contacts
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -100,6 +101,8 @@ class GarmentWithEffects:
         self._forces = of_kind(effects, ForceEffect)
         self._frictions = of_kind(effects, FrictionEffect)
         self._stretches = of_kind(effects, StretchEffect)
+        if self._frictions:
+            self._warp_map = _warp_map(self.sheet)
         self._adhesion: FloatArray | None = None
         for cling in of_kind(effects, AdhesionEffect):
             pull = cling.apply(self.sheet)
@@ -136,7 +139,7 @@ class GarmentWithEffects:
             changed["adhesion"] = self._adhesion
         if self._frictions:
             friction = np.full(len(state.x), self.material.friction)
-            sliding = _sliding(self.sheet, self.material.margin, state, obstacles)
+            sliding = _sliding(self._warp_map, self.material.margin, state, obstacles)
             for rub in self._frictions:
                 friction[sliding.nodes] += rub.apply(self.material.friction, sliding)
             changed["friction"] = np.maximum(friction, 0.0)
@@ -191,15 +194,18 @@ def largest_strain(elements: Elements, x: FloatArray) -> FloatArray:
     return strain
 
 
-def _sliding(sheet: Sheet, margin: float, state: ClothState, obstacles: Obstacles) -> Sliding:
+def _sliding(
+    warp_map: sp.csr_array, margin: float, state: ClothState, obstacles: Obstacles
+) -> Sliding:
     nodes = np.flatnonzero(state.owner >= 0).astype(np.int32)
     contacts = known_contacts(state.x, nodes, state.owner[nodes], obstacles, margin)
     relative, force = state.v[nodes] - contacts.surface_velocity, state.reaction[nodes]
+    warp = warp_map[nodes] @ state.x
     return Sliding(
         nodes,
         _tangential(relative, contacts.normal),
         _tangential(force, contacts.normal),
-        _grain(sheet, state.x)[nodes],
+        warp / np.maximum(norms(warp), 1e-300)[:, None],
     )
 
 
@@ -207,15 +213,16 @@ def _tangential(vector: FloatArray, normal: FloatArray) -> FloatArray:
     return vector - np.einsum("ij,ij->i", vector, normal)[:, None] * normal
 
 
-def _grain(sheet: Sheet, x: FloatArray) -> FloatArray:
-    """Returns (n,3) unit directions of the warp at the nodes, as the garment lies at `x`."""
+def _warp_map(sheet: Sheet) -> sp.csr_array:
+    """Returns W (n,n): W x is along the warp at the nodes, weighted by the triangles' areas.
+
+    A triangle's warp is F u, where u, its warp in its own frame, does not change, and F is linear
+    in its corners.
+    """
     e = sheet.elements
     frame = np.einsum("eia,eic->eac", e.triangle_gradient, sheet.rest_position[e.triangle])
     flat = np.einsum("eac,ec->ea", frame, sheet.grain)
-    f = np.einsum("eia,eic->eac", e.triangle_gradient, x[e.triangle])
-    along = np.einsum("eac,ea->ec", f, flat) * e.triangle_area[:, None]
-    grain = np.zeros_like(x)
-    for corner in range(3):
-        np.add.at(grain, e.triangle[:, corner], along)
-    unit: FloatArray = grain / np.maximum(norms(grain), 1e-300)[:, None]
-    return unit
+    weight = np.einsum("eia,ea,e->ei", e.triangle_gradient, flat, e.triangle_area)
+    row, column = np.repeat(e.triangle, 3, axis=1), np.tile(e.triangle, (1, 3))
+    entries = (np.tile(weight, (1, 3)).ravel(), (row.ravel(), column.ravel()))
+    return sp.csr_array(entries, shape=(e.node_count, e.node_count))
