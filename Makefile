@@ -10,8 +10,11 @@ setup: $(VENV)/.installed
 demo: setup
 	$(BIN)/drake-dress run scenarios/dummy_standing.yaml
 
+# One thread for each of the processes side by side; what meets in real time runs by itself.
 test: $(VENV)/.installed-test lint
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m 'not alone' \
+	    --numprocesses logical --maxprocesses 4 --dist worksteal
+	$(BIN)/python -m pytest -m alone
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

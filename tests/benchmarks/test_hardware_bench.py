@@ -13,6 +13,7 @@ from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
 
 SCENARIO = "scenarios/lab.yaml"
+pytestmark = pytest.mark.alone
 needs_network = pytest.mark.skipif(not available(), reason="no right to a network namespace")
 
 
