@@ -78,7 +78,8 @@ class Sample:
         gripper_force: side to (3,) of the garment on the gripper, N.
         dressing: side to (s, l in m, theta in rad).
         stage: (2,) 0 prepare, 1 dress, 2 done; left, right.
-        global_solve_time, local_solve_time: s; NaN where no solve ended.
+        global_solve_time, local_solve_time: of the last solve, s; NaN where none ended.
+        global_solves, local_solves: that ended since the sample before; None: as many as times.
         estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
         estimate_joint_position: (6,3), m; None where it has none.
         capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
@@ -100,6 +101,8 @@ class Sample:
     stage: npt.ArrayLike
     global_solve_time: float = np.nan
     local_solve_time: float = np.nan
+    global_solves: int | None = None
+    local_solves: int | None = None
     estimate_garment_position: npt.ArrayLike | None = None
     estimate_joint_position: npt.ArrayLike | None = None
     capsule_a: npt.ArrayLike | None = None
@@ -197,6 +200,7 @@ class RunLogWriter:
         self._series["/control/safety"].attrs["flags"] = [f"{v.value} {v.name}" for v in Verdict]
         for name in ("global", "local"):
             self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
+            self._add(f"/control/{name}/solves", (), "1", dtype="i2")
         self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
         self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
         if bases is not None:
@@ -291,6 +295,11 @@ class RunLogWriter:
             "/control/global/solve_time": sample.global_solve_time,
             "/control/local/solve_time": sample.local_solve_time,
         }
+        for name, solves, spent in (
+            ("global", sample.global_solves, sample.global_solve_time),
+            ("local", sample.local_solves, sample.local_solve_time),
+        ):
+            rows[f"/control/{name}/solves"] = np.isfinite(spent) if solves is None else solves
         for side in SIDES:
             rows[f"/gripper/{side}/position"] = sample.gripper_position[side]
             rows[f"/gripper/{side}/force"] = sample.gripper_force[side]
@@ -586,6 +595,16 @@ class RunLog:
         name = f"/control/{controller}/solve_time"
         return self._read(name) if name in self.file else np.full(len(self), np.nan)
 
+    def solves(self, controller: str) -> npt.NDArray[np.int64]:
+        """Returns (T,) how many solves of it ended since the sample before.
+
+        A log of before they were counted says one where there is a time.
+        """
+        name = f"/control/{controller}/solves"
+        if name not in self.file:
+            return np.isfinite(self.solve_time(controller)).astype(np.int64)
+        return np.asarray(self.file[name], dtype=np.int64)
+
     def _read(self, name: str) -> FloatArray:
         return np.asarray(self.file[name], dtype=np.float64)
 
@@ -643,6 +662,8 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
     "/control/safety": ("T", 2),
     "/control/global/solve_time": ("T",),
     "/control/local/solve_time": ("T",),
+    "/control/global/solves": ("T",),
+    "/control/local/solves": ("T",),
 }
 
 

@@ -103,7 +103,9 @@ def summarize(
     for name in ("global", "local"):
         solve = log.solve_time(name)
         solve = solve[np.isfinite(solve)]
-        summary[f"{name}_rate_hz"] = len(solve) / duration if duration > 0.0 else None
+        summary[f"{name}_rate_hz"] = (
+            float(log.solves(name).sum()) / duration if duration > 0.0 else None
+        )
         summary[f"{name}_solve_ms"] = {
             "median": 1e3 * float(np.median(solve)) if len(solve) else None,
             "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,

@@ -177,6 +177,8 @@ class RunRecorder(LeafSystem):
         arms = None
         if self._has_arms:
             arms = {side: ArmSample(*(value(f"{side}_arm_{n}") for n in _OF_ARM)) for side in SIDES}
+        spent, solves = self._ended(context, "solve_time")
+        local_spent, local_solves = self._ended(context, "local_solve_time")
         self._writer.append(
             Sample(
                 time=context.get_time() - self._begun,
@@ -191,8 +193,10 @@ class RunRecorder(LeafSystem):
                 dressing=dressing,
                 stage=value("stage") if self._has_control else np.zeros(2),
                 safety=verdict,
-                global_solve_time=self._ended(context, "solve_time"),
-                local_solve_time=self._ended(context, "local_solve_time"),
+                global_solve_time=spent,
+                local_solve_time=local_spent,
+                global_solves=solves,
+                local_solves=local_solves,
                 estimate_garment_position=value("estimated_position").reshape(-1, 3),
                 estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
                 capsule_a=capsule_a,
@@ -212,11 +216,14 @@ class RunRecorder(LeafSystem):
             np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
         )
 
-    def _ended(self, context: Context, name: str) -> float:
-        """Returns the time of the last solve, s; NaN if none ended since the sample before."""
+    def _ended(self, context: Context, name: str) -> tuple[float, int]:
+        """Returns the last solve's time, s, and how many ended since the sample before.
+
+        The time is NaN where none did.
+        """
         if not self._has_control or (name == "local_solve_time" and not self._has_local):
-            return np.nan
+            return np.nan, 0
         spent, count = self.GetInputPort(name).Eval(context)
-        ended = count > self._solves[name]
+        ended = round(count - self._solves[name])
         self._solves[name] = float(count)
-        return float(spent) if ended else np.nan
+        return (float(spent) if ended > 0 else np.nan), max(ended, 0)

@@ -97,6 +97,7 @@ def dressing(
                 stage=np.where(on >= 1.9, 2, np.where(on > 0.5, 1, 0)),
                 global_solve_time=0.3 if i % 5 == 0 else np.nan,
                 local_solve_time=0.004,
+                local_solves=3,
                 estimate_garment_position=position,
                 estimate_joint_position=joints,
                 capsule_a=a,

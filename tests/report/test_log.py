@@ -60,6 +60,10 @@ def test_what_is_read_is_what_was_written(path, garment, samples):
         np.testing.assert_array_equal(
             log.solve_time("global"), [s.global_solve_time for s in samples]
         )
+        np.testing.assert_array_equal(
+            log.solves("global"), [np.isfinite(s.global_solve_time) for s in samples]
+        )
+        np.testing.assert_array_equal(log.solves("local"), [3 for _ in samples])
 
 
 def test_layout_is_the_published_one(path, garment, samples):
@@ -77,6 +81,8 @@ def test_layout_is_the_published_one(path, garment, samples):
         "control/safety": (count, 2),
         "control/global/solve_time": (count,),
         "control/local/solve_time": (count,),
+        "control/global/solves": (count,),
+        "control/local/solves": (count,),
         "estimate/garment/position": (count, n, 3),
         "estimate/human/joint_position": (count, 6, 3),
     }

@@ -74,6 +74,8 @@ def test_coat_that_is_on_succeeds(summary_of, garment, tmp_path):
         "p99": pytest.approx(300.0),
     }
     assert summary["global_rate_hz"] == pytest.approx(0.5)
+    # three between two samples, though only the last one's time is kept
+    assert summary["local_rate_hz"] == pytest.approx(0.3 * len(_dressed(garment)))
     # s of the right sleeve reaches 1.9 at (1.9 + 0.3) / 2.4 of ten seconds
     assert summary["dressing_time_s"] == pytest.approx(9.5)
     write_summary(summary, tmp_path / "summary.json")
