@@ -244,6 +244,10 @@ class Weights:
     corridor: float = 3.0  # on cloth that hangs ahead of a hand that is to go in
     corridor_radius: float = 0.06  # m
     corridor_length: float = 0.12  # m
+    passage: float = 3.0  # on cloth that would cross the forearm if the hand were in the armhole
+    passage_radius: float = 0.06  # m
+    passage_length: float = 0.25  # m
+    passage_growth: float = 0.0  # of the radius per length up the forearm, m/m
 
 
 @dataclass

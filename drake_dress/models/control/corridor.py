@@ -1,7 +1,10 @@
-"""The way that a hand goes on along its forearm: what of the garment hangs in it.
+"""The way that a hand goes on along its forearm, and the place that a forearm takes then.
 
 A panel or a rim before a hand is met by it, folds up and takes the opening along. How far nodes
 stand in a cylinder ahead of the hand is a cost that says so before they touch, with a derivative.
+The same cylinder from the armhole back up the forearm, as it would lie with the hand in the
+armhole, tells whether the arm gets in at all: the cloth between armhole and neck lies across a
+steep one, however well the armhole faces the hand.
 """
 
 from __future__ import annotations
@@ -30,7 +33,12 @@ class Corridor:
 
 
 def corridor_cost(
-    x: FloatArray, hand: FloatArray, into: FloatArray, radius: float, length: float
+    x: FloatArray,
+    hand: FloatArray,
+    into: FloatArray,
+    radius: float,
+    length: float,
+    growth: float = 0.0,
 ) -> tuple[float, FloatArray]:
     """Returns Σ τ (r − ρ)² over the nodes in a cylinder, m², and its derivative (n,3), m.
 
@@ -42,12 +50,14 @@ def corridor_cost(
         into: (3,) unit vector along it.
         radius: r, m.
         length: from the hand on, m.
+        growth: of r per length beyond the hand, m/m: a cone.
     """
     offset = x - hand
     along = offset @ into
     aside = offset - along[:, None] * into
     distance = np.linalg.norm(aside, axis=1)
-    within = (distance < radius) & (along > -_BEHIND) & (along < length)
+    wide = radius + growth * np.maximum(along, 0.0)
+    within = (distance < wide) & (along > -_BEHIND) & (along < length)
     slope = np.zeros_like(x)
     nodes = np.flatnonzero(within)
     if not len(nodes):
@@ -57,8 +67,9 @@ def corridor_cost(
     fade = np.minimum(begins, 1.0) * np.minimum(ends, 1.0)
     change = np.where(begins < 1.0, np.minimum(ends, 1.0), 0.0)
     change -= np.where(ends < 1.0, np.minimum(begins, 1.0), 0.0)
-    short = radius - distance[nodes]
+    short = wide[nodes] - distance[nodes]
     outward = aside[nodes] / np.maximum(distance[nodes], 1e-12)[:, None]
     slope[nodes] = (-2.0 * fade * short)[:, None] * outward
-    slope[nodes] += (change / _FADE * short**2)[:, None] * into
+    wider = np.where(along[nodes] > 0.0, growth, 0.0)
+    slope[nodes] += (change / _FADE * short**2 + 2.0 * fade * short * wider)[:, None] * into
     return float(np.sum(fade * short**2)), slope

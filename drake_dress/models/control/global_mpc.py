@@ -52,6 +52,9 @@ class Weights:
         free_clearance: distance of a gripper to the person's skin that costs nothing, m.
         corridor: on what hangs ahead of a hand that is to go in, 1/m²; see corridor.py.
         corridor_radius, corridor_length: of the cylinder ahead of it, m.
+        passage: on what would cross the forearm if the hand were in the armhole now, 1/m².
+        passage_radius, passage_length: of the cone that stands for the forearm, m.
+        passage_growth: of its radius per length, m/m.
     """
 
     position: float = 1.0
@@ -69,6 +72,10 @@ class Weights:
     corridor: float = 3.0
     corridor_radius: float = 0.06
     corridor_length: float = 0.12
+    passage: float = 3.0
+    passage_radius: float = 0.06
+    passage_length: float = 0.25
+    passage_growth: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -81,6 +88,7 @@ class SleeveTarget:
         entering: the direction asked for is that from the armhole to the garment's entry, not the
             armhole's own.
         corridor: ahead of the hand that is to go in, if it is near.
+        passage: (N,3) unit vectors from elbow to hand of the arm that is to go in.
     """
 
     position: FloatArray
@@ -89,6 +97,7 @@ class SleeveTarget:
     direction_weight: float = 1.0
     entering: bool = False
     corridor: Corridor | None = None
+    passage: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -267,6 +276,8 @@ class GlobalController:
                 cost += w.direction * t.direction_weight * float(np.sum((d - t.direction[j]) ** 2))
                 if t.corridor is not None:
                     cost += w.corridor * self._corridor(x, t.corridor, j)[0]
+                if t.passage is not None and w.passage > 0.0:
+                    cost += w.passage * self._passage(x, sleeve.p_c, t.passage[j])[0]
                 force[j, i] = np.linalg.norm(held[self._split[i]].sum(axis=0))
                 cost += w.safety * max(0.0, force[j, i] - w.free_force) ** 2
             sleeves.append((pair[0], pair[1]))
@@ -298,6 +309,13 @@ class GlobalController:
     def _corridor(self, x: FloatArray, way: Corridor, j: int) -> tuple[float, FloatArray]:
         w = self.weights
         return corridor_cost(x, way.hand[j], way.into[j], w.corridor_radius, w.corridor_length)
+
+    def _passage(
+        self, x: FloatArray, center: FloatArray, into: FloatArray
+    ) -> tuple[float, FloatArray]:
+        w = self.weights
+        size = (w.passage_radius, w.passage_length, w.passage_growth)
+        return corridor_cost(x, center, -into, *size)
 
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
         """Returns the cost of grippers close to the person, and its derivative by held nodes."""
@@ -340,6 +358,10 @@ class GlobalController:
                     d_bar = scale * (sleeve.v_c - t.direction[j])
                 if t.corridor is not None:
                     x_bar += w.corridor * self._corridor(rollout.states[j], t.corridor, j)[1]
+                if t.passage is not None and w.passage > 0.0:
+                    crossing = self._passage(rollout.states[j], sleeve.p_c, t.passage[j])[1]
+                    x_bar += w.passage * crossing
+                    p_bar = p_bar - w.passage * crossing.sum(axis=0)
                 loop = self._armholes[i]
                 np.add.at(
                     x_bar,

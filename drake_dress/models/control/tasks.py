@@ -438,8 +438,13 @@ class TaskPlanner:
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
-        if entering and (given.retreat[side] or facts[side].hand_distance > p.near_distance):
+        if entering and given.retreat[side]:
             return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
+        passage = np.stack([-a[side].D(0.0) for a in axes[1:]])
+        if entering and facts[side].hand_distance > p.near_distance:
+            return SleeveTarget(
+                position, direction, direction_weight=way.emphasis, entering=True, passage=passage
+            )
         if entering:
             return SleeveTarget(
                 position,
@@ -448,6 +453,7 @@ class TaskPlanner:
                 p.near_direction * way.emphasis,
                 entering=True,
                 corridor=_ahead([a[side] for a in axes[1:]]),
+                passage=passage,
             )
         return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
 

@@ -38,7 +38,7 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
         (loops[0], loops[1]),
         (signs[0], signs[1]),
         HORIZON,
-        Weights(direction=0.02, safety=1e-3, free_force=0.5),
+        Weights(direction=0.02, safety=1e-3, free_force=0.5, passage=2.0),
         0.15,
         8,
         0.2,
@@ -54,6 +54,7 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
                 np.tile([0.6, 0.0, 0.8], (HORIZON, 1)),
                 entering=i == 1,
                 corridor=_ahead(x[loops[i][0]]) if i == 1 else None,
+                passage=np.tile([0.6, 0.0, -0.8], (HORIZON, 1)) if i == 0 else None,
             )
         )
     return controller, x, (targets[0], targets[1])
@@ -95,6 +96,9 @@ def test_gradient_of_the_plan_matches_finite_differences(
     assert (controller._level_error(controller._apart(x), left, 0) > 0.0) == (span == 1.0)
     assert targets[1].corridor is not None
     assert controller._corridor(x, targets[1].corridor, 0)[0] > 0.0
+    assert targets[0].passage is not None
+    sleeve = rollout.sleeves[0][0]
+    assert controller._passage(rollout.states[0], sleeve.p_c, targets[0].passage[0])[0] > 0.0
     if beside:
         assert controller._clearance(x, person[0])[0] > 0.0
     gradient = controller._gradient(rollout, velocity, targets, person, left)

@@ -234,10 +234,13 @@ def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner
         target = planner.targets(given, [away, away], q, STEP)[0]
         if retreat:
             assert target.corridor is None and target.position_weight == 1.0
+            assert target.passage is None
             continue
         assert target.position_weight == p.near_position
         assert target.corridor is not None
         np.testing.assert_allclose(target.corridor.hand[0], axis.G(0.0))
         np.testing.assert_allclose(target.corridor.into[-1], -axis.D(0.0))
+        assert target.passage is not None
+        np.testing.assert_allclose(target.passage, np.tile(-axis.D(0.0), (HORIZON, 1)))
         onward = np.stack([axis.G((j + 1) * STEP * p.progress_rate) for j in range(HORIZON)])
         assert np.allclose(target.position, onward) == facts.touches
