@@ -299,7 +299,8 @@ class Search:
         for name in [n.name for n in named[:-1]]:
             rest = [e for e in model.effects if e.NAME != name]
             self._stage(f"fitting {', '.join(e.NAME for e in rest)} alone")
-            (leaner,) = self._fits(self._plain, [rest])
+            # about the model: coarse simulations tell what little dropping it changes, not all
+            (leaner,) = self._fits(model, [rest])
             # the refined simulation may better a fit, but not by so much
             if self._gain(leaner, model) > 5.0 * _FURTHER:
                 continue
