@@ -247,7 +247,6 @@ class Weights:
     passage: float = 3.0  # on cloth that would cross the forearm if the hand were in the armhole
     passage_radius: float = 0.06  # m
     passage_length: float = 0.25  # m
-    passage_growth: float = 0.0  # of the radius per length up the forearm, m/m
 
 
 @dataclass

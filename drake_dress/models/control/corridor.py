@@ -33,12 +33,7 @@ class Corridor:
 
 
 def corridor_cost(
-    x: FloatArray,
-    hand: FloatArray,
-    into: FloatArray,
-    radius: float,
-    length: float,
-    growth: float = 0.0,
+    x: FloatArray, hand: FloatArray, into: FloatArray, radius: float, length: float
 ) -> tuple[float, FloatArray]:
     """Returns Σ τ (r − ρ)² over the nodes in a cylinder, m², and its derivative (n,3), m.
 
@@ -50,14 +45,12 @@ def corridor_cost(
         into: (3,) unit vector along it.
         radius: r, m.
         length: from the hand on, m.
-        growth: of r per length beyond the hand, m/m: a cone.
     """
     offset = x - hand
     along = offset @ into
     aside = offset - along[:, None] * into
     distance = np.linalg.norm(aside, axis=1)
-    wide = radius + growth * np.maximum(along, 0.0)
-    within = (distance < wide) & (along > -_BEHIND) & (along < length)
+    within = (distance < radius) & (along > -_BEHIND) & (along < length)
     slope = np.zeros_like(x)
     nodes = np.flatnonzero(within)
     if not len(nodes):
@@ -67,9 +60,8 @@ def corridor_cost(
     fade = np.minimum(begins, 1.0) * np.minimum(ends, 1.0)
     change = np.where(begins < 1.0, np.minimum(ends, 1.0), 0.0)
     change -= np.where(ends < 1.0, np.minimum(begins, 1.0), 0.0)
-    short = wide[nodes] - distance[nodes]
+    short = radius - distance[nodes]
     outward = aside[nodes] / np.maximum(distance[nodes], 1e-12)[:, None]
     slope[nodes] = (-2.0 * fade * short)[:, None] * outward
-    wider = np.where(along[nodes] > 0.0, growth, 0.0)
-    slope[nodes] += (change / _FADE * short**2 + 2.0 * fade * short * wider)[:, None] * into
+    slope[nodes] += (change / _FADE * short**2)[:, None] * into
     return float(np.sum(fade * short**2)), slope

@@ -53,8 +53,7 @@ class Weights:
         corridor: on what hangs ahead of a hand that is to go in, 1/m²; see corridor.py.
         corridor_radius, corridor_length: of the cylinder ahead of it, m.
         passage: on what would cross the forearm if the hand were in the armhole now, 1/m².
-        passage_radius, passage_length: of the cone that stands for the forearm, m.
-        passage_growth: of its radius per length, m/m.
+        passage_radius, passage_length: of the cylinder that stands for the forearm, m.
     """
 
     position: float = 1.0
@@ -75,7 +74,6 @@ class Weights:
     passage: float = 3.0
     passage_radius: float = 0.06
     passage_length: float = 0.25
-    passage_growth: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -314,8 +312,7 @@ class GlobalController:
         self, x: FloatArray, center: FloatArray, into: FloatArray
     ) -> tuple[float, FloatArray]:
         w = self.weights
-        size = (w.passage_radius, w.passage_length, w.passage_growth)
-        return corridor_cost(x, center, -into, *size)
+        return corridor_cost(x, center, -into, w.passage_radius, w.passage_length)
 
     def _clearance(self, x: FloatArray, obstacles: Obstacles) -> tuple[float, FloatArray]:
         """Returns the cost of grippers close to the person, and its derivative by held nodes."""

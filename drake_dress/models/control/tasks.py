@@ -438,22 +438,19 @@ class TaskPlanner:
             position[j], direction[j] = axis.G(s), axis.D(s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
-        if entering and given.retreat[side]:
-            return SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
-        passage = np.stack([-a[side].D(0.0) for a in axes[1:]])
-        if entering and facts[side].hand_distance > p.near_distance:
-            return SleeveTarget(
-                position, direction, direction_weight=way.emphasis, entering=True, passage=passage
-            )
         if entering:
-            return SleeveTarget(
-                position,
-                direction,
-                p.near_position,
-                p.near_direction * way.emphasis,
-                entering=True,
-                corridor=_ahead([a[side] for a in axes[1:]]),
-                passage=passage,
+            target = SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
+            if given.retreat[side]:
+                return target
+            ahead = _ahead([a[side] for a in axes[1:]])
+            target = replace(target, passage=ahead.into)
+            if facts[side].hand_distance > p.near_distance:
+                return target
+            return replace(
+                target,
+                position_weight=p.near_position,
+                direction_weight=p.near_direction * way.emphasis,
+                corridor=ahead,
             )
         return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
 
