@@ -341,9 +341,9 @@ def _fastest(velocity, angular_velocity):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _lend_depth(x, element, shapes, distance, lent):  # type: ignore[no-untyped-def]
     corners = element.shape[1]
-    point = np.empty((1, 3))
-    depth = np.empty(1)
-    who = np.empty(1, dtype=np.int32)
+    near = np.empty(element.shape[0], dtype=np.int32)
+    middle = np.empty((element.shape[0], 3))
+    count = 0
     for e in range(element.shape[0]):
         least = 1e9
         for c in range(corners):
@@ -352,12 +352,17 @@ def _lend_depth(x, element, shapes, distance, lent):  # type: ignore[no-untyped-
         size2 = (x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2 + (x[i, 2] - x[j, 2]) ** 2
         if least > 0.0 and least * least > size2:
             continue
-        point[:] = 0.0
+        for k in range(3):
+            middle[count, k] = 0.0
         for c in range(corners):
             for k in range(3):
-                point[0, k] += x[element[e, c], k] / corners
-        nearest_obstacle(point, shapes, depth, who)
+                middle[count, k] += x[element[e, c], k] / corners
+        near[count] = e
+        count += 1
+    depth = np.empty(count)
+    # all at once: neighbours have the same body next to them
+    nearest_obstacle(middle[:count], shapes, depth, np.empty(count, dtype=np.int32))
+    for q in range(count):
         for c in range(corners):
-            node = element[e, c]
-            if depth[0] < lent[node]:
-                lent[node] = depth[0]
+            node = element[near[q], c]
+            lent[node] = min(lent[node], depth[q])
