@@ -320,6 +320,7 @@ def safety_limits(scenario: schema.Scenario) -> SafetyLimits:
         stop_time=s.stop_time,
         max_lead=s.max_lead,
         stale_time=s.stale_time,
+        person_distance=s.person_distance,
         least_distance=s.least_distance,
         largest_distance=np.inf if largest is None else largest,
         workspace=None if box is None else np.array([box.low, box.high]),

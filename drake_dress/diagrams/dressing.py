@@ -161,7 +161,8 @@ def make_dressing(
     else:
         asking = builder.AddNamedSystem("local_controller", local.system())
     governor = builder.AddNamedSystem(
-        "safety_governor", SafetyGovernor(station.start_grippers, rates.command_period, limits)
+        "safety_governor",
+        SafetyGovernor(station.start_grippers, rates.command_period, limits, policy.person),
     )
 
     def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]
@@ -183,6 +184,7 @@ def make_dressing(
     connect(mpc, "plan", asking, "plan")
     connect(asking, "request_time", governor, "request_time")
     connect(lab, "permission", governor, "permission")
+    connect(lab, "estimate.joint_position", governor, "joint_position")
     for side in SIDES:
         for quantity in ("position", "force"):
             connect(

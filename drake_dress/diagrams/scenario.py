@@ -327,6 +327,7 @@ class Safety:
     stop_time: float = 0.5  # beyond the force limit, after which both grippers stop, s
     max_lead: float = 0.02  # of a command before its gripper, m
     stale_time: float = 0.1  # age at which a request is not obeyed any more, s
+    person_distance: float = 0.03  # of a gripper to the person's skin, m
     least_distance: float = 0.08  # between the grippers, m
     largest_distance: float | None = None  # between the grippers, m; any if empty
     workspace: Workspace | None = None  # everywhere if empty
@@ -622,6 +623,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "safety.stop_time": (0.0, 60.0),
     "safety.max_lead": (0.001, 0.2),
     "safety.stale_time": (0.005, 5.0),
+    "safety.person_distance": (0.0, 0.3),
     "safety.least_distance": (0.0, 1.0),
     "safety.largest_distance": (0.05, 3.0),
     "gripper.max_speed": (0.001, 2.0),

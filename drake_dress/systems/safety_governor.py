@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.control.person_model import PersonModel, person_capsules
 from drake_dress.models.control.safety import (
     GovernorState,
     Measurement,
     Request,
     SafetyLimits,
+    Skin,
     step,
 )
 from drake_dress.models.sides import SIDES
@@ -30,6 +34,7 @@ class SafetyGovernor(LeafSystem):
         - left_gripper_force
         - right_gripper_force
         - permission
+        - joint_position
         output_ports:
         - left_position_command
         - right_position_command
@@ -39,7 +44,8 @@ class SafetyGovernor(LeafSystem):
 
     Requests (3,) m/s in W; request_time (1,) when the controller made both, s, of the diagram's
     clock. Positions (3,) p_WG, m; forces (3,) of the garment on the gripper, N. verdict (2,): of
-    left and right, the flags of `models.control.safety.Verdict` as a number. Outputs are of the
+    left and right, the flags of `models.control.safety.Verdict` as a number. joint_position (18,):
+    shoulder, elbow, hand of left, then right arm in W, m; may be left open. Outputs are of the
     state alone, no feedthrough. Any input may be NaN or infinite.
 
     The law is that of `models/control/safety.py`. The governor integrates its commands itself: it
@@ -49,12 +55,19 @@ class SafetyGovernor(LeafSystem):
         start: (2,3) p_WG of left and right at time 0, m.
         period: of the commands, s.
         limits: which are kept.
+        person: their shape; None: grippers may touch them.
 
     Raises:
         ValueError: the start is outside the limits of place.
     """
 
-    def __init__(self, start: np.ndarray, period: float, limits: SafetyLimits) -> None:
+    def __init__(
+        self,
+        start: np.ndarray,
+        period: float,
+        limits: SafetyLimits,
+        person: PersonModel | None = None,
+    ) -> None:
         super().__init__()
         start = np.asarray(start, dtype=float).reshape(2, 3)
         broken = limits.broken_at(start)
@@ -62,6 +75,7 @@ class SafetyGovernor(LeafSystem):
             raise ValueError(broken)
         self._period = period
         self._limits = limits
+        self._person = person
         self._memory = self.DeclareDiscreteState(GovernorState(start).packed())
         self._verdict = self.DeclareDiscreteState(np.zeros(2))
         for side in SIDES:
@@ -71,6 +85,7 @@ class SafetyGovernor(LeafSystem):
             for side in SIDES:
                 self.DeclareVectorInputPort(f"{side}_gripper_{name}", 3)
         self.DeclareVectorInputPort("permission", 1)
+        self.DeclareVectorInputPort("joint_position", 18)
         ticket = {self.discrete_state_ticket(self._memory)}
         for offset, name in ((0, "position"), (6, "velocity")):
             for i, side in enumerate(SIDES):
@@ -88,8 +103,9 @@ class SafetyGovernor(LeafSystem):
         def of_both(name: str) -> np.ndarray:
             return np.stack([self.GetInputPort(f"{side}_{name}").Eval(context) for side in SIDES])
 
+        memory = GovernorState.unpacked(context.get_discrete_state(self._memory).value())
         state, verdicts = step(
-            GovernorState.unpacked(context.get_discrete_state(self._memory).value()),
+            memory,
             Request(
                 of_both("velocity_request"),
                 float(self.GetInputPort("request_time").Eval(context)[0]),
@@ -99,9 +115,23 @@ class SafetyGovernor(LeafSystem):
             context.get_time(),
             self._period,
             bool(self.GetInputPort("permission").Eval(context)[0] > 0.5),
+            self._skin(context, memory.position),
         )
         discrete.set_value(self._memory, state.packed())
         discrete.set_value(self._verdict, [float(v) for v in verdicts])
+
+    def _skin(self, context: Context, position: np.ndarray) -> Skin | None:
+        """Returns the person next to `position` (2,3), m; None where they are not seen."""
+        joints = self.GetInputPort("joint_position")
+        if self._person is None or not joints.HasValue(context):
+            return None
+        seen = joints.Eval(context).reshape(6, 3)
+        if not np.isfinite(seen).all():
+            return None
+        near = find_proximity(
+            position, Obstacles.resting(*person_capsules(self._person, seen)), 0.0
+        )
+        return Skin(near.gap, near.normal)
 
     def _show(self, rows: slice):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:

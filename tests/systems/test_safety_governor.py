@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
+from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.safety import SafetyLimits, Verdict
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.floating_gripper import FloatingGripper
@@ -17,6 +18,10 @@ PERIOD = 0.01
 START = np.array([[0.0, 0.3, 1.4], [0.0, -0.3, 1.4]])
 LIMITS = SafetyLimits()
 GRIPPER_SPEED = 0.25
+PERSON = PersonModel((), np.array([[0.0, 0.2, 1.4], [0.0, -0.2, 1.4]]), (0.05, 0.04, 0.04))
+# The left hand is ahead of the left gripper; the rest of both arms is far.
+HAND = START[0] + [0.2, 0.0, 0.0]
+JOINTS = np.concatenate([HAND + [0.6, 0.0, 0.0], HAND + [0.3, 0.0, 0.0], HAND, np.full(9, 9.0)])
 
 
 class Clock(LeafSystem):
@@ -49,10 +54,14 @@ def simulate(
     limits: SafetyLimits = LIMITS,
     alive: float = np.inf,
     permission: float = 1.0,
+    joints: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Returns logs of the left gripper, (T,k), at every 2 ms, and of the verdicts."""
     builder = DiagramBuilder()
-    governor = builder.AddSystem(SafetyGovernor(START, PERIOD, limits))
+    governor = builder.AddSystem(SafetyGovernor(START, PERIOD, limits, PERSON))
+    if joints is not None:
+        seen = builder.AddSystem(ConstantVectorSource(joints))
+        builder.Connect(seen.get_output_port(), governor.GetInputPort("joint_position"))
     clock = builder.AddSystem(Clock(alive))
     builder.Connect(clock.get_output_port(), governor.GetInputPort("request_time"))
     allowed = builder.AddSystem(ConstantVectorSource([permission]))
@@ -136,3 +145,19 @@ def test_without_permission_nothing_moves(permission: float) -> None:
     log = simulate([0.1, 0.0, 0.0], 0.0, 0.5, permission=permission)
     np.testing.assert_array_equal(log["command"], np.broadcast_to(START[0], log["command"].shape))
     assert int(log["verdict"][-1][0]) & Verdict.HELD
+
+
+def test_a_gripper_keeps_its_distance_to_the_skin() -> None:
+    limits = replace(LIMITS, person_distance=0.03)
+    log = simulate([0.2, 0.0, 0.0], 0.0, 2.0, limits, joints=JOINTS)
+    ahead = log["command"][:, 0] - START[0, 0]
+    assert 0.125 < ahead.max() <= 0.2 - 0.04 - 0.03 + 1e-9
+    assert int(log["verdict"][-1][0]) & Verdict.PERSON
+
+
+@pytest.mark.parametrize("joints", [None, np.where(np.arange(18) == 4, np.nan, JOINTS)])
+def test_who_is_not_seen_is_no_limit(joints: np.ndarray | None) -> None:
+    limits = replace(LIMITS, person_distance=0.03)
+    log = simulate([0.2, 0.0, 0.0], 0.0, 1.0, limits, joints=joints)
+    assert log["command"][-1, 0] - START[0, 0] > 0.15
+    assert not int(log["verdict"][-1][0]) & Verdict.PERSON

@@ -10,17 +10,19 @@ The new velocity v of a gripper is the point nearest to the request in an inters
     speed          |v| ≤ max_speed
     acceleration   |v - v_last| ≤ max_acceleration dt, or max_braking dt (below)
     force          n·v ≤ c(force, request), n the direction that pulls against the garment
+    person         not nearer to the skin than a distance: slower toward it, or away from it
     distance       of both grippers, least and largest: each closes or opens it by half at most
     workspace      a box
     lead           of the command before the measured gripper
 
 All are balls and half-spaces, and the nearest point is found exactly (`projection.py`). Limits of
-place are kept by stopping in time. Along a direction that stays (workspace, least distance) v obeys
-v dt + v² / (2 max_acceleration) ≤ d, d being what is left, and keeping it never needs more than
-ordinary braking. Where direction turns (lead, largest distance) the whole way to rest is in the
-ball: |p + τ v| ≤ radius, τ = dt + v̂ / (2 max_acceleration), v̂ = |v_last| + max_acceleration dt
-being the largest speed of this step. Braking straight at 3 max_acceleration keeps that from one
-step to the next: the factor of v falls from τ to dt + (1.5 dt + v / 2a) (1 - 3 a dt / v) < τ.
+place are kept by stopping in time. Along a direction that stays (workspace, least distance, a
+person who is still) v obeys v dt + v² / (2 max_acceleration) ≤ d, d being what is left, and
+keeping it never needs more than ordinary braking. Where direction turns (lead, largest distance)
+the whole way to rest is in the ball: |p + τ v| ≤ radius, τ = dt + v̂ / (2 max_acceleration),
+v̂ = |v_last| + max_acceleration dt being the largest speed of this step. Braking straight at
+3 max_acceleration keeps that from one step to the next: the factor of v falls from τ to
+dt + (1.5 dt + v / 2a) (1 - 3 a dt / v) < τ.
 
 Speed and max_braking are never exceeded, whatever the rest asks: v_last is in both balls, so both
 always meet. Beyond max_acceleration, up to max_braking, a gripper brakes only where the limits
@@ -46,6 +48,9 @@ reset by hand: nothing is wrong but the force, which is measured to be gone. Giv
 hard limit comes last in the order above: it leaves no workspace.
 
 Both stop where one must: they hold one garment on one person.
+
+What presses cloth into a person is a gripper, mostly one that a hand reaches for. How the person
+moves is not known here: who comes nearer is let come, and the gripper gives way.
 """
 
 from __future__ import annotations
@@ -62,7 +67,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # A request this many times faster than allowed was not meant: it is in mm/s, or garbage.
 _ABSURD = 10.0
-# Time in which a limit of distance that is broken is made good again, s, no faster than relaxing.
+# Time in which a limit of distance that is broken is made good again, s, no faster than relaxing,
+# or yielding where it is the person's.
 _RETURN_TIME = 0.1
 # Stamps may be off by this, s: rounding of clocks that count periods.
 _CLOCK_ROUNDING = 1e-6
@@ -84,6 +90,7 @@ class Verdict(IntFlag):
     STOPPED = 512  # force was over the hard limit too long
     BRAKING = 1024  # more than max_acceleration was needed
     HELD = 2048  # the station does not permit motion: something it needs is not there
+    PERSON = 4096  # too near to the person's skin
 
 
 @dataclass(frozen=True)
@@ -99,11 +106,12 @@ class SafetyLimits:
         hard_force: from here on there is no pulling, N; beyond, the gripper gives way.
         filter_time: time constant of the force's low-pass, s.
         yield_rate: speed of giving way per force over the hard limit, m/s/N.
-        yield_speed: of giving way at most, m/s.
+        yield_speed: of giving way at most, to a force or a person, m/s.
         relax_speed: of giving way while stopped, and of going back into a distance, m/s.
         stop_time: over the hard limit after which both stop, s.
         max_lead: of the command before the measured position, m, braking included.
         stale_time: age at which a request is not obeyed any more, s.
+        person_distance: of a gripper's command to the person's skin, m. 0: any.
         least_distance: of the grippers' commands, m: hands must not hit each other. 0: any.
         largest_distance: of the same, m, for a garment that may not be drawn wider even if the
             force is measured wrong; inf: any.
@@ -125,6 +133,7 @@ class SafetyLimits:
     stop_time: float = 0.5
     max_lead: float = 0.02
     stale_time: float = 0.1
+    person_distance: float = 0.0
     least_distance: float = 0.0
     largest_distance: float = np.inf
     workspace: FloatArray | None = None
@@ -185,6 +194,19 @@ class Measurement:
 
 
 @dataclass(frozen=True)
+class Skin:
+    """The person next to the commands of left and right gripper.
+
+    Attributes:
+        distance: (2,) m, negative inside.
+        away: (2,3) unit vectors from the nearest point of the skin.
+    """
+
+    distance: FloatArray
+    away: FloatArray
+
+
+@dataclass(frozen=True)
 class GovernorState:
     """What the governor remembers; always finite but for a stamp of -inf.
 
@@ -235,6 +257,7 @@ def step(
     now: float,
     dt: float,
     permitted: bool = True,
+    skin: Skin | None = None,
 ) -> tuple[GovernorState, tuple[Verdict, Verdict]]:
     """Returns the state after `dt`, whose position is the command, and what was cut.
 
@@ -246,6 +269,7 @@ def step(
         now: s; must not go back.
         dt: since the step before, s.
         permitted: whether the station lets grippers move; they yield to force in any case.
+        skin: where the person is seen; finite. None: not seen.
     """
     entries = np.hstack([measured.position, measured.force])
     seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(entries).all(axis=1))
@@ -274,6 +298,8 @@ def step(
         relaxing = stopped and size[i] < limits.hard_force
         if not relaxing:
             spaces.append((Verdict.FORCE, pull))
+        if skin is not None:
+            spaces.append((Verdict.PERSON, _person_limit(skin, i, limits, dt)))
         spaces += _distance_limits(state.position, i, reach, limits, dt)
         spaces += _workspace_limits(state.position[i], limits, dt)
         if seen[i]:
@@ -352,6 +378,15 @@ def _force_limit(
     return HalfSpace(pull, left * max(0.0, float(pull @ wanted)) - giving_way)
 
 
+def _person_limit(skin: Skin, i: int, limits: SafetyLimits, dt: float) -> HalfSpace | None:
+    if limits.person_distance <= 0.0:
+        return None
+    room = float(skin.distance[i]) - limits.person_distance
+    if room < 0.0:
+        return HalfSpace(-skin.away[i], _returning(room, limits.yield_speed))
+    return HalfSpace(-skin.away[i], _stoppable(room, limits, dt))
+
+
 def _distance_limits(
     position: FloatArray, i: int, reach: float, limits: SafetyLimits, dt: float
 ) -> list[tuple[Verdict, Ball | HalfSpace | None]]:
@@ -396,7 +431,7 @@ def _kept_within(
     distance = float(np.linalg.norm(offset))
     if distance <= radius:
         return Ball(-offset / reach, radius / reach)
-    return HalfSpace(offset / distance, _returning(radius - distance, limits))
+    return HalfSpace(offset / distance, _returning(radius - distance, limits.relax_speed))
 
 
 def _time_to_rest(velocity: FloatArray, limits: SafetyLimits, dt: float) -> float:
@@ -409,13 +444,13 @@ def _time_to_rest(velocity: FloatArray, limits: SafetyLimits, dt: float) -> floa
 def _stoppable(room: float, limits: SafetyLimits, dt: float) -> float:
     """Returns the speed from which one stops within `room`, m/s; negative to go back into it."""
     if room < 0.0:
-        return _returning(room, limits)
+        return _returning(room, limits.relax_speed)
     slowed = limits.max_acceleration * dt
     return float(np.sqrt(slowed**2 + 2.0 * limits.max_acceleration * room) - slowed)
 
 
-def _returning(room: float, limits: SafetyLimits) -> float:
-    return max(room / _RETURN_TIME, -limits.relax_speed)
+def _returning(room: float, speed: float) -> float:
+    return max(room / _RETURN_TIME, -speed)
 
 
 def _governed(

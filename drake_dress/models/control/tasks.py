@@ -86,6 +86,8 @@ class TaskParameters:
             direction, m.
         near_position, near_direction: factors on W and Q then.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
+        dressing_position: factor on W once both are: the last centimetres cost less than what the
+            armhole lies askew on the shoulder.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
@@ -129,6 +131,7 @@ class TaskParameters:
     near_position: float = 3.0
     near_direction: float = 0.3
     dressing_direction: float = 0.1
+    dressing_position: float = 4.0
     waiting_reach: float = 0.9
     final_progress: float = 1.99
     largest_lead: float = 0.6
@@ -452,7 +455,8 @@ class TaskPlanner:
                 direction_weight=p.near_direction * way.emphasis,
                 corridor=ahead,
             )
-        return SleeveTarget(position, direction, direction_weight=p.dressing_direction)
+        weight = p.dressing_position if facts[0].linked and facts[1].linked else 1.0
+        return SleeveTarget(position, direction, weight, p.dressing_direction)
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
         """Returns the largest s from which the garment reaches `other` (3,), m (J_w).

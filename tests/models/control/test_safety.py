@@ -12,6 +12,7 @@ from drake_dress.models.control.safety import (
     Measurement,
     Request,
     SafetyLimits,
+    Skin,
     Verdict,
     step,
 )
@@ -46,6 +47,7 @@ class Arms:
         duration: float = DT,
         stamp: float | None = None,
         position: np.ndarray | None = None,
+        wall: float | None = None,
     ) -> np.ndarray:
         """Asks for `duration`; returns (T,2,3) the commands' velocities by their positions."""
         path = [self.state.position]
@@ -60,12 +62,17 @@ class Arms:
                 self.limits,
                 self.time,
                 DT,
+                skin=None if wall is None else self._skin(wall),
             )
             self.time += DT
             self.seen |= self.verdicts[0] | self.verdicts[1]
             self.path.append(self.state.position)
             path.append(self.state.position)
         return np.diff(path, axis=0) / DT
+
+    def _skin(self, wall: float) -> Skin:
+        """Returns a person who is all that lies beyond x = `wall`, m."""
+        return Skin(wall - self.state.position[:, 0], np.tile(-X, (2, 1)))
 
 
 def test_request_within_all_limits_passes_unchanged() -> None:
@@ -294,6 +301,45 @@ def test_grippers_keep_their_distances(sign: float) -> None:
     else:
         assert 0.2 - 1e-12 <= apart.min() < 0.21
     assert Verdict.DISTANCE in arms.seen
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.2])
+def test_a_gripper_stops_before_the_person(aside: float) -> None:
+    arms = Arms(replace(LIMITS, person_distance=0.03))
+    velocity = arms.ask(0.25 * X + aside * Y, duration=2.0, wall=0.2)
+    path = np.array(arms.path)
+    assert 0.165 < path[-1, 0, 0] <= 0.17 + 1e-12
+    assert path[:, :, 0].max() <= 0.17 + 1e-12
+    change = np.linalg.norm(np.diff(velocity, axis=0), axis=2).max()
+    assert change <= LIMITS.max_acceleration * DT + 1e-9
+    np.testing.assert_allclose(velocity[-1, :, 1], aside, atol=1e-9)
+    assert Verdict.PERSON in arms.seen
+    assert Verdict.BRAKING not in arms.seen
+
+
+def test_a_gripper_gives_way_to_a_person_who_comes() -> None:
+    arms = Arms(replace(LIMITS, person_distance=0.03))
+    nearest = []
+    for k in range(300):
+        wall = 0.2 - 0.08 * k * DT
+        arms.ask(NOTHING, wall=wall)
+        nearest.append(wall - arms.state.position[:, 0].max())
+    # it goes as fast as they come where what is lacking over the time to make it good is that speed
+    assert 0.02 < min(nearest) < 0.03
+    assert arms.state.velocity[0, 0] == pytest.approx(-0.08, abs=2e-3)
+
+
+def test_a_force_over_the_limit_counts_more_than_the_distance_to_the_person() -> None:
+    arms = Arms(replace(LIMITS, person_distance=0.03))
+    velocity = arms.ask(NOTHING, force=(LIMITS.hard_force + 4.0) * X, duration=0.3, wall=0.02)
+    np.testing.assert_allclose(velocity[-1, :, 0], 4.0 * LIMITS.yield_rate, rtol=1e-6)
+
+
+def test_without_a_distance_to_keep_a_person_is_touched() -> None:
+    arms = Arms()
+    arms.ask(0.25 * X, duration=1.0, wall=0.1)
+    assert arms.state.position[0, 0] > 0.2
+    assert Verdict.PERSON not in arms.seen
 
 
 def test_state_survives_being_packed() -> None:
