@@ -43,15 +43,24 @@ class Approach:
         share: of the direction in which an armhole is drawn over the hand.
         orientation: of the direction from the armhole to the garment's entry.
         emphasis: factor on Q.
+        tilt: how much of the forearm's slope the latter direction has. The garment turns about the
+            vertical as far as it is asked to; turned up toward a steep forearm it hangs on edge.
     """
 
     share: float
     orientation: float
     emphasis: float = 1.0
+    tilt: float = 1.0
 
     def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector along which an armhole is drawn over the hand."""
         return _between(_inward(to, side), axis.D(0.0), self.share)
+
+    def entry(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
+        """Returns the unit vector from an armhole to the garment's entry, as it is asked for."""
+        forearm = axis.D(0.0) * np.array([1.0, 1.0, self.tilt])
+        forearm /= np.linalg.norm(forearm)
+        return _between(_inward(to, side), forearm, self.orientation)
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,10 @@ class TaskParameters:
         tethered_approach_distance: the same with the other sleeve on, m.
         approach_slope: l_h per distance beside the line of approach; 1 as printed.
         approaches: how a hand is gone about; after each attempt that missed it the next, in turn.
-        tethered_approaches: the same with the other sleeve on.
+            The first is tried first, but the second for a flat forearm, the third for a steep one.
+        tethered_approaches: the same with the other sleeve on, begun with the first.
+        flat, steep: level part of a forearm's direction from which on it is flat; up to which it
+            is steep.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
@@ -103,8 +115,9 @@ class TaskParameters:
     approach_slope: float = 3.0
     approaches: tuple[Approach, ...] = (
         Approach(0.25, 0.6),
+        Approach(0.5, 1.0, 3.0),
+        Approach(0.25, 0.6, tilt=0.3),
         Approach(0.25, 0.75, 3.0),
-        Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
     tethered_approaches: tuple[Approach, ...] = (
@@ -113,6 +126,8 @@ class TaskParameters:
         Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
+    flat: float = 0.65
+    steep: float = 0.47
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
@@ -206,7 +221,7 @@ class TaskPlanner:
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
         missed = stages.attempts
         linked = [self._linked(x, joints, side) for side in (0, 1)]
-        ways = [self._approach(missed[i], linked[1 - i]) for i in (0, 1)]
+        ways = [self._approach(axes[i], missed[i], linked[1 - i]) for i in (0, 1)]
         facts = (
             self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
             self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
@@ -221,8 +236,8 @@ class TaskPlanner:
             (eases(stages, 0, p.stages, time), eases(stages, 1, p.stages, time)),
             stages.attempts,
             (
-                self._outlook(x, joints[2], to, sleeves, 0, linked),
-                self._outlook(x, joints[5], to, sleeves, 1, linked),
+                self._outlook(x, joints[2], to, sleeves, 0, linked, missed[0]),
+                self._outlook(x, joints[5], to, sleeves, 1, linked, missed[1]),
             ),
         )
 
@@ -262,13 +277,21 @@ class TaskPlanner:
             self._target(assignment, 1, axes, headings, sleeves, time_step),
         )
 
-    def _approach(self, attempts: int, tethered: bool) -> Approach:
+    def _approach(self, axis: ArmAxis, attempts: int, tethered: bool) -> Approach:
         """Returns how to go about a hand that was missed so often.
 
         What misses a hand once mostly misses it again: an arm that another approach suits gets it.
+        A flat forearm goes into an armhole that is turned toward it about the vertical, a steep one
+        into one that comes from the side.
         """
-        ways = self.parameters.tethered_approaches if tethered else self.parameters.approaches
-        return ways[attempts % len(ways)]
+        p = self.parameters
+        if tethered:
+            return p.tethered_approaches[attempts % len(p.tethered_approaches)]
+        level = float(np.linalg.norm(axis.D(0.0)[:2]))
+        best = 1 if level >= p.flat else 2 if level <= p.steep else 0
+        turn = attempts % len(p.approaches)
+        # the best goes first, the others keep their order
+        return p.approaches[best if turn == 0 else turn - 1 if turn <= best else turn]
 
     def _linked(self, x: FloatArray, joints: FloatArray, side: int) -> bool:
         """Returns whether an arm passes through its armhole."""
@@ -285,13 +308,18 @@ class TaskPlanner:
         sleeves: Sequence[SleeveState],
         side: int,
         linked: Sequence[bool],
+        missed: int,
     ) -> FloatArray | None:
-        """Returns where, from the hand, a tethered sleeve is seen by it, (3,) m, if it is near."""
+        """Returns where, from the hand, a sleeve is seen by it, (3,) m, if it is near.
+
+        A tethered one, for it does not reach any further, or one that missed the hand.
+        """
         p, sleeve, other = self.parameters, sleeves[side], sleeves[1 - side]
         near = np.linalg.norm(hand - sleeve.p_c) < p.outlook_distance
-        if linked[side] or not linked[1 - side] or not near:
+        tethered = linked[1 - side]
+        if linked[side] or not near or not (tethered or missed > 0):
             return None
-        reach = p.outlook_reach * self._reach
+        reach = p.outlook_reach * self._reach if tethered else np.inf
         loop, normal = self.armholes[side], sleeve.v_c
         move = move_into_sight(
             x, self.mesh.faces, loop, normal, hand, other.p_c, reach, to.rotation.T
@@ -363,7 +391,7 @@ class TaskPlanner:
         fact, tethered = given.facts[side], given.facts[1 - side].linked
         attempts, outlook = given.attempts[side], given.outlook[side]
         hand = axis.G(0.0)
-        way = self._approach(attempts, tethered)
+        way = self._approach(axis, attempts, tethered)
         direction = way.direction(axis, to, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
@@ -371,7 +399,7 @@ class TaskPlanner:
         beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
         barred = _ramp(fact.sight, p.stages.least_sight, p.stages.lost_sight)
         facing = (1.0 - barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
-        if tethered:
+        if outlook is not None:
             facing = max(facing, _ramp(fact.sight, p.stages.least_sight, p.clear_sight))
         inside = facing * _ramp(depth, -0.02, 0.02)
         aside = (1.0 - facing) * _aside(offset, direction)
@@ -413,7 +441,7 @@ class TaskPlanner:
         facts = given.facts
         task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
         position, direction = np.empty((n, 3)), np.empty((n, 3))
-        way = self._approach(given.attempts[side], facts[1 - side].linked)
+        way = self._approach(axes[0][side], given.attempts[side], facts[1 - side].linked)
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
@@ -424,7 +452,7 @@ class TaskPlanner:
                     position[j] = self._prepared(
                         given, side, axis, to, sleeves[side], given.retreat[side]
                     )
-                direction[j] = _between(_inward(to, side), axis.D(0.0), way.orientation)
+                direction[j] = way.entry(axis, to, side)
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * time_step * step

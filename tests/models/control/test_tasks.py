@@ -112,13 +112,40 @@ def test_a_hand_that_was_missed_is_gone_about_in_other_ways(
     for k, (way, target) in enumerate(zip(ways, targets, strict=False)):
         assert target.direction_weight == way.emphasis
         for j, other in enumerate(ways):
-            assert (along[k] < along[j]) == (way.orientation < other.orientation)
+            if way.tilt == other.tilt:
+                assert (along[k] < along[j]) == (way.orientation < other.orientation)
+            elif way.orientation == other.orientation:
+                # it is the level part of the forearm that it turns to
+                slope = [t.direction[0, 2] for t in (targets[k], targets[j])]
+                assert (slope[0] < slope[1]) == (way.tilt < other.tilt)
             # the line on which the hand is met is another one
             if way.share != other.share:
                 assert abs(facts[k].prepared_error - facts[j].prepared_error) > 1e-3
     # all were tried: the first again
     np.testing.assert_array_equal(targets[-1].direction, targets[0].direction)
     assert facts[-1] == facts[0]
+
+
+@pytest.mark.parametrize(("extension", "first"), [(1.1, 1), (0.6, 0), (0.4, 2)])
+def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
+    planner: TaskPlanner, extension: float, first: int
+) -> None:
+    q = np.vstack(
+        [
+            arm_points(M, "sitting", side, ArmPose(0.25, extension, 0.0, 0.0), frame(0.0))
+            for side in SIDES
+        ]
+    )
+    axis, to, ways = arm_axes(q)[0], heading(q), planner.parameters.approaches
+    off = SleeveFacts(linked=False, s=0.0, hand_distance=0.5, prepared_error=0.2, passed=0.0)
+    away = SleeveState(axis.G(0.0) - 0.3 * axis.D(0.0), axis.D(0.0))
+    rows = np.stack([q] * (HORIZON + 1))
+    asked = []
+    for k in range(len(ways)):
+        given = Assignment((Task.PREPARE, Task.REST), (off, off), attempts=(k, 0))
+        asked.append(planner.targets(given, [away, away], rows, STEP)[0].direction[0])
+    order = [first, *(i for i in range(len(ways)) if i != first)]
+    np.testing.assert_allclose(asked, [ways[i].entry(axis, to, 0) for i in order])
 
 
 @pytest.mark.parametrize("side", [0, 1])
