@@ -85,6 +85,9 @@ def study(
 ) -> list[Case]:
     """Returns the cases of a study: all groups at the first size and noise, effects at the others.
 
+    The further sizes and noises come effect by effect, in an order that mixes their kinds, so that
+    a study that is not finished yet has seen the same effects at each of them.
+
     Args:
         groups: of them.
         draws: of each group.
@@ -96,8 +99,11 @@ def study(
     found = cases(groups, draws, seed, sizes[0], noises[0])
     if "effect" in groups:
         settings = [(sizes[0], n) for n in noises[1:]] + [(s, noises[0]) for s in sizes[1:]]
-        for size, noise in settings:
-            found += cases(["effect"], {"effect": beside}, seed, size, noise)
+        further = [cases(["effect"], {"effect": beside}, seed, *setting) for setting in settings]
+        mixed = np.random.default_rng(seed).permutation(len(SIZES))
+        for k in range(beside):
+            for i in mixed:
+                found += [draws_there[k * len(SIZES) + i] for draws_there in further]
     return found
 
 

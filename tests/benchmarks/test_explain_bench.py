@@ -40,6 +40,7 @@ def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it():
     beside = [c for c in found if (c.size, c.marker_noise) != (1.0, 1e-3)]
     assert len(beside) == 2 * len(SIZES)
     assert {(c.size, c.marker_noise) for c in beside} == {(2.0, 1e-3), (1.0, 3e-3)}
+    assert [c.hide for c in beside[0::2]] == [c.hide for c in beside[1::2]]  # as far as it got
     assert all(c.force_noise == pytest.approx(50.0 * c.marker_noise) for c in found)
 
 
