@@ -14,6 +14,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.contact.wrenches import body_wrenches
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
@@ -198,15 +199,9 @@ class ClothPlant(LeafSystem):
 
     def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
-        wrench = np.zeros((len(self._names), 6))
-        rows = np.flatnonzero(after.owner >= 0)
-        if len(rows):
-            poses = self._poses.Eval(context)
-            origin = np.array([poses[i].translation() for i in self._index])
-            body = self._body_of[after.owner[rows]]
-            moment = np.cross(x[rows] - origin[body], -after.reaction[rows])
-            np.add.at(wrench, body, np.hstack([moment, -after.reaction[rows]]))
-        return wrench
+        poses = self._poses.Eval(context)
+        origin = np.array([poses[i].translation() for i in self._index])
+        return body_wrenches(self._body_of, origin, x, after.owner, after.reaction)
 
     def _calc(self, index):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:

@@ -166,15 +166,40 @@ class ImplicitContact:
 
         What conjugate gradients left over along a slip is none of it.
         """
-        out = np.where((self.mode != FREE)[:, None], residual, 0.0)
-        slip = self.mode == SLIP
-        normal = self._near.normal[slip]
-        pressure = np.einsum("ij,ij->i", out[slip], normal)
-        w = velocity[slip] - self._near.surface_velocity[slip]
-        w -= np.einsum("ij,ij->i", w, normal)[:, None] * normal
-        resisted = self.resistance[slip, None] * w
-        out[slip] = pressure[:, None] * normal + self._friction[slip] - resisted
+        out = np.empty_like(residual)
+        _impulse(
+            self.mode,
+            self._near.normal,
+            self._near.surface_velocity,
+            velocity,
+            residual,
+            self._friction,
+            self.resistance,
+            out,
+        )
         return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _impulse(  # type: ignore[no-untyped-def]
+    mode, normal, surface_velocity, velocity, residual, friction, resistance, out
+):
+    for i in range(mode.shape[0]):
+        if mode[i] == FREE:
+            for c in range(3):
+                out[i, c] = 0.0
+        elif mode[i] == SLIP:
+            pressure = 0.0
+            away = 0.0
+            for c in range(3):
+                pressure += residual[i, c] * normal[i, c]
+                away += (velocity[i, c] - surface_velocity[i, c]) * normal[i, c]
+            for c in range(3):
+                w = velocity[i, c] - surface_velocity[i, c] - away * normal[i, c]
+                out[i, c] = pressure * normal[i, c] + friction[i, c] - resistance[i] * w
+        else:
+            for c in range(3):
+                out[i, c] = residual[i, c]
 
 
 @nb.njit(cache=True, nogil=True)

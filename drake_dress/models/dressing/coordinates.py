@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -64,8 +65,8 @@ class ArmAxis:
             np.array(p, dtype=np.float64) for p in (hand, elbow, shoulder)
         )
         lower, upper = self._elbow - self._hand, self._shoulder - self._elbow
-        lower_length, upper_length = float(np.linalg.norm(lower)), float(np.linalg.norm(upper))
-        if not np.isfinite(lower_length + upper_length):
+        lower_length, upper_length = _length(lower), _length(upper)
+        if not math.isfinite(lower_length + upper_length):
             raise ValueError("a joint of the arm is not finite")
         shorter = min(lower_length, upper_length)
         if shorter < _SHORTEST_LIMB:
@@ -75,11 +76,11 @@ class ArmAxis:
 
         u, w = lower / lower_length, upper / upper_length
         cross = _cross(u, w)
-        angle = float(np.arctan2(np.linalg.norm(cross), u @ w))
+        angle = math.atan2(_length(cross), u @ w)
         if angle > np.pi - _STRAIGHT:
             raise ValueError("the forearm lies folded back on the upper arm")
         straight = angle < _STRAIGHT
-        half_tangent = float(np.tan(0.5 * angle))
+        half_tangent = math.tan(0.5 * angle)
         cut = _FILLET_SHARE * shorter
         if fillet_radius is not None and not straight:
             cut = min(fillet_radius * half_tangent, _MOST_SHARE * shorter)
@@ -90,7 +91,7 @@ class ArmAxis:
             self._normal = _perpendicular(u)
             self._inward, self._radius, self._half_arc = np.zeros(3), np.inf, cut
         else:
-            self._normal = cross / np.linalg.norm(cross)
+            self._normal = cross / _length(cross)
             self._inward = _cross(self._normal, u)
             self._radius = cut / half_tangent
             self._half_arc = 0.5 * angle * self._radius
@@ -139,7 +140,7 @@ class ArmAxis:
         offset = point - foot
         direction = self.D(s)
         theta = float(np.arctan2(offset @ _cross(direction, self._normal), offset @ self._normal))
-        return DressingCoordinates(s, float(np.linalg.norm(offset)), theta)
+        return DressingCoordinates(s, _length(offset), theta)
 
     def beyond_hand(self, point: FloatArray) -> float:
         """Returns how far a point (3,) lies past the hand, measured along the forearm, m.
@@ -183,6 +184,10 @@ class ArmAxis:
         candidates.append((s_arc, arc_foot))
         gaps = [float(np.sum((point - foot) ** 2)) for _, foot in candidates]
         return candidates[int(np.argmin(gaps))]
+
+
+def _length(v: FloatArray) -> float:
+    return math.sqrt(v @ v)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
