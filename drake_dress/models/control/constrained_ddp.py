@@ -17,17 +17,21 @@ And rows that depend on each other are dropped, as seven bounds on six inputs ma
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.control.interior_point import interior_point
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
+from drake_dress.models.control.local_problem import LocalProblem, LocalSolution, NormBounds
+from drake_dress.models.control.small_matrices import (
+    add_curvature,
+    complete_basis,
+    solve_positive_definite,
+    split_rows,
+)
 
-# A row whose part in the inputs is less than this of itself once the others' are taken off is none.
-_DEPENDENT = 1e-7
 # Excess of a bound, m or m/s, below which it counts as held.
 _TOLERANCE = 1e-9
 # Change of states and inputs at which the passes end.
@@ -56,6 +60,63 @@ class Settings:
     tolerance: float = 1e-8
 
 
+class _Cost(NamedTuple):
+    """Σ ½ xᵀw x + w_xᵀx + ½ vᵀr v + r_vᵀv over a trajectory: (N+1,n,n), (N+1,n), (N,m), (N,m)."""
+
+    w: FloatArray
+    w_x: FloatArray
+    r: FloatArray
+    r_v: FloatArray
+
+
+class _Bounds(NamedTuple):
+    """Norm bounds ‖C z + d‖ ≤ φ on states or inputs, and what a trajectory makes of them.
+
+    Attributes:
+        matrix, offset, radius: C (T,K,3,d), d (T,K,3), φ (T,K).
+        first: time of the first bound that counts: the start is what it is.
+        normal, size, excess: unit vector and length of C z + d, (T,K,3) and (T,K); ‖C z + d‖ − φ.
+        active, multiplier: (T,K).
+    """
+
+    matrix: FloatArray
+    offset: FloatArray
+    radius: FloatArray
+    first: int
+    normal: FloatArray
+    size: FloatArray
+    excess: FloatArray
+    active: BoolArray
+    multiplier: FloatArray
+
+
+class _Law(NamedTuple):
+    """What the backward pass leaves for the forward pass, for each step.
+
+    Attributes:
+        gain, feedforward: δv = gain δx + feedforward, (N,m,n) and (N,m).
+        q_vv, q_vx, q_v: derivatives of the action value, (N,m,m), (N,m,n), (N,m).
+        number: (N,) rows of active bounds, those that the step after handed over among them.
+        source: (N,R,2) of a row: 0, 1, 2 for a bound on inputs, on states, a row of the step
+            after; and which.
+        basis, rank, coefficient, owner: of the rows, see `split_rows`.
+        carried: (N,R) size of what is handed to the step before; 0 where nothing is.
+    """
+
+    gain: FloatArray
+    feedforward: FloatArray
+    q_vv: FloatArray
+    q_vx: FloatArray
+    q_v: FloatArray
+    number: IntArray
+    source: IntArray
+    basis: FloatArray
+    rank: IntArray
+    coefficient: FloatArray
+    owner: IntArray
+    carried: FloatArray
+
+
 def solve_constrained_ddp(
     problem: LocalProblem,
     guess: FloatArray | None = None,
@@ -75,83 +136,97 @@ def solve_constrained_ddp(
     p = problem
     steps, m = p.input_weight.shape
     v = np.zeros((steps, m)) if guess is None else np.array(guess, dtype=np.float64)
-    lx: FloatArray = np.zeros(p.state_bounds.radius.shape)
-    lv: FloatArray = np.zeros(p.input_bounds.radius.shape)
-    if state_multiplier is not None:
-        lx[:] = state_multiplier
-    if input_multiplier is not None:
-        lv[:] = input_multiplier
     # x_j − x_0 = B u_j with u_j the sum of inputs: m coordinates in place of n
     b = p.input_matrix
     w, r = 2.0 * p.state_weight, 2.0 * p.input_weight
-    costs = _contiguous(
-        np.einsum("tn,na,nb->tab", w, b, b),
-        (w * (p.start - p.state_target)) @ b,
-        r,
-        -r * p.input_target,
-    )
-    on_states = _contiguous(
-        p.state_bounds.matrix @ b,
-        p.state_bounds.offset + p.state_bounds.matrix @ p.start,
-        p.state_bounds.radius,
-    )
-    on_inputs = _contiguous(p.input_bounds.matrix, p.input_bounds.offset, p.input_bounds.radius)
-    u, gain, integrator = np.empty((steps + 1, m)), np.zeros((steps, m, m)), np.eye(m)
-    solve: Any = _solve
-    start_inside: Any = interior_point
-    sweeps, interior, converged = 0, 0, False
-    starts = [(np.zeros_like(v), settings.max_interior_steps)]
-    if guess is not None:
-        starts.insert(0, (v.copy(), settings.max_interior_steps // 3))
+    hessian, slope = np.einsum("tn,na,nb->tab", w, b, b), (w * (p.start - p.state_target)) @ b
+    cost = _Cost(*map(np.ascontiguousarray, (hessian, slope, r, -r * p.input_target)))
+    of_x, of_v = p.state_bounds, p.input_bounds
+    on_x = _about(of_x.matrix @ b, of_x.offset + of_x.matrix @ p.start, of_x.radius, 1)
+    on_v = _about(of_v.matrix, of_v.offset, of_v.radius, 0)
     if state_multiplier is not None:
-        sweeps, converged = solve(
-            integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
-            settings.warm_sweeps, settings.max_halvings,
-        )  # fmt: skip
-        converged = converged and _are_within(p.price, lx, lv)
+        on_x.multiplier[:] = state_multiplier
+    if input_multiplier is not None:
+        on_v.multiplier[:] = input_multiplier
+    u = np.empty((steps + 1, m))
+    sweep: Any = _sweep
+    sweeps, interior, converged = 0, 0, False
+    if state_multiplier is not None:
+        sweeps, converged = sweep(
+            cost, on_x, on_v, v, u, settings.warm_sweeps, settings.max_halvings
+        )
+        converged = converged and _are_within(p.price, on_x, on_v)
     if not converged:
-        together = [
-            np.concatenate([a[1:], c], axis=1) for a, c in zip(on_states, on_inputs, strict=True)
-        ]
-        n_x, n_v = len(lx[0]), len(lv[0])
-        multiplier, excess = np.empty((steps, n_x + n_v)), np.empty((steps, n_x + n_v))
-        for start, most in starts:
-            v[:] = start
-            iterations, near = start_inside(
-                *costs, *together, n_x, v, u, multiplier, excess, p.price, most, settings.tolerance
-            )  # fmt: skip
-            interior += iterations
-            if near:
-                break
-        lx[1:], lv[:] = multiplier[:, :n_x], multiplier[:, n_x:]
+        interior, near = _start_inside(p.price, cost, on_x, on_v, v, u, guess, settings)
         if near:
-            # bounds that nothing keeps are widened by as little as can be
-            _widen(on_states[2][1:], excess[:, :n_x])
-            _widen(on_inputs[2], excess[:, n_x:])
-            inside = v.copy(), lx.copy(), lv.copy()
-            more, converged = solve(
-                integrator, *costs, *on_states, *on_inputs, v, u, lx, lv, gain,
-                settings.max_sweeps, settings.max_halvings,
-            )  # fmt: skip
+            inside = v.copy(), on_x.multiplier.copy(), on_v.multiplier.copy()
+            more, ended = sweep(cost, on_x, on_v, v, u, settings.max_sweeps, settings.max_halvings)
             sweeps += more
-            if not converged:
-                v, lx, lv = inside
-            elif not _are_within(p.price, lx, lv):
-                _, lx, lv = inside
+            if not ended:
+                v = inside[0]
+            if not ended or not _are_within(p.price, on_x, on_v):
+                on_x.multiplier[:], on_v.multiplier[:] = inside[1:]
             converged = True
         elif not np.isfinite(v).all():
-            v[:], lx[:], lv[:] = 0.0, 0.0, 0.0
+            v[:], on_x.multiplier[:], on_v.multiplier[:] = 0.0, 0.0, 0.0
     return LocalSolution(
-        v, p.states(v), lx, lv, p.cost(v), p.violation(v), sweeps, interior, bool(converged)
+        v,
+        p.states(v),
+        on_x.multiplier,
+        on_v.multiplier,
+        p.cost(v),
+        p.violation(v),
+        sweeps,
+        interior,
+        bool(converged),
     )
 
 
-def _are_within(price: float, *multipliers: FloatArray) -> bool:
+def _start_inside(
+    price: float,
+    cost: _Cost,
+    on_x: _Bounds,
+    on_v: _Bounds,
+    v: FloatArray,
+    u: FloatArray,
+    guess: FloatArray | None,
+    settings: Settings,
+) -> tuple[int, bool]:
+    """Fills inputs and multipliers by the interior point method, and widens what nothing keeps.
+
+    Returns:
+        Its iterations, and whether they sufficed.
+    """
+    method: Any = interior_point
+    together = [np.concatenate([x[1:], y], axis=1) for x, y in zip(on_x[:3], on_v[:3], strict=True)]
+    n_x = on_x.radius.shape[1]
+    multiplier, excess = np.empty(together[2].shape), np.empty(together[2].shape)
+    starts = [(np.zeros_like(v), settings.max_interior_steps)]
+    if guess is not None:
+        starts.insert(0, (guess, settings.max_interior_steps // 3))
+    total, near = 0, False
+    for start, most in starts:
+        v[:] = start
+        iterations, near = method(
+            *cost, *together, n_x, v, u, multiplier, excess, price, most, settings.tolerance
+        )
+        total += iterations
+        if near:
+            break
+    on_x.multiplier[1:], on_v.multiplier[:] = multiplier[:, :n_x], multiplier[:, n_x:]
+    if near:
+        # by as little as can be
+        _widen(on_x.radius[1:], excess[:, :n_x])
+        _widen(on_v.radius, excess[:, n_x:])
+    return total, near
+
+
+def _are_within(price: float, *bounds: _Bounds) -> bool:
     """Returns whether no multiplier is beyond the price of an excess.
 
     Of bounds that only just leave room, sweeps may end on multipliers beyond all measure.
     """
-    return all(m.max(initial=0.0) <= price for m in multipliers)
+    return all(b.multiplier.max(initial=0.0) <= price for b in bounds)
 
 
 def _widen(radius: FloatArray, excess: FloatArray) -> None:
@@ -160,8 +235,20 @@ def _widen(radius: FloatArray, excess: FloatArray) -> None:
     radius[wide] = np.sqrt(radius[wide] * (radius[wide] + 2.0 * excess[wide]))
 
 
-def _contiguous(*arrays: FloatArray) -> list[FloatArray]:
-    return [np.array(a, dtype=np.float64, order="C") for a in arrays]
+def _about(matrix: FloatArray, offset: FloatArray, radius: FloatArray, first: int) -> _Bounds:
+    """Returns bounds of which nothing is measured yet."""
+    shape = radius.shape
+    return _Bounds(
+        np.ascontiguousarray(matrix),
+        np.ascontiguousarray(offset),
+        np.array(radius, dtype=np.float64, order="C"),
+        first,
+        np.zeros((*shape, 3)),
+        np.zeros(shape),
+        np.full(shape, -np.inf),
+        np.zeros(shape, dtype=np.bool_),
+        np.zeros(shape),
+    )
 
 
 def feedback_gains(problem: LocalProblem, solution: LocalSolution) -> FloatArray:
@@ -173,74 +260,66 @@ def feedback_gains(problem: LocalProblem, solution: LocalSolution) -> FloatArray
     p = problem
     steps, m = p.input_weight.shape
     n = len(p.start)
-    n_x, n_v = p.state_bounds.radius.shape[1], p.input_bounds.radius.shape[1]
-    x_normal, x_size = np.zeros((steps + 1, n_x, 3)), np.zeros((steps + 1, n_x))
-    v_normal, v_size = np.zeros((steps, n_v, 3)), np.zeros((steps, n_v))
-    x_excess, v_excess = np.zeros((steps + 1, n_x)), np.zeros((steps, n_v))
-    for bounds, z, normal, size, excess in (
-        (p.state_bounds, solution.x, x_normal, x_size, x_excess),
-        (p.input_bounds, solution.v, v_normal, v_size, v_excess),
-    ):
-        _bounds(bounds.matrix, bounds.offset, bounds.radius, z, 0, normal, size, excess)
+    on_x = _at(p.state_bounds, solution.x, solution.state_multiplier)
+    on_v = _at(p.input_bounds, solution.v, solution.input_multiplier)
     hessian = np.zeros((steps + 1, n, n))
     hessian[:, range(n), range(n)] = 2.0 * p.state_weight
-    gain, feedforward = np.zeros((steps, m, n)), np.zeros((steps, m))
-    work = _workspace(steps, n, m, n_x + n_v + n)
+    x_slope = 2.0 * p.state_weight * (solution.x - p.state_target)
+    v_slope = 2.0 * p.input_weight * (solution.v - p.input_target)
+    law = _room(steps, n, m, on_x.radius.shape[1] + on_v.radius.shape[1] + n)
     backward: Any = _backward
-    backward(
-        p.input_matrix,
-        hessian,
-        2.0 * p.input_weight,
-        2.0 * p.state_weight * (solution.x - p.state_target),
-        2.0 * p.input_weight * (solution.v - p.input_target),
-        p.state_bounds.matrix,
-        x_normal,
-        x_size,
-        x_excess,
-        solution.state_multiplier > 0.0,
-        solution.state_multiplier,
-        p.input_bounds.matrix,
-        v_normal,
-        v_size,
-        v_excess,
-        solution.input_multiplier > 0.0,
-        solution.input_multiplier,
-        *work,
-        gain,
-        feedforward,
-    )
+    r = 2.0 * p.input_weight
+    backward(p.input_matrix, hessian, r, x_slope, v_slope, on_x, on_v, law)
+    gain: FloatArray = law.gain
     return gain
 
 
+def _at(bounds: NormBounds, z: FloatArray, multiplier: FloatArray) -> _Bounds:
+    """Returns bounds about a solution `z` (T,d)."""
+    found = _about(bounds.matrix, bounds.offset, bounds.radius, 0)
+    measure: Any = _measure
+    measure(found, z)
+    found.active[:] = multiplier > 0.0
+    found.multiplier[:] = multiplier
+    return found
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _workspace(steps, n, m, rows):  # type: ignore[no-untyped-def]
-    """Returns what a backward pass leaves for the forward pass, in the order of its arguments."""
-    return (
+def _room(steps, n, m, rows):  # type: ignore[no-untyped-def]
+    """Returns a law to be filled, for N = `steps`, with `rows` active bounds a step at the most."""
+    return _Law(
+        np.zeros((steps, m, n)),
+        np.zeros((steps, m)),
         np.empty((steps, m, m)),
         np.empty((steps, m, n)),
         np.empty((steps, m)),
+        np.zeros(steps, np.int64),
+        np.zeros((steps, rows, 2), np.int64),
         np.empty((steps, m, m + n + 1)),
         np.zeros(steps, np.int64),
         np.zeros((steps, rows, m)),
         np.zeros((steps, rows), np.int64),
-        np.zeros(steps, np.int64),
-        np.zeros((steps, rows, 2), np.int64),
         np.zeros((steps, rows)),
     )
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _bounds(matrix, offset, radius, z, first, normal, size, excess):  # type: ignore[no-untyped-def]
-    """Fills unit vectors (T,K,3), norms and excesses (T,K) of norm bounds; returns their sum."""
+def _measure(bounds, z):  # type: ignore[no-untyped-def]
+    """Fills unit vectors, lengths and excesses of the bounds at `z` (T,d).
+
+    Returns:
+        The sum of what is beyond a bound.
+    """
+    matrix, normal, size, excess = bounds.matrix, bounds.normal, bounds.size, bounds.excess
     total = 0.0
-    for t in range(first, matrix.shape[0]):
+    for t in range(bounds.first, matrix.shape[0]):
         for k in range(matrix.shape[1]):
-            if radius[t, k] == np.inf:
+            if bounds.radius[t, k] == np.inf:
                 excess[t, k] = -np.inf
                 continue
             length2 = 0.0
             for a in range(3):
-                y = offset[t, k, a]
+                y = bounds.offset[t, k, a]
                 for b in range(z.shape[1]):
                     y += matrix[t, k, a, b] * z[t, b]
                 normal[t, k, a] = y
@@ -250,16 +329,33 @@ def _bounds(matrix, offset, radius, z, first, normal, size, excess):  # type: ig
             if length > 0.0:
                 for a in range(3):
                     normal[t, k, a] /= length
-            over = length - radius[t, k]
-            excess[t, k] = over
-            if over > 0.0:
-                total += over
+            excess[t, k] = length - bounds.radius[t, k]
+            total += max(excess[t, k], 0.0)
     return total
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _cost(x, v, w, w_x, r, r_v, x_slope, v_slope):  # type: ignore[no-untyped-def]
-    """Fills slopes w x + w_x and r v + r_v; returns Σ ½ xᵀw x + w_xᵀx + ½ vᵀr v + r_vᵀv."""
+def _excess(bounds, z):  # type: ignore[no-untyped-def]
+    """Returns the sum of what is beyond a bound at `z` (T,d), and fills nothing."""
+    total = 0.0
+    for t in range(bounds.first, bounds.matrix.shape[0]):
+        for k in range(bounds.matrix.shape[1]):
+            if bounds.radius[t, k] == np.inf:
+                continue
+            length2 = 0.0
+            for a in range(3):
+                y = bounds.offset[t, k, a]
+                for b in range(z.shape[1]):
+                    y += bounds.matrix[t, k, a, b] * z[t, b]
+                length2 += y * y
+            total += max(np.sqrt(length2) - bounds.radius[t, k], 0.0)
+    return total
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _evaluate(cost, x, v, x_slope, v_slope):  # type: ignore[no-untyped-def]
+    """Fills slopes w x + w_x (N+1,n) and r v + r_v (N,m); returns the cost."""
+    w, w_x, r, r_v = cost
     total = 0.0
     for t in range(1, x.shape[0]):
         for a in range(x.shape[1]):
@@ -278,6 +374,7 @@ def _cost(x, v, w, w_x, r, r_v, x_slope, v_slope):  # type: ignore[no-untyped-de
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _roll(b, v, x):  # type: ignore[no-untyped-def]
+    """Fills states x_{t+1} = x_t + b v_t (N+1,n) from zero."""
     n, m = b.shape
     x[0] = 0.0
     for t in range(v.shape[0]):
@@ -289,371 +386,241 @@ def _roll(b, v, x):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _add_curvature(matrix, normal, factor, out):  # type: ignore[no-untyped-def]
-    """Adds factor · Cᵀ(I − nnᵀ)C to `out` (n,n), for a C (3,n) with n (3,)."""
-    n = matrix.shape[1]
-    row = np.empty(n)
-    for b in range(n):
-        row[b] = matrix[0, b] * normal[0] + matrix[1, b] * normal[1] + matrix[2, b] * normal[2]
-    for a in range(n):
-        m0, m1, m2 = matrix[0, a], matrix[1, a], matrix[2, a]
-        if m0 == 0.0 and m1 == 0.0 and m2 == 0.0:
-            continue
-        for b in range(n):
-            out[a, b] += factor * (
-                m0 * matrix[0, b] + m1 * matrix[1, b] + m2 * matrix[2, b] - row[a] * row[b]
-            )
+def _backward(b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-untyped-def]
+    """Fills the law of each step, the last one first.
 
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _orthonormal_rows(rows, count, m, basis, residual, owner, coefficient):  # type: ignore[no-untyped-def]
-    """Splits rows [G_v | G_x | s] into an orthonormal basis in v and what v cannot change.
-
-    rows = coefficient · basis + residual, with the basis [Y | Z | t]; where a row has given a
-    basis vector `owner` is that vector's index and its residual is zero, elsewhere it is −1 and the
-    v part of its residual is zero. Pivots are the largest left. Returns the size of the basis.
+    Args:
+        b: (n,m) of the dynamics x_{t+1} = x_t + b v_t.
+        w: (N+1,n,n) Hessians of the cost of states.
+        r: (N,m) diagonal ones of the cost of inputs.
+        x_slope: (N+1,n) slopes of the cost along the trajectory.
+        v_slope: (N,m) likewise.
+        on_x: bounds on states, measured along it.
+        on_v: bounds on inputs, likewise.
+        law: filled.
     """
-    width = rows.shape[1]
-    rank = 0
-    scale = np.empty(count)
-    for i in range(count):
-        owner[i] = -1
-        s = 0.0
-        for c in range(m):
-            s += rows[i, c] ** 2
-        scale[i] = s
-        for c in range(width):
-            residual[i, c] = rows[i, c]
-        for k in range(m):
-            coefficient[i, k] = 0.0
-    while rank < m:
-        best, largest = -1, _DEPENDENT**2
-        for i in range(count):
-            if owner[i] >= 0 or scale[i] == 0.0:
-                continue
-            s = 0.0
-            for c in range(m):
-                s += residual[i, c] ** 2
-            if s > largest * scale[i]:
-                best, largest = i, s / scale[i]
-        if best < 0:
-            break
-        length = 0.0
-        for c in range(m):
-            length += residual[best, c] ** 2
-        length = np.sqrt(length)
-        for c in range(width):
-            basis[rank, c] = residual[best, c] / length
-        for i in range(count):
-            if owner[i] >= 0:
-                continue
-            along = 0.0
-            for c in range(m):
-                along += residual[i, c] * basis[rank, c]
-            coefficient[i, rank] = along
-            for c in range(width):
-                residual[i, c] -= along * basis[rank, c]
-        owner[best] = rank
-        rank += 1
-    return rank
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _complete(basis, rank, m, free):  # type: ignore[no-untyped-def]
-    """Fills `free` (m−rank,m) with unit vectors across the basis and each other."""
-    found = 0
-    tried = np.zeros(m, dtype=np.bool_)
-    work = np.empty(m)
-    best_row = np.empty(m)
-    while rank + found < m:
-        best, largest = -1, -1.0
-        for c in range(m):
-            if tried[c]:
-                continue
-            for a in range(m):
-                work[a] = 0.0
-            work[c] = 1.0
-            for _ in range(2):
-                for k in range(rank):
-                    s = 0.0
-                    for a in range(m):
-                        s += work[a] * basis[k, a]
-                    for a in range(m):
-                        work[a] -= s * basis[k, a]
-                for k in range(found):
-                    s = 0.0
-                    for a in range(m):
-                        s += work[a] * free[k, a]
-                    for a in range(m):
-                        work[a] -= s * free[k, a]
-            s = 0.0
-            for a in range(m):
-                s += work[a] ** 2
-            if s > largest:
-                best, largest = c, s
-                for a in range(m):
-                    best_row[a] = work[a]
-        tried[best] = True
-        length = np.sqrt(largest)
-        for a in range(m):
-            free[found, a] = best_row[a] / length
-        found += 1
-    return found
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _solve_spd(h, size, rhs, columns):  # type: ignore[no-untyped-def]
-    """Solves h z = rhs in place by Cholesky; returns whether h is positive definite."""
-    for i in range(size):
-        for j in range(i + 1):
-            s = h[i, j]
-            for k in range(j):
-                s -= h[i, k] * h[j, k]
-            if i == j:
-                if s <= 0.0:
-                    return False
-                h[i, i] = np.sqrt(s)
-            else:
-                h[i, j] = s / h[j, j]
-    for c in range(columns):
-        for i in range(size):
-            s = rhs[i, c]
-            for k in range(i):
-                s -= h[i, k] * rhs[k, c]
-            rhs[i, c] = s / h[i, i]
-        for i in range(size - 1, -1, -1):
-            s = rhs[i, c]
-            for k in range(i + 1, size):
-                s -= h[k, i] * rhs[k, c]
-            rhs[i, c] = s / h[i, i]
-    return True
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _backward(  # type: ignore[no-untyped-def]
-    b_matrix,
-    w,
-    r,
-    x_slope,
-    v_slope,
-    x_matrix,
-    x_normal,
-    x_size,
-    x_excess,
-    x_active,
-    x_multiplier,
-    v_matrix,
-    v_normal,
-    v_size,
-    v_excess,
-    v_active,
-    v_multiplier,
-    q_vv,
-    q_vx,
-    q_v,
-    basis,
-    rank,
-    coefficient,
-    owner,
-    count,
-    source,
-    carried_scale,
-    gain,
-    feedforward,
-):
-    """Fills the feedback law δv = gain δx + feedforward of each step, and what made it."""
-    n, m = b_matrix.shape
-    steps = v_slope.shape[0]
-    most_rows = owner.shape[1]
+    n, m = b.shape
+    steps, most_rows = law.owner.shape
     p_xx, p_x = np.zeros((n, n)), np.zeros(n)
-    p_b = np.empty((n, m))
-    rows = np.empty((most_rows, m + n + 1))
-    residual = np.empty((most_rows, m + n + 1))
-    free = np.empty((m, m))
-    reduced, right = np.empty((m, m)), np.empty((m, n + 1))
+    rows, residual = np.empty((most_rows, m + n + 1)), np.empty((most_rows, m + n + 1))
     both = np.empty((m, n + 1))
-    law = np.empty((m, n + 1))
-    value = np.empty((n, n))
     for i in range(steps - 1, -1, -1):
-        # cost-to-go at x_{i+1}
         for a in range(n):
             p_x[a] += x_slope[i + 1, a]
             for e in range(n):
                 p_xx[a, e] += w[i + 1, a, e]
-        for k in range(x_active.shape[1]):
-            if x_active[i + 1, k] and x_multiplier[i + 1, k] > 0.0 and x_size[i + 1, k] > 0.0:
-                _add_curvature(
-                    x_matrix[i + 1, k],
-                    x_normal[i + 1, k],
-                    x_multiplier[i + 1, k] / x_size[i + 1, k],
-                    p_xx,
-                )
-        # action value (Eq. VQ-define); the state is an integrator
-        for a in range(n):
-            for c in range(m):
-                s = 0.0
-                for e in range(n):
-                    s += p_xx[a, e] * b_matrix[e, c]
-                p_b[a, c] = s
+        _bend(on_x, i + 1, p_xx)
+        _act(b, p_xx, p_x, r[i], v_slope[i], law, i)
+        _bend(on_v, i, law.q_vv[i])
+        # `residual` still is that of the step after
+        number = _gather(b, on_x, on_v, law, i, residual, rows)
+        law.rank[i] = split_rows(
+            rows, number, m, law.basis[i], residual, law.owner[i], law.coefficient[i]
+        )
+        _hand_over(rows, residual, number, m, law.owner[i], law.carried[i])
+        _decide(law, i, both)
+        _cost_to_go(law, i, both, p_xx, p_x)
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _bend(bounds, t, hessian):  # type: ignore[no-untyped-def]
+    """Adds the curvature of active bounds at time `t`, weighted by their multipliers."""
+    for k in range(bounds.active.shape[1]):
+        size, multiplier = bounds.size[t, k], bounds.multiplier[t, k]
+        if bounds.active[t, k] and multiplier > 0.0 and size > 0.0:
+            add_curvature(bounds.matrix[t, k], bounds.normal[t, k], multiplier / size, hessian)
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _act(b, p_xx, p_x, r, v_slope, law, i):  # type: ignore[no-untyped-def]
+    """Fills the derivatives of the action value (Eq. VQ-define); the state is an integrator."""
+    n, m = b.shape
+    q_vv, q_vx, q_v = law.q_vv[i], law.q_vx[i], law.q_v[i]
+    for a in range(n):
         for c in range(m):
-            s = v_slope[i, c]
-            for a in range(n):
-                q_vx[i, c, a] = p_b[a, c]
-                s += b_matrix[a, c] * p_x[a]
-            q_v[i, c] = s
-            for e in range(c + 1):
-                s = 0.0
-                for a in range(n):
-                    s += b_matrix[a, c] * p_b[a, e]
-                q_vv[i, c, e] = s
-                q_vv[i, e, c] = s
-            q_vv[i, c, c] += r[i, c]
-        for k in range(v_active.shape[1]):
-            if v_active[i, k] and v_multiplier[i, k] > 0.0 and v_size[i, k] > 0.0:
-                _add_curvature(
-                    v_matrix[i, k], v_normal[i, k], v_multiplier[i, k] / v_size[i, k], q_vv[i]
-                )
-        # rows of active bounds [g_v | g_x | g] and what the step after hands over
-        number = 0
-        for k in range(v_active.shape[1]):
-            if v_active[i, k] and number < most_rows:
-                for c in range(m):
-                    s = 0.0
-                    for a in range(3):
-                        s += v_matrix[i, k, a, c] * v_normal[i, k, a]
-                    rows[number, c] = s
-                for a in range(n):
-                    rows[number, m + a] = 0.0
-                rows[number, m + n] = v_excess[i, k]
-                source[i, number, 0], source[i, number, 1] = 0, k
-                number += 1
-        for k in range(x_active.shape[1]):
-            if x_active[i + 1, k] and number < most_rows:
-                for e in range(n):
-                    s = 0.0
-                    for a in range(3):
-                        s += x_matrix[i + 1, k, a, e] * x_normal[i + 1, k, a]
-                    rows[number, m + e] = s
-                rows[number, m + n] = x_excess[i + 1, k]
-                source[i, number, 0], source[i, number, 1] = 1, k
-                number += 1
-        if i + 1 < steps:
-            for k in range(count[i + 1]):
-                if owner[i + 1, k] >= 0 or carried_scale[i + 1, k] == 0.0 or number >= most_rows:
-                    continue
-                # `residual` still is that of the step after
-                for a in range(n + 1):
-                    both_a = residual[k, m + a] / carried_scale[i + 1, k]
-                    rows[number, m + a] = both_a
-                source[i, number, 0], source[i, number, 1] = 2, k
-                number += 1
-        for k in range(number):
-            if source[i, k, 0] == 0:
-                continue
-            for c in range(m):
-                s = 0.0
-                for a in range(n):
-                    s += rows[k, m + a] * b_matrix[a, c]
-                rows[k, c] = s
-        count[i] = number
-        rank[i] = _orthonormal_rows(rows, number, m, basis[i], residual, owner[i], coefficient[i])
-        for k in range(number):
-            carried_scale[i, k] = 0.0
-            if owner[i, k] < 0:
-                s, whole = 0.0, 0.0
-                for a in range(n):
-                    s += residual[k, m + a] ** 2
-                    whole += rows[k, m + a] ** 2
-                if s > 1e-16 * max(whole, 1e-8):
-                    carried_scale[i, k] = np.sqrt(s)
-        # the law: what the rows ask for, and the best across them
-        size = rank[i]
-        for c in range(m):
-            for a in range(n + 1):
-                s = 0.0
-                for k in range(size):
-                    s -= basis[i, k, c] * basis[i, k, m + a]
-                law[c, a] = s
-        across = _complete(basis[i], size, m, free)
-        if across > 0:
-            for c in range(m):
-                for a in range(n + 1):
-                    s = q_vx[i, c, a] if a < n else q_v[i, c]
-                    for e in range(m):
-                        s += q_vv[i, c, e] * law[e, a]
-                    both[c, a] = s
-            for k in range(across):
-                for a in range(n + 1):
-                    s = 0.0
-                    for c in range(m):
-                        s -= free[k, c] * both[c, a]
-                    right[k, a] = s
-                for e in range(k + 1):
-                    s = 0.0
-                    for c in range(m):
-                        t = 0.0
-                        for d in range(m):
-                            t += q_vv[i, c, d] * free[e, d]
-                        s += free[k, c] * t
-                    reduced[k, e] = s
-            _solve_spd(reduced, across, right, n + 1)
-            for c in range(m):
-                for a in range(n + 1):
-                    s = law[c, a]
-                    for k in range(across):
-                        s += free[k, c] * right[k, a]
-                    law[c, a] = s
-        for c in range(m):
-            for a in range(n):
-                gain[i, c, a] = law[c, a]
-            feedforward[i, c] = law[c, n]
-        # cost-to-go at x_i
-        for c in range(m):
-            for a in range(n + 1):
-                s = q_vx[i, c, a] if a < n else q_v[i, c]
-                for e in range(m):
-                    s += q_vv[i, c, e] * law[e, a]
-                both[c, a] = s
-        for a in range(n):
-            for e in range(a + 1):
-                s = p_xx[a, e]
-                for c in range(m):
-                    s += law[c, a] * both[c, e] + q_vx[i, c, a] * law[c, e]
-                value[a, e] = s
-                value[e, a] = s
-            s = p_x[a]
-            for c in range(m):
-                s += law[c, a] * both[c, n] + q_vx[i, c, a] * law[c, n]
-            p_x[a] = s
-        for a in range(n):
+            s = 0.0
             for e in range(n):
-                p_xx[a, e] = value[a, e]
+                s += p_xx[a, e] * b[e, c]
+            q_vx[c, a] = s
+    for c in range(m):
+        s = v_slope[c]
+        for a in range(n):
+            s += b[a, c] * p_x[a]
+        q_v[c] = s
+        for e in range(c + 1):
+            s = 0.0
+            for a in range(n):
+                s += b[a, c] * q_vx[e, a]
+            q_vv[c, e] = s
+            q_vv[e, c] = s
+        q_vv[c, c] += r[c]
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def]
+    """Fills rows [g_v | g_x | g] of what is to hold after step `i`; returns how many.
+
+    They are active bounds on its input and on the state that it leads to (Eq.
+    current-constraint), and what the step after could not keep by itself (Eq. future-constraint).
+    A row for the state x_{i+1} is one for x_i, and by `b` one for v_i.
+    """
+    n, m = b.shape
+    steps, most_rows = law.owner.shape
+    source = law.source[i]
+    number = 0
+    for k in range(on_v.active.shape[1]):
+        if on_v.active[i, k] and number < most_rows:
+            for c in range(m):
+                s = 0.0
+                for a in range(3):
+                    s += on_v.matrix[i, k, a, c] * on_v.normal[i, k, a]
+                rows[number, c] = s
+            for a in range(n):
+                rows[number, m + a] = 0.0
+            rows[number, m + n] = on_v.excess[i, k]
+            source[number, 0], source[number, 1] = 0, k
+            number += 1
+    on_input = number
+    for k in range(on_x.active.shape[1]):
+        if on_x.active[i + 1, k] and number < most_rows:
+            for e in range(n):
+                s = 0.0
+                for a in range(3):
+                    s += on_x.matrix[i + 1, k, a, e] * on_x.normal[i + 1, k, a]
+                rows[number, m + e] = s
+            rows[number, m + n] = on_x.excess[i + 1, k]
+            source[number, 0], source[number, 1] = 1, k
+            number += 1
+    if i + 1 < steps:
+        for k in range(law.number[i + 1]):
+            scale = law.carried[i + 1, k]
+            if law.owner[i + 1, k] >= 0 or scale == 0.0 or number >= most_rows:
+                continue
+            for a in range(n + 1):
+                rows[number, m + a] = handed[k, m + a] / scale
+            source[number, 0], source[number, 1] = 2, k
+            number += 1
+    for k in range(on_input, number):
+        for c in range(m):
+            s = 0.0
+            for a in range(n):
+                s += rows[k, m + a] * b[a, c]
+            rows[k, c] = s
+    law.number[i] = number
+    return number
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _hand_over(rows, residual, count, m, owner, carried):  # type: ignore[no-untyped-def]
+    """Fills the size of what rows ask of the state and no input can change; 0 where it is none."""
+    state = slice(m, rows.shape[1] - 1)
+    for k in range(count):
+        carried[k] = 0.0
+        if owner[k] < 0:
+            left, whole = _square(residual[k, state]), _square(rows[k, state])
+            if left > 1e-16 * max(whole, 1e-8):
+                carried[k] = np.sqrt(left)
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _square(row):  # type: ignore[no-untyped-def]
+    s = 0.0
+    for a in range(row.shape[0]):
+        s += row[a] ** 2
+    return s
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _decide(law, i, both):  # type: ignore[no-untyped-def]
+    """Fills gain and feedforward: what the rows ask of the input, and the best across them.
+
+    `both` (m,n+1) is filled with [Q_vx | Q_v] + Q_vv [gain | feedforward].
+    """
+    m, n = law.q_vx[i].shape
+    basis, size, q_vv = law.basis[i], law.rank[i], law.q_vv[i]
+    found, free = np.empty((m, n + 1)), np.empty((m, m))
+    for c in range(m):
+        for a in range(n + 1):
+            s = 0.0
+            for k in range(size):
+                s -= basis[k, c] * basis[k, m + a]
+            found[c, a] = s
+    across = complete_basis(basis, size, m, free)
+    _slopes(law, i, found, both)
+    if across > 0:
+        reduced, right = np.empty((m, m)), np.empty((m, n + 1))
+        for k in range(across):
+            for a in range(n + 1):
+                s = 0.0
+                for c in range(m):
+                    s -= free[k, c] * both[c, a]
+                right[k, a] = s
+            for e in range(k + 1):
+                s = 0.0
+                for c in range(m):
+                    t = 0.0
+                    for d in range(m):
+                        t += q_vv[c, d] * free[e, d]
+                    s += free[k, c] * t
+                reduced[k, e] = s
+        solve_positive_definite(reduced, across, right, n + 1)
+        for c in range(m):
+            for a in range(n + 1):
+                s = found[c, a]
+                for k in range(across):
+                    s += free[k, c] * right[k, a]
+                found[c, a] = s
+        _slopes(law, i, found, both)
+    for c in range(m):
+        for a in range(n):
+            law.gain[i, c, a] = found[c, a]
+        law.feedforward[i, c] = found[c, n]
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _slopes(law, i, found, both):  # type: ignore[no-untyped-def]
+    """Fills `both` (m,n+1) with [Q_vx | Q_v] + Q_vv `found`."""
+    m, n = law.q_vx[i].shape
+    for c in range(m):
+        for a in range(n + 1):
+            s = law.q_vx[i, c, a] if a < n else law.q_v[i, c]
+            for e in range(m):
+                s += law.q_vv[i, c, e] * found[e, a]
+            both[c, a] = s
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _cost_to_go(law, i, both, p_xx, p_x):  # type: ignore[no-untyped-def]
+    """Turns the cost-to-go at x_{i+1} into that at x_i under the law."""
+    m, n = law.q_vx[i].shape
+    gain, feedforward, q_vx = law.gain[i], law.feedforward[i], law.q_vx[i]
+    for a in range(n):
+        for e in range(a + 1):
+            s = p_xx[a, e]
+            for c in range(m):
+                s += gain[c, a] * both[c, e] + q_vx[c, a] * gain[c, e]
+            p_xx[a, e] = s
+            p_xx[e, a] = s
+        s = p_x[a]
+        for c in range(m):
+            s += gain[c, a] * both[c, n] + q_vx[c, a] * feedforward[c]
+        p_x[a] = s
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _forward(  # type: ignore[no-untyped-def]
-    b_matrix,
-    q_vv,
-    q_vx,
-    q_v,
-    basis,
-    rank,
-    coefficient,
-    owner,
-    count,
-    source,
-    carried_scale,
-    gain,
-    feedforward,
-    dx,
-    dv,
-    x_multiplier,
-    v_multiplier,
-):
-    """Fills the new trajectory's distance to the old one, and the multipliers of active bounds."""
-    n, m = b_matrix.shape
-    steps = dv.shape[0]
-    most_rows = owner.shape[1]
+def _forward(b, law, dx, dv, x_multiplier, v_multiplier):  # type: ignore[no-untyped-def]
+    """Fills the new trajectory's distance to the old one, and the multipliers of active bounds.
+
+    Args:
+        b: (n,m) of the dynamics.
+        law: of the backward pass.
+        dx: (N+1,n), filled.
+        dv: (N,m), filled.
+        x_multiplier: (N+1,K), filled; zero where not active.
+        v_multiplier: (N,L), likewise.
+    """
+    n, m = b.shape
+    steps, most_rows = law.owner.shape
     multiplier, handed = np.zeros(most_rows), np.zeros(most_rows)
     slope = np.empty(m)
     x_multiplier[:] = 0.0
@@ -661,67 +628,83 @@ def _forward(  # type: ignore[no-untyped-def]
     dx[0] = 0.0
     for i in range(steps):
         for c in range(m):
-            s = feedforward[i, c]
+            s = law.feedforward[i, c]
             for a in range(n):
-                s += gain[i, c, a] * dx[i, a]
+                s += law.gain[i, c, a] * dx[i, a]
             dv[i, c] = s
         for a in range(n):
             s = dx[i, a]
             for c in range(m):
-                s += b_matrix[a, c] * dv[i, c]
+                s += b[a, c] * dv[i, c]
             dx[i + 1, a] = s
         for c in range(m):
-            s = q_v[i, c]
+            s = law.q_v[i, c]
             for a in range(n):
-                s += q_vx[i, c, a] * dx[i, a]
+                s += law.q_vx[i, c, a] * dx[i, a]
             for e in range(m):
-                s += q_vv[i, c, e] * dv[i, e]
+                s += law.q_vv[i, c, e] * dv[i, e]
             slope[c] = s
-        for k in range(count[i]):
-            multiplier[k] = handed[k] if owner[i, k] < 0 else 0.0
-        for rank_k in range(rank[i] - 1, -1, -1):
-            s = 0.0
-            for c in range(m):
-                s -= basis[i, rank_k, c] * slope[c]
-            pivot = -1
-            for k in range(count[i]):
-                if owner[i, k] == rank_k:
-                    pivot = k
-                elif owner[i, k] < 0 or owner[i, k] > rank_k:
-                    s -= coefficient[i, k, rank_k] * multiplier[k]
-            multiplier[pivot] = s / coefficient[i, pivot, rank_k]
+        _balance(law, i, slope, handed, multiplier)
         handed[:] = 0.0
-        for k in range(count[i]):
-            kind, which = source[i, k, 0], source[i, k, 1]
+        for k in range(law.number[i]):
+            kind, which = law.source[i, k, 0], law.source[i, k, 1]
             if kind == 0:
                 v_multiplier[i, which] = multiplier[k]
             elif kind == 1:
                 x_multiplier[i + 1, which] = multiplier[k]
             else:
-                handed[which] = multiplier[k] / carried_scale[i + 1, which]
+                handed[which] = multiplier[k] / law.carried[i + 1, which]
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _balance(law, i, slope, handed, multiplier):  # type: ignore[no-untyped-def]
+    """Fills the multipliers of the rows of step `i`: they hold the action value's `slope` (m,).
+
+    Rows that no input changes have the multiplier that the step before has `handed` on.
+    """
+    basis, coefficient, owner = law.basis[i], law.coefficient[i], law.owner[i]
+    for k in range(law.number[i]):
+        multiplier[k] = handed[k] if owner[k] < 0 else 0.0
+    for j in range(law.rank[i] - 1, -1, -1):
+        s = 0.0
+        for c in range(slope.shape[0]):
+            s -= basis[j, c] * slope[c]
+        pivot = -1
+        for k in range(law.number[i]):
+            if owner[k] == j:
+                pivot = k
+            elif owner[k] < 0 or owner[k] > j:
+                s -= coefficient[k, j] * multiplier[k]
+        multiplier[pivot] = s / coefficient[pivot, j]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _judge(matrix, normal, excess, active, dz, found, linear, first):  # type: ignore[no-untyped-def]
-    """Fills what the linear bounds say of the step (T,K); returns the extremes.
+def _judge(bounds, dz, found, linear):  # type: ignore[no-untyped-def]
+    """Fills what the linear bounds say of a step.
+
+    Args:
+        bounds: measured before it.
+        dz: (T,d) the step.
+        found: (T,K) multipliers of the forward pass.
+        linear: (T,K) excesses, filled.
 
     Returns:
         The largest multiplier, the least one, and the largest excess of a bound that is not active.
     """
     largest, least, beyond = 0.0, 0.0, 0.0
-    for t in range(first, excess.shape[0]):
-        for k in range(excess.shape[1]):
-            s = excess[t, k]
+    for t in range(bounds.first, linear.shape[0]):
+        for k in range(linear.shape[1]):
+            s = bounds.excess[t, k]
             linear[t, k] = s
             if s == -np.inf:
                 continue
-            if active[t, k]:
+            if bounds.active[t, k]:
                 largest, least = max(largest, found[t, k]), min(least, found[t, k])
                 continue
             for e in range(dz.shape[1]):
                 along = 0.0
                 for a in range(3):
-                    along += normal[t, k, a] * matrix[t, k, a, e]
+                    along += bounds.normal[t, k, a] * bounds.matrix[t, k, a, e]
                 s += along * dz[t, e]
             linear[t, k] = s
             beyond = max(beyond, s)
@@ -729,128 +712,110 @@ def _judge(matrix, normal, excess, active, dz, found, linear, first):  # type: i
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _switch(active, found, excess, first):  # type: ignore[no-untyped-def]
-    """Lets bounds go whose multiplier is not positive, and takes in those that are exceeded."""
-    for t in range(first, active.shape[0]):
-        for k in range(active.shape[1]):
-            if active[t, k]:
-                active[t, k] = found[t, k] > 0.0
-            else:
-                active[t, k] = excess[t, k] > _TOLERANCE
+def _begin(bounds):  # type: ignore[no-untyped-def]
+    """Makes bounds active that had a multiplier, or that the trajectory reaches."""
+    for t in range(bounds.first, bounds.active.shape[0]):
+        for k in range(bounds.active.shape[1]):
+            reached = bounds.excess[t, k] > -_TOLERANCE
+            bounds.active[t, k] = bounds.multiplier[t, k] > 0.0 or reached
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _solve(  # type: ignore[no-untyped-def]
-    b_matrix,
-    w,
-    w_x,
-    r,
-    r_v,
-    x_matrix,
-    x_offset,
-    x_radius,
-    v_matrix,
-    v_offset,
-    v_radius,
-    v,
-    x,
-    x_multiplier,
-    v_multiplier,
-    gain,
-    max_sweeps,
-    max_halvings,
-):
-    """Sweeps from inputs `v` and multipliers until they are optimal; returns sweeps and whether."""
-    n, m = b_matrix.shape
-    steps = v.shape[0]
-    n_x, n_v = x_radius.shape[1], v_radius.shape[1]
-    work = _workspace(steps, n, m, n_x + n_v + n)
-    (q_vv, q_vx, q_v, basis, rank, coefficient, owner, count, source, carried_scale) = work
-    feedforward = np.empty((steps, m))
-    dx, dv = np.zeros((steps + 1, n)), np.zeros((steps, m))
-    x_new, v_new = np.empty_like(x), np.empty_like(v)
-    x_slope, v_slope = np.zeros((steps + 1, n)), np.zeros((steps, m))
-    x_scratch, v_scratch = np.empty((steps + 1, n)), np.empty((steps, m))
-    x_normal, x_size = np.zeros((steps + 1, n_x, 3)), np.zeros((steps + 1, n_x))
-    v_normal, v_size = np.zeros((steps, n_v, 3)), np.zeros((steps, n_v))
-    x_way, x_length, x_over = x_normal.copy(), x_size.copy(), x_size.copy()
-    v_way, v_length, v_over = v_normal.copy(), v_size.copy(), v_size.copy()
-    x_excess, v_excess = np.full((steps + 1, n_x), -np.inf), np.full((steps, n_v), -np.inf)
-    x_linear, v_linear = np.empty((steps + 1, n_x)), np.empty((steps, n_v))
-    x_found, v_found = np.zeros((steps + 1, n_x)), np.zeros((steps, n_v))
-    x_active = np.zeros((steps + 1, n_x), np.bool_)
-    v_active = np.zeros((steps, n_v), np.bool_)
+def _switch(bounds, found, excess):  # type: ignore[no-untyped-def]
+    """Lets bounds go whose multiplier is not positive, and takes in those that are exceeded."""
+    for t in range(bounds.first, bounds.active.shape[0]):
+        for k in range(bounds.active.shape[1]):
+            if bounds.active[t, k]:
+                bounds.active[t, k] = found[t, k] > 0.0
+            else:
+                bounds.active[t, k] = excess[t, k] > _TOLERANCE
 
-    _roll(b_matrix, v, x)
-    excess = _bounds(x_matrix, x_offset, x_radius, x, 1, x_normal, x_size, x_excess)
-    excess += _bounds(v_matrix, v_offset, v_radius, v, 0, v_normal, v_size, v_excess)
-    cost = _cost(x, v, w, w_x, r, r_v, x_slope, v_slope)
-    for t in range(steps):
-        for k in range(n_x):
-            x_active[t + 1, k] = x_multiplier[t + 1, k] > 0.0 or x_excess[t + 1, k] > -_TOLERANCE
-        for k in range(n_v):
-            v_active[t, k] = v_multiplier[t, k] > 0.0 or v_excess[t, k] > -_TOLERANCE
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _accept(bounds, found):  # type: ignore[no-untyped-def]
+    """Takes the multipliers of the forward pass."""
+    for t in range(bounds.first, found.shape[0]):
+        for k in range(found.shape[1]):
+            bounds.multiplier[t, k] = max(0.0, found[t, k])
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _along(slope, step):  # type: ignore[no-untyped-def]
+    """Returns Σ slope · step, and the largest component of the step."""
+    total, size = 0.0, 0.0
+    for t in range(step.shape[0]):
+        for a in range(step.shape[1]):
+            total += slope[t, a] * step[t, a]
+            size = max(size, abs(step[t, a]))
+    return total, size
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _sweep(cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: ignore[no-untyped-def]
+    """Sweeps from inputs `v` (N,m) and multipliers until they are optimal.
+
+    The dynamics are x_{t+1} = x_t + v_t with x_0 = 0, all of m; `x` (N+1,m) is filled.
+
+    Returns:
+        Sweeps, and whether they ended at an optimum.
+    """
+    steps, m = v.shape
+    law = _room(steps, m, m, on_x.radius.shape[1] + on_v.radius.shape[1] + m)
+    b = np.eye(m)
+    x_new, v_new, dx, dv = np.empty_like(x), np.empty_like(v), np.zeros_like(x), np.zeros_like(v)
+    x_slope, v_slope = np.zeros_like(x), np.zeros_like(v)
+    x_scratch, v_scratch = np.empty_like(x), np.empty_like(v)
+    x_linear, v_linear = np.empty_like(on_x.radius), np.empty_like(on_v.radius)
+    x_found, v_found = np.zeros_like(on_x.radius), np.zeros_like(on_v.radius)
+
+    _roll(b, v, x)
+    excess = _measure(on_x, x) + _measure(on_v, v)
+    value = _evaluate(cost, x, v, x_slope, v_slope)
+    _begin(on_x)
+    _begin(on_v)
     price = 0.0
     for sweep in range(1, max_sweeps + 1):
-        _backward(
-            b_matrix, w, r, x_slope, v_slope,
-            x_matrix, x_normal, x_size, x_excess, x_active, x_multiplier,
-            v_matrix, v_normal, v_size, v_excess, v_active, v_multiplier,
-            q_vv, q_vx, q_v, basis, rank, coefficient, owner, count, source, carried_scale,
-            gain, feedforward,
-        )  # fmt: skip
-        _forward(
-            b_matrix, q_vv, q_vx, q_v, basis, rank, coefficient, owner, count, source,
-            carried_scale, gain, feedforward, dx, dv, x_found, v_found,
-        )  # fmt: skip
-        of_x = _judge(x_matrix, x_normal, x_excess, x_active, dx, x_found, x_linear, 1)
-        of_v = _judge(v_matrix, v_normal, v_excess, v_active, dv, v_found, v_linear, 0)
-        largest, least, beyond = max(of_x[0], of_v[0]), min(of_x[1], of_v[1]), max(of_x[2], of_v[2])
+        _backward(b, cost.w, cost.r, x_slope, v_slope, on_x, on_v, law)
+        _forward(b, law, dx, dv, x_found, v_found)
+        x_largest, x_least, x_beyond = _judge(on_x, dx, x_found, x_linear)
+        v_largest, v_least, v_beyond = _judge(on_v, dv, v_found, v_linear)
+        largest, beyond = max(x_largest, v_largest), max(x_beyond, v_beyond)
         # the active set is that of the quadratic programme: then the step leads down
-        consistent = least > -_ROUNDING * max(largest, 1e-6) and beyond < _TOLERANCE
+        rounding = _ROUNDING * max(largest, 1e-6)
+        consistent = min(x_least, v_least) > -rounding and beyond < _TOLERANCE
         price = max(price, 1.5 * largest)
-        size, slope = 0.0, -price * excess
-        for t in range(steps):
-            for c in range(m):
-                size = max(size, abs(dv[t, c]))
-                slope += v_slope[t, c] * dv[t, c]
-            for a in range(n):
-                size = max(size, abs(dx[t + 1, a]))
-                slope += x_slope[t + 1, a] * dx[t + 1, a]
-        merit = cost + price * excess
+        x_along, x_size = _along(x_slope, dx)
+        v_along, v_size = _along(v_slope, dv)
+        slope = x_along + v_along - price * excess
+        merit = value + price * excess
         factor, accepted = 1.0, False
         for _ in range(max_halvings if consistent else 1):
             for t in range(steps):
                 for c in range(m):
                     v_new[t, c] = v[t, c] + factor * dv[t, c]
-            _roll(b_matrix, v_new, x_new)
-            new_excess = _bounds(x_matrix, x_offset, x_radius, x_new, 1, x_way, x_length, x_over)
-            new_excess += _bounds(v_matrix, v_offset, v_radius, v_new, 0, v_way, v_length, v_over)
-            new_cost = _cost(x_new, v_new, w, w_x, r, r_v, x_scratch, v_scratch)
+            _roll(b, v_new, x_new)
+            new_value = _evaluate(cost, x_new, v_new, x_scratch, v_scratch)
+            new = new_value + price * (_excess(on_x, x_new) + _excess(on_v, v_new))
             allowed = 1e-4 * factor * min(slope, 0.0) + 1e-12 * (1.0 + abs(merit))
-            if new_cost + price * new_excess <= merit + allowed:
-                accepted = True
+            accepted = new <= merit + allowed
+            if accepted:
                 break
             factor *= 0.5
         if accepted:
             v[:] = v_new
             x[:] = x_new
-            excess = _bounds(x_matrix, x_offset, x_radius, x, 1, x_normal, x_size, x_excess)
-            excess += _bounds(v_matrix, v_offset, v_radius, v, 0, v_normal, v_size, v_excess)
-            cost = _cost(x, v, w, w_x, r, r_v, x_slope, v_slope)
-            for t in range(steps):
-                for k in range(n_x):
-                    x_multiplier[t + 1, k] = max(0.0, x_found[t + 1, k])
-                for k in range(n_v):
-                    v_multiplier[t, k] = max(0.0, v_found[t, k])
-            _switch(x_active, x_found, x_excess, 1)
-            _switch(v_active, v_found, v_excess, 0)
-            if consistent and factor == 1.0 and size < _SMALLEST_STEP:
+            excess = _measure(on_x, x) + _measure(on_v, v)
+            value = _evaluate(cost, x, v, x_slope, v_slope)
+            _accept(on_x, x_found)
+            _accept(on_v, v_found)
+            _switch(on_x, x_found, on_x.excess)
+            _switch(on_v, v_found, on_v.excess)
+            if consistent and factor == 1.0 and max(x_size, v_size) < _SMALLEST_STEP:
                 return sweep, True
         elif consistent:
             return sweep, False
         else:
             # the same trajectory again, with other bounds
-            _switch(x_active, x_found, x_linear, 1)
-            _switch(v_active, v_found, v_linear, 0)
+            _switch(on_x, x_found, x_linear)
+            _switch(on_v, v_found, v_linear)
     return max_sweeps, False
