@@ -23,6 +23,7 @@ from drake_dress.diagrams.hardware_station import (
     NotAtStartError,
     StationSilentError,
 )
+from drake_dress.diagrams.pace import SteadyPace
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
@@ -138,6 +139,7 @@ def _note(dressing: Dressing, ending: Ending, writer: RunLogWriter) -> None:
             writer.series("/station/command_time", times, "s")
             writer.series("/station/status_age", ages, "s")
             writer.note("start_up", process_age(meter.first))
+        writer.note("behind", ending.behind)
     if ending.fault is not None:
         writer.note("ended_by", ending.fault)
 
@@ -151,10 +153,14 @@ def _open_meshcat() -> Meshcat:
 
 @dataclass(frozen=True)
 class Ending:
-    """Why a run ended before its time: the user interrupted, or the station had a fault."""
+    """Why a run ended before its time: the user interrupted, or the station had a fault.
+
+    `behind` is real time, s, by which a run on hardware fell behind the rate that was asked for.
+    """
 
     interrupted: bool = False
     fault: str | None = None
+    behind: float = 0.0
 
 
 def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Ending:
@@ -166,6 +172,8 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
     ):
         return Ending(interrupted=True)
     simulator.Initialize()
+    hardware = isinstance(dressing.station, HardwareStation)
+    pace = SteadyPace(simulator) if hardware else None
     context = dressing.mpc.GetMyContextFromRoot(simulator.get_context())
     stage_port = dressing.mpc.GetOutputPort("stage")
     terminal = sys.stderr.isatty()
@@ -204,7 +212,7 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
             done_since = min(done_since, now) if is_finished(stage) else np.inf
             if now - done_since >= _STAY:
                 break
-        return Ending(interrupt.is_set(), fault)
+        return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
 
 
 def _made_ready(dressing: Dressing, station: HardwareStation) -> bool:

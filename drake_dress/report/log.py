@@ -455,6 +455,12 @@ class RunLog:
         return None if value is None else float(value)
 
     @property
+    def behind(self) -> float | None:
+        """Real time by which a run on hardware fell behind the rate that was asked for, s."""
+        value = self.file.attrs.get("behind")
+        return None if value is None else float(value)
+
+    @property
     def ended_by(self) -> str | None:
         """What was wrong with the station, that ended the run; None if nothing was."""
         text = self.file.attrs.get("ended_by")

@@ -213,6 +213,7 @@ def _pace(summary: dict[str, Any]) -> str:
         median, p99 = (_figure(latency[n], "{:.1f} ms") for n in ("median", "p99"))
         rows.append(("commands", f"{rate}, latency {median} (median), {p99} (99 %)"))
         rows.append(("start-up to first command", _figure(summary["start_up_s"], "{:.1f} s")))
+        rows.append(("fell behind real time by", _figure(summary["fell_behind_s"], "{:.1f} s")))
     return (
         "<table><tbody>"
         + "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows)

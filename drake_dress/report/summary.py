@@ -59,7 +59,8 @@ def summarize(
     time from which both sleeves stay on (s and linking number). `safety_cut_s` is, for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
     where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
-    sending of a status to the command that answers it) and `start_up_s` (to the first command).
+    sending of a status to the command that answers it), `start_up_s` (to the first command) and
+    `fell_behind_s` (real time by which it was slower than asked).
     Of a run with arms: `max_joint_speed_share`, `max_joint_torque_share` of limits,
     `min_joint_margin_rad`, `arm_tracking_mm` (of grippers from where joints are commanded to be),
     `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand).
@@ -216,6 +217,7 @@ def _command_figures(log: RunLog) -> dict[str, Any]:
             "p99": 1e3 * float(np.quantile(ages, 0.99)) if len(ages) else None,
         },
         "start_up_s": log.start_up,
+        "fell_behind_s": log.behind,
     }
 
 

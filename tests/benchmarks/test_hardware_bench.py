@@ -36,6 +36,7 @@ def test_a_run_drives_a_lab_of_another_process(tmp_path: Path) -> None:
         summary = summarize(log, wall_time=0.0)
         assert summary["command_rate_hz"] > 100.0
         assert summary["start_up_s"] > 0.0
+        assert summary["fell_behind_s"] >= 0.0
         travelled = np.linalg.norm(np.diff(log.gripper_position["left"][5:], axis=0), axis=1)
         assert travelled.sum() > 0.05
     with RunLog.open(tmp_path / "lab" / "run.h5") as log:
