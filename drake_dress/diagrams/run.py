@@ -202,7 +202,7 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
                 # no command without a log of it: commands end, and arms stop by themselves
                 fault = f"log: cannot be written: {error}"
                 break
-            fault = _station_fault(dressing, simulator)
+            fault = _station_fault(dressing, simulator) or dressing.mpc.failure
             stage = stage_port.Eval(context)
             names = [("prepare", "dress", "done")[int(s)] for s in stage]
             progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import multiprocessing
 import os
@@ -32,11 +33,17 @@ class Apart:
             initializer=_begin,
             initargs=(work, os.getpid()),
         )
-        self._pool.submit(_ready)
+        self._process = self._pool.submit(os.getpid)
 
     def submit(self, *arguments: Any) -> Future[Any]:
         """Returns what will be the result."""
         return self._pool.submit(_work, *arguments)
+
+    def kill(self) -> None:
+        """Ends the process whatever it does; results that are awaited become exceptions."""
+        if self._process.done() and self._process.exception() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._process.result(), signal.SIGKILL)
 
 
 def _begin(work: Callable[..., Any], parent: int) -> None:
@@ -49,10 +56,6 @@ def _begin(work: Callable[..., Any], parent: int) -> None:
     if os.getppid() != parent:
         # it ended before the kernel was told
         os._exit(1)
-
-
-def _ready() -> None:
-    """Does nothing: the process is there when it has returned."""
 
 
 def _work(*arguments: Any) -> Any:

@@ -83,7 +83,9 @@ class GlobalMpc(LeafSystem):
     own meanwhile, beside the simulated garment. Where the world does not wait, `waits` is False:
     it runs in a process of its own, a plan is used from k·period + delay on or from when it is
     there, if that is later, and no solve begins before the one before it has ended. What the plan
-    before it does until then is part of the prediction and not changed.
+    before it does until then is part of the prediction and not changed. But no plan is used beyond
+    its end by more than a period: then the plan is to rest, until there is another. A solve that
+    fails, or takes longer than `patience`, was the last one.
 
     Args:
         policy: does the work.
@@ -91,10 +93,19 @@ class GlobalMpc(LeafSystem):
         delay: from what is seen to the use of the plan, s, less than the period and as long as
             the policy's committed steps.
         waits: whether the world waits for a solve that takes longer than its delay.
+        patience: with a solve, where it does not, s.
+
+    Attributes:
+        failure: why there are no plans any more; None while there are.
     """
 
     def __init__(
-        self, policy: DressingPolicy, period: float, delay: float, waits: bool = True
+        self,
+        policy: DressingPolicy,
+        period: float,
+        delay: float,
+        waits: bool = True,
+        patience: float = 10.0,
     ) -> None:
         super().__init__()
         if not 0.0 < delay < period:
@@ -105,12 +116,15 @@ class GlobalMpc(LeafSystem):
         self._policy = policy
         self._delay = delay
         self._period = period
+        self._patience = patience
+        self.failure: str | None = None
         solve = _Solve(policy)
-        if waits:
+        self._apart = None if waits else Apart(solve)
+        if self._apart is None:
             threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
             self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)
         else:
-            self._submit = Apart(solve).submit
+            self._submit = self._apart.submit
         self._pending: Future[_Finished] | None = None
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
@@ -119,6 +133,7 @@ class GlobalMpc(LeafSystem):
         idle = GlobalPlan(
             0.0, policy.parameters.time_step, np.zeros((n, 2, 3)), np.zeros((n + 1, 2, 3))
         )
+        self._idle = idle
         self._plan = self.DeclareAbstractState(Value(idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
         # what `_show` shows, and when was seen what the plan in use answers
@@ -189,7 +204,7 @@ class GlobalMpc(LeafSystem):
         )
 
     def _begin(self, context: Context, state: State) -> None:
-        if self._pending is not None:
+        if self._pending is not None or self.failure is not None:
             return
         gone = context.get_time() - self._begun_at
         self._begun_at = context.get_time()
@@ -204,9 +219,30 @@ class GlobalMpc(LeafSystem):
         self._pending = self._submit(memory, x, v, joints, now, steps)
 
     def _look(self, context: Context, state: State) -> None:
-        due = context.get_time() >= self._begun_at + self._delay - 1e-9
-        if due and self._pending is not None and self._pending.done():
-            self._finish(context, state)
+        if self._pending is None:
+            return
+        since = context.get_time() - self._begun_at
+        if self._pending.done():
+            error = self._pending.exception()
+            if error is not None:
+                self._fail(f"{type(error).__name__}: {error}", state)
+            elif since >= self._delay - 1e-9:
+                self._finish(context, state)
+        elif since > self._patience:
+            self._fail(f"no plan for {self._patience:g} s", state)
+        else:
+            plan: GlobalPlan = context.get_abstract_state(self._plan).get_value()
+            end = plan.start + len(plan.velocity) * plan.time_step
+            if plan.assignment is not None and context.get_time() > end + self._period:
+                state.get_mutable_abstract_state(self._plan).set_value(self._idle)
+
+    def _fail(self, why: str, state: State) -> None:
+        self.failure = f"global controller: {why}"
+        self._pending = None
+        state.get_mutable_abstract_state(self._plan).set_value(self._idle)
+        if self._apart is not None:
+            # nobody waits for it, the end of this process included
+            self._apart.kill()
 
     def _finish(self, context: Context, state: State) -> None:
         if self._pending is None:

@@ -1,0 +1,86 @@
+"""The global controller where the world does not wait for it."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from drake_dress.models.control.local_control import GlobalPlan
+from drake_dress.models.control.policy import PolicyParameters
+from drake_dress.systems.global_mpc import GlobalMpc
+
+pytestmark = pytest.mark.alone
+_PERIOD, _DELAY, _FAILS = 0.5, 0.2, 0.9
+
+
+@dataclass
+class _Policy:
+    """Asks for motion, and stops to do so at a time."""
+
+    ends: str
+    parameters: PolicyParameters = field(default_factory=PolicyParameters)
+    mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
+
+    def initial_state(self) -> Any:
+        return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
+
+    def decide(self, memory: Any, x: Any, v: Any, joints: Any, now: float, steps: int) -> Any:
+        n = self.parameters.horizon
+        if now > _FAILS:
+            if self.ends == "raises":
+                raise ValueError("the garment is gone")
+            if self.ends == "dies":
+                os._exit(3)
+            time.sleep({"hangs": 600.0, "is late": 1.3}[self.ends])
+        plan = SimpleNamespace(velocity=np.full((n, 2, 3), 0.1), armhole=np.zeros((n, 2, 3)))
+        return memory, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
+
+
+def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
+    failures = {
+        "raises": "global controller: ValueError: the garment is gone",
+        "dies": "global controller: BrokenProcessPool",
+        "hangs": "global controller: no plan for 1.8 s",
+        "is late": None,
+    }
+    builder = DiagramBuilder()
+    controllers = {}
+    for ends in failures:
+        mpc = GlobalMpc(_Policy(ends), _PERIOD, _DELAY, waits=False, patience=1.8)
+        controllers[ends] = builder.AddNamedSystem(ends, mpc)
+        for i in range(3):
+            port = mpc.get_input_port(i)
+            source = builder.AddSystem(ConstantVectorSource(np.zeros(port.size())))
+            builder.Connect(source.get_output_port(), port)
+    simulator = Simulator(builder.Build())
+    for mpc in controllers.values():
+        mpc.rehearse(np.zeros((1, 3)), np.zeros((6, 3)), lambda: False)
+    simulator.set_target_realtime_rate(1.0)
+    plans: dict[str, list[GlobalPlan]] = {ends: [] for ends in failures}
+    for k in range(1, 36):
+        simulator.AdvanceTo(0.1 * k)
+        for ends, mpc in controllers.items():
+            context = mpc.GetMyContextFromRoot(simulator.get_context())
+            plans[ends].append(mpc.GetOutputPort("plan").Eval(context))
+    for ends, failure in failures.items():
+        moves = np.array([bool(plan.velocity.any()) for plan in plans[ends]])
+        # seen at 0.5 s, used from 0.7 s to 1.3 s, and for another period
+        assert moves[7:10].all(), ends
+        first = int(np.argmin(moves[7:])) + 7
+        assert not moves[first] and 0.1 * first <= 1.3 + _PERIOD + 0.11, ends
+        found = controllers[ends].failure
+        if failure is None:
+            assert found is None
+            assert moves[first:].any(), "it goes on with the plan that came late"
+        else:
+            assert not moves[first:].any(), ends
+            assert found is not None and found.startswith(failure)
