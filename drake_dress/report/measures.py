@@ -122,9 +122,10 @@ def penetration_depth(
         b: (c,3) their second ends, m.
         radius: (c,), m.
     """
-    points = np.concatenate(
-        [position, position[edges].mean(axis=1), position[faces].mean(axis=1)]
-    ).astype(np.float64)
+    x = position.astype(np.float64)
+    middles = 0.5 * (x[edges[:, 0]] + x[edges[:, 1]])
+    centroids = (x[faces[:, 0]] + x[faces[:, 1]] + x[faces[:, 2]]) / 3.0
+    points = np.concatenate([x, middles, centroids])
     distance = np.empty(len(points))
     owner = np.empty(len(points), dtype=np.int32)
     nearest_obstacle(points, Obstacles.resting(a, b, radius).packed, distance, owner)

@@ -19,6 +19,7 @@ a fold) counts a passage as long as the hand stays in the fold.
 
 from __future__ import annotations
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +27,7 @@ FloatArray = npt.NDArray[np.float64]
 
 # How far the fan's apex may be moved off the loop's centre, as a share of the loop's size.
 _APEX_SHIFT = 1e-6
+_SHIFTS = np.array([[0.0, 0.0, 0.0], [0.8, 0.5, 0.3], [-0.3, 0.8, -0.5], [0.5, -0.3, -0.8]])
 
 
 def linking_number(loop: FloatArray, curve: FloatArray) -> float:
@@ -76,9 +78,9 @@ def arm_linking_number(
         ValueError: the loop is not (≥ 3, 3) or not finite.
     """
     _check_closed("loop", loop)
-    line = np.stack([hand, elbow, shoulder, interior]).astype(np.float64)
-    apex = _apex(loop, line)
-    return sum(_passages(loop, apex, p, q) for p, q in zip(line[:-1], line[1:], strict=True))
+    line = np.array([hand, elbow, shoulder, interior], dtype=np.float64)
+    count: int = _passages(np.ascontiguousarray(loop, dtype=np.float64), line)
+    return count
 
 
 def torso_interior(left_shoulder: FloatArray, right_shoulder: FloatArray) -> FloatArray:
@@ -90,58 +92,115 @@ def torso_interior(left_shoulder: FloatArray, right_shoulder: FloatArray) -> Flo
     return middle
 
 
-def _apex(loop: FloatArray, line: FloatArray) -> FloatArray:
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _passages(loop, line):  # type: ignore[no-untyped-def]
+    """Returns signed crossings of the line (4,3) with the fan of the loop (k,3).
+
+    Seen along a segment the fan is plane triangles (apex, first, second), and the question is
+    which of them hold the origin. Each spoke's side of the origin is decided once and used by both
+    triangles that share it, so that a line through a spoke counts once. An end of a segment that
+    lies in a triangle's plane belongs to the segment that follows, decided by the same expression
+    there, so that a joint of the arm counts once.
+    """
+    count = loop.shape[0]
+    apex = _apex(loop, line)
+    seen, side = np.empty((count, 2)), np.empty(count, dtype=np.bool_)
+    along, across, up = np.empty(3), np.empty(3), np.empty(3)
+    total = 0
+    for segment in range(line.shape[0] - 1):
+        p, q = line[segment], line[segment + 1]
+        length = _distance(p, q)
+        if length == 0.0:
+            continue
+        least = 0
+        for a in range(3):
+            along[a] = (q[a] - p[a]) / length
+            if abs(along[a]) < abs(along[least]):
+                least = a
+        a, b, c = least, (least + 1) % 3, (least + 2) % 3
+        # along × the axis that it is least along
+        size = np.sqrt(along[b] ** 2 + along[c] ** 2)
+        across[a], across[b], across[c] = 0.0, along[c] / size, -along[b] / size
+        up[a] = along[b] * across[c] - along[c] * across[b]
+        up[b] = along[c] * across[a] - along[a] * across[c]
+        up[c] = along[a] * across[b] - along[b] * across[a]
+        apex_0, apex_1 = _from_along(p, apex, across), _from_along(p, apex, up)
+        for k in range(count):
+            seen[k, 0] = _from_along(p, loop[k], across)
+            seen[k, 1] = _from_along(p, loop[k], up)
+            side[k] = apex_0 * seen[k, 1] - apex_1 * seen[k, 0] >= 0.0
+        for k in range(count):
+            n = k + 1 if k + 1 < count else 0
+            if side[k] == side[n]:
+                continue
+            beyond = seen[k, 0] * seen[n, 1] - seen[k, 1] * seen[n, 0] >= 0.0
+            if side[k] != beyond:
+                continue
+            below_p = _height(loop[k], loop[n], apex, p) < 0.0
+            below_q = _height(loop[k], loop[n], apex, q) < 0.0
+            if beyond and below_p and not below_q:
+                total += 1
+            elif not beyond and not below_p and below_q:
+                total -= 1
+    return total
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _apex(loop, line):  # type: ignore[no-untyped-def]
     """Returns the apex (3,) of the fan: the loop's centre, but not on the arm's line.
 
     A line through the apex meets all spokes at once and has no definite side of any. Which point
     spans the disc is free, so of a few next to the centre the one farthest from the line serves;
     all segments have to see the same one.
     """
-    center = loop.mean(axis=0)
-    size = float(np.max(np.linalg.norm(loop - center, axis=1)))
-    shifts = np.array([[0.0, 0.0, 0.0], [0.8, 0.5, 0.3], [-0.3, 0.8, -0.5], [0.5, -0.3, -0.8]])
-    candidates = center + _APEX_SHIFT * size * shifts
-    clearance = np.full(len(candidates), np.inf)
-    for p, q in zip(line[:-1], line[1:], strict=True):
-        length = float(np.linalg.norm(q - p))
-        if length > 0.0:
-            aside = np.linalg.norm(np.cross(candidates - p, q - p), axis=1) / length
-            clearance = np.minimum(clearance, aside)
-    apex: FloatArray = candidates[int(np.argmax(clearance))]
-    return apex
+    center, candidate, best = np.zeros(3), np.empty(3), np.empty(3)
+    for k in range(loop.shape[0]):
+        for a in range(3):
+            center[a] += loop[k, a]
+    center /= loop.shape[0]
+    size = 0.0
+    for k in range(loop.shape[0]):
+        size = max(size, _distance(loop[k], center))
+    largest = -1.0
+    for s in range(_SHIFTS.shape[0]):
+        for a in range(3):
+            candidate[a] = center[a] + _APEX_SHIFT * size * _SHIFTS[s, a]
+        clearance = np.inf
+        for i in range(line.shape[0] - 1):
+            length = _distance(line[i], line[i + 1])
+            if length > 0.0:
+                clearance = min(clearance, _aside(candidate, line[i], line[i + 1]) / length)
+        if clearance > largest:
+            largest = clearance
+            best[:] = candidate
+    return best
 
 
-def _passages(loop: FloatArray, apex: FloatArray, p: FloatArray, q: FloatArray) -> int:
-    """Returns signed crossings of the segment pq with the fan of the loop about `apex`.
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _from_along(p, q, axis):  # type: ignore[no-untyped-def]
+    return (q[0] - p[0]) * axis[0] + (q[1] - p[1]) * axis[1] + (q[2] - p[2]) * axis[2]
 
-    Seen along the segment the fan is plane triangles (apex, first, second), and the question is
-    which of them hold the origin. Each spoke's side of the origin is decided once and used by both
-    triangles that share it, so that a line through a spoke counts once.
-    """
-    length = float(np.linalg.norm(q - p))
-    if length == 0.0:
-        return 0
-    along = (q - p) / length
-    across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
-    across /= np.linalg.norm(across)
-    plane = np.stack([across, np.cross(along, across)], axis=1)
 
-    apex_2, loop_2 = (apex - p) @ plane, (loop - p) @ plane
-    side_first = apex_2[0] * loop_2[:, 1] - apex_2[1] * loop_2[:, 0] >= 0.0
-    side_second = np.roll(side_first, -1)
-    second_2 = np.roll(loop_2, -1, axis=0)
-    side_edge = loop_2[:, 0] * second_2[:, 1] - loop_2[:, 1] * second_2[:, 0] >= 0.0
-    upward = side_first & ~side_second & side_edge
-    downward = ~side_first & side_second & ~side_edge
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _distance(p, q):  # type: ignore[no-untyped-def]
+    return np.sqrt((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2)
 
-    # Ends of the segment against each triangle's plane; an end in the plane belongs to the segment
-    # that follows, decided by the same expression there, so that a joint of the arm counts once.
-    spoke = loop - apex
-    normal = np.cross(spoke, np.roll(spoke, -1, axis=0))
-    below_p, below_q = normal @ (p - apex) < 0.0, normal @ (q - apex) < 0.0
-    upward &= below_p & ~below_q
-    downward &= ~below_p & below_q
-    return int(np.count_nonzero(upward) - np.count_nonzero(downward))
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _aside(point, p, q):  # type: ignore[no-untyped-def]
+    """Returns ‖(point − p) × (q − p)‖."""
+    x, y, z = point[0] - p[0], point[1] - p[1], point[2] - p[2]
+    u, v, w = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    return np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _height(first, second, apex, point):  # type: ignore[no-untyped-def]
+    """Returns six times the volume of the tetrahedron of a triangle of the fan and a point."""
+    x, y, z = first[0] - apex[0], first[1] - apex[1], first[2] - apex[2]
+    u, v, w = second[0] - apex[0], second[1] - apex[1], second[2] - apex[2]
+    d, e, f = point[0] - apex[0], point[1] - apex[1], point[2] - apex[2]
+    return (y * w - z * v) * d + (z * u - x * w) * e + (x * v - y * u) * f
 
 
 def _solid_angle(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
