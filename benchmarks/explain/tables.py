@@ -61,14 +61,19 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     header = ["right", "ambiguous", "parameter error, %", "gain", "loss before"]
     names = dict.fromkeys(r["case"]["hide"] for r in effects)
     each = [[name, *_summary([r for r in effects if r["case"]["hide"] == name])] for name in names]
+    shared = _shared(every)
     beside = [
-        [f"{1e3 * noise:g}", size, *_summary([r for r in every if _setting(r) == (noise, size)])]
-        for noise, size in sorted({_setting(r) for r in every})
+        [f"{1e3 * noise:g}", size, *_summary([r for r in shared if _setting(r) == (noise, size)])]
+        for noise, size in sorted({_setting(r) for r in shared})
     ]
     return [
         Table("Each effect", ["hidden", "draws", *header], each),
         Table("All", *_groups(central)),
-        Table("By noise and size", ["noise, mm", "size", "draws", *header], beside),
+        Table(
+            "By noise and size, the same draws at each",
+            ["noise, mm", "size", "draws", *header],
+            beside,
+        ),
         Table(
             "Confidence",
             ["said", "causes", "right, %"],
@@ -79,6 +84,19 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
             ],
         ),
     ]
+
+
+def _shared(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Returns results of draws that were made at every noise and size."""
+    settings = {_setting(r) for r in results}
+    made: dict[tuple[str, int], set[tuple[float, float]]] = {}
+    for r in results:
+        made.setdefault(_draw(r), set()).add(_setting(r))
+    return [r for r in results if made[_draw(r)] == settings]
+
+
+def _draw(result: dict[str, Any]) -> tuple[str, int]:
+    return result["case"]["hide"], result["case"]["seed"]
 
 
 def _setting(result: dict[str, Any]) -> tuple[float, float]:

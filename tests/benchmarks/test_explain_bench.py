@@ -16,7 +16,7 @@ def result(group="effect", hide="friction", named=("friction",), verdict="named"
     hidden = {} if hide == "nothing" else {n: {"added": 0.2} for n in hide.split("+")}
     confidence = changes.pop("confidence", 0.95)
     case = {"group": group, "hide": hide, "seed": 1, "size": 1.0, "marker_noise": 1e-3}
-    case.update({k: changes.pop(k) for k in ("size", "marker_noise") if k in changes})
+    case.update({k: changes.pop(k) for k in ("seed", "size", "marker_noise") if k in changes})
     return {
         "case": case,
         "hidden": hidden,
@@ -74,12 +74,17 @@ def test_a_kin_of_what_no_list_has_has_no_parameters_to_compare():
 
 
 def test_tables_tell_centre_and_what_is_beside_it_apart():
-    found = [result(), result(named=("adhesion",)), result(marker_noise=3e-3, named=())]
+    found = [
+        result(),
+        result(seed=2, named=("adhesion",)),
+        result(marker_noise=3e-3, named=()),
+    ]
     by_title = {t.title: t for t in tables(found)}
     assert by_title["Each effect"].rows[0][:3] == ["friction", 2, 1]
     assert by_title["All"].rows[0][:3] == ["effect", 2, 50.0]
-    beside = by_title["By noise and size"].rows
-    assert [row[:4] for row in beside] == [["1", 1.0, 2, 1], ["3", 1.0, 1, 0]]
+    # the second draw was not made at the other noise
+    beside = by_title["By noise and size, the same draws at each"].rows
+    assert [row[:4] for row in beside] == [["1", 1.0, 1, 1], ["3", 1.0, 1, 0]]
     assert parameter_error(found[0]) == pytest.approx(0.05)
     assert tables([]) == []
 
