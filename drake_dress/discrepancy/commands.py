@@ -66,6 +66,7 @@ def explain_files(
                 mesh,
                 [t.contact for t in comparison.told["refined"]],
                 experiment.samples,
+                experiment.labs["scenario"].person(()),
             )
             stage("running on its own")
             alone = windows(experiment, found, tick)

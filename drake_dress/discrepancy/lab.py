@@ -152,15 +152,16 @@ class PersonShape:
     """The person's capsules where joints were measured, or as posed.
 
     Attributes:
-        limb: (c,) which limb a capsule is of, −1 for none: upper arm and forearm of left, right.
+        limb: (c,) which of `LIMB_NAMES` a capsule is of, −1 for none.
     """
 
-    LIMBS = 4
+    LIMB_NAMES = tuple(f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm"))
+    LIMBS = len(LIMB_NAMES)
 
     def __init__(self, sizes: BodyMeasures, stance: Posture, arms: dict[Side, ArmPose]) -> None:
         capsules = body_capsules(sizes, stance)
-        order = [f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm")]
-        self.limb = np.array([order.index(c.body) if c.body in order else -1 for c in capsules])
+        names = self.LIMB_NAMES
+        self.limb = np.array([names.index(c.body) if c.body in names else -1 for c in capsules])
         self.posed = np.concatenate([arm_points(sizes, stance, side, arms[side]) for side in SIDES])
         self._radius = np.array([c.radius for c in capsules])
         self._a = np.array([c.a_B for c in capsules])

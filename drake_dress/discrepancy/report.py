@@ -13,14 +13,13 @@ from drake_dress import __version__
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.sentences import headline, plain, values
-from drake_dress.discrepancy.where import Spot
+from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
 from drake_dress.report.page import chart, embedded, html_page
 
 FloatArray = npt.NDArray[np.float64]
 
 _BEFORE, _AFTER, _NOISE = "#b8453b", "#0b7a5e", "#66727f"
-_ROWS = 10
 
 
 def report_page(
@@ -146,7 +145,7 @@ def _spots(spots: Sequence[Spot]) -> str:
             else f"<td>{1e3 * s.rms:.2f} mm</td><td>{1e3 * s.noise:.2f} mm</td>"
         )
         + f"<td>{s.whitened:.2f}</td></tr>"
-        for s in spots[:_ROWS]
+        for s in worst(spots)
     )
     return (
         "<table><thead><tr><th></th><th>part</th><th>RMS</th><th>noise</th>"

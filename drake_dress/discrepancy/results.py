@@ -14,10 +14,8 @@ from drake_dress.diagrams.build import effects as effects_on
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
-from drake_dress.discrepancy.where import Spot
+from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
-
-_SPOTS = 12
 
 
 def as_json(
@@ -69,7 +67,7 @@ def as_json(
             "noise_m": alone.noise,
         },
         "loss": x.loss,
-        "where": [vars(s) for s in spots[:_SPOTS]],
+        "where": [vars(s) for s in worst(spots)],
     }
 
 

@@ -8,13 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.discrepancy.lab import PersonShape
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.whitening import Whitening
+from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 
 FloatArray = npt.NDArray[np.float64]
 # Phases by the grippers' speed, m/s, and by contact.
 _STILL, _FAST = 0.01, 0.15
+# A marker no farther than this from a limb's skin is of the cloth that lies on it, m.
+_ON_LIMB = 0.02
+KINDS = ("signal", "recording", "region", "limb", "phase", "time", "marker")
 
 
 @dataclass(frozen=True)
@@ -22,7 +27,7 @@ class Spot:
     """A part of the data and how far off it is.
 
     Attributes:
-        kind: signal, region, phase, recording or time.
+        kind: one of `KINDS`.
         name: of the part.
         rms: residual, m or N.
         noise: of it.
@@ -43,6 +48,7 @@ def spots(
     mesh: GarmentMesh,
     contact: Sequence[FloatArray],
     samples: Sequence[npt.NDArray[np.int64]],
+    person: PersonShape,
 ) -> list[Spot]:
     """Returns all parts, worst first.
 
@@ -53,6 +59,7 @@ def spots(
         mesh: that markers sit on.
         contact: share of nodes in contact at each compared sample of each recording.
         samples: indices that are compared, of each recording.
+        person: whose limbs the garment touches.
     """
     w = whitening
     squared = (w.data - predicted) ** 2
@@ -85,11 +92,20 @@ def spots(
         for number, name in enumerate(REGION_NAMES):
             rows = mine & markers & np.isin(w.marker, np.flatnonzero(region == number))
             add("region", f"{name.replace('_', ' ')} in {r.name}", rows)
+        for k in range(r.marker_position.shape[1]):
+            where = REGION_NAMES[region[k]].replace("_", " ")
+            add("marker", f"{k} ({where}) in {r.name}", mine & markers & (w.marker == k))
         speed = _speed(r)[samples[i]]
         phase = np.where(speed < _STILL, 0, np.where(speed < _FAST, 1, 2))
         touching = contact[i] > 0.0
         at = np.searchsorted(r.time[samples[i]] - r.time[0], w.time[mine] - 1e-9)
         at = np.minimum(at, len(phase) - 1)
+        limb = limbs_touched(r, samples[i], person)
+        of_marker = np.full(len(mine), -1)
+        on_cloth = mine & markers
+        of_marker[on_cloth] = limb[at[markers[mine]], w.marker[on_cloth]]
+        for number, name in enumerate(person.LIMB_NAMES):
+            add("limb", f"{name.replace('_', ' ')} in {r.name}", of_marker == number)
         for number, name in enumerate(("at rest", "slow", "fast")):
             for touch in (False, True):
                 rows = np.zeros(len(mine), dtype=np.bool_)
@@ -100,6 +116,42 @@ def spots(
             rows = mine & markers & (w.time >= second) & (w.time < second + 1)
             add("time", f"{second} to {second + 1} s of {r.name}", rows)
     return sorted(found, key=lambda s: -s.whitened)
+
+
+def worst(found: Sequence[Spot], most: int = 3) -> list[Spot]:
+    """Returns the first `most` spots of each kind, from the whole to the fine.
+
+    Args:
+        found: worst first.
+        most: of a kind.
+    """
+    return [s for kind in KINDS for s in [s for s in found if s.kind == kind][:most]]
+
+
+def limbs_touched(
+    recording: Recording, samples: npt.NDArray[np.int64], person: PersonShape
+) -> npt.NDArray[np.int64]:
+    """Returns (S,m) the limb, of `person.LIMB_NAMES`, that each marker was seen on, or −1.
+
+    Args:
+        recording: whose joints, where they were measured, place the limbs.
+        samples: (S,) indices.
+        person: its pose and sizes.
+    """
+    joints = recording.joint_position
+    markers = recording.marker_position.shape[1]
+    found = np.full((len(samples), markers), -1, dtype=np.int64)
+    distance, owner = np.empty(markers), np.empty(markers, dtype=np.int32)
+    still = np.zeros((6, 3))
+    bodies = person.obstacles(person.posed, still)
+    for row, sample in zip(found, samples, strict=True):
+        if joints is not None:
+            bodies = person.obstacles(joints[sample], still)
+        seen = np.ascontiguousarray(recording.marker_position[sample])
+        nearest_obstacle(seen, bodies.packed, distance, owner)
+        on = np.isfinite(seen).all(axis=1) & (distance < _ON_LIMB)
+        row[on] = person.limb[owner[on]]
+    return found
 
 
 def _speed(recording: Recording) -> FloatArray:
