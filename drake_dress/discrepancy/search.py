@@ -129,7 +129,7 @@ class Search:
         self._experiment, self._rng = experiment, rng
         self._stage, self._progress = stage, progress
         self._columns: list[tuple[Candidate, FloatArray]] = []
-        self._take(comparison, comparison.vector["refined"] - comparison.vector["scenario"])
+        self._take(comparison, _numerics(comparison))
 
     def _take(self, comparison: Comparison, numerics: FloatArray) -> None:
         """Goes on with a comparison; refining the scenario's simulation has changed `numerics`."""
@@ -144,9 +144,10 @@ class Search:
         first = screened = screen(self._comparison, self._columns, self._plain.reference)
         model, named = self._plain, list[Named]()
         fitted: dict[str, tuple[Effect, float]] = {}
+        refused = set[str]()
         while len(model.effects) < _MOST_CAUSES:
             begun = model is self._plain
-            there = {e.NAME for e in model.effects}
+            there = refused | {e.NAME for e in model.effects}
             chosen = [s for s in shortlist(screened) if s.candidate.name not in there]
             least = _LEAST_GAIN if begun else _FURTHER
             if not chosen or chosen[0].gain < 0.5 * least:
@@ -154,7 +155,8 @@ class Search:
             self._stage(f"fitting {', '.join(s.candidate.name for s in chosen)}")
             fits = self._fits(model, [(*model.effects, s.start) for s in chosen])
             if begun:
-                fitted = {f.effects[-1].NAME: (f.effects[-1], self._gain(model, f)) for f in fits}
+                gains = {f.effects[-1].NAME: (f.effects[-1], self._gain(model, f)) for f in fits}
+                fitted = gains | fitted
             best, rest, confidence = self._best(model, fits)
             gain = self._gain(model, best)
             if gain < least or self._confidence(model, [best]) < _SURELY:
@@ -171,9 +173,15 @@ class Search:
                     replace(other, confidence=self._confidence(best, [both])),
                 ]
                 best = both
+            without = self._comparison, self._columns
             best = self._with_its_numerics(best)
             if begun and not self._is_gain(best):
-                return self._found(self._plain, [], None, first, fitted)
+                # what its own numerics may be off explains as much: it is not this one
+                refused.add(news[0].name)
+                self._comparison, self._columns = without
+                self._take(self._comparison, _numerics(self._comparison))
+                model = self._plain
+                continue
             model, named = self._lean(best, named + news)
             screened = screen(self._comparison, self._columns, model.reference)
         return self._found(model, named, None, first, fitted)
@@ -267,6 +275,9 @@ class Search:
             ranked = ranked[:1]
         self._stage(f"refining {', '.join(f.effects[-1].NAME for f in ranked)}")
         ranked = [self._refined(f) for f in ranked]
+        if len(ranked) == 1:
+            # what is a gain by coarse simulations need not be one here before it is polished
+            confidence = min(confidence, self._confidence(before, ranked))
         for _ in range(_POLISHED):
             if confidence >= _CERTAIN or all(f.settled for f in ranked):
                 break
@@ -350,3 +361,8 @@ class Search:
         totals = np.stack([a[draws].sum(axis=1) for a in losses])
         wins = (totals.argmin(axis=0) == 0) & (totals[0] < start[draws].sum(axis=1))
         return float(wins.mean())
+
+
+def _numerics(comparison: Comparison) -> FloatArray:
+    """Returns (N,) whitened, what refining the scenario's simulation changes without effects."""
+    return comparison.vector["refined"] - comparison.vector["scenario"]

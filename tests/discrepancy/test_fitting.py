@@ -7,67 +7,9 @@ import pytest
 
 from drake_dress.discrepancy.attribution import compare, screen
 from drake_dress.discrepancy.candidates import Candidate, Probe
-from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.fitting import Evidence, fit_again, fit_all, with_slopes
-from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.effects.mass import SurfaceDensity
-
-COUNT, SAMPLES, MARKERS, NOISE = 4, 200, 6, 1e-3
-TRUTH = 0.05
-ASTRAY = 2
-
-
-class MadeUp:
-    """Simulations that move markers in proportion to what cloth weighs more.
-
-    From a weight on, the coarsest one folds the cloth of one recording another way.
-    """
-
-    def __init__(self, rng, folds_from=0.02):
-        time = np.arange(SAMPLES) * 0.02
-        self.told_at = []
-        self._folds_from = folds_from
-        self._base = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
-        self._slope = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
-        self._other = rng.normal(0.0, 0.03, (SAMPLES, MARKERS, 3))
-        self._finer = rng.normal(0.0, 0.2e-3, (2, COUNT, SAMPLES, MARKERS, 3))
-        path = np.zeros((SAMPLES, 2, 3))
-        self.recordings = []
-        for i in range(COUNT):
-            seen = self._marker("refined", i, TRUTH) + rng.normal(0.0, NOISE, (SAMPLES, MARKERS, 3))
-            self.recordings.append(
-                Recording(
-                    f"r{i}", time, path, seen, np.zeros((MARKERS, 3)), None, None, NOISE, 0.05
-                )
-            )
-        self.samples = [np.arange(SAMPLES)] * COUNT
-
-    def slope(self, i):
-        return self._slope[i]
-
-    def tell(self, jobs, progress=None):
-        answer = []
-        for level, effects in jobs:
-            levels = [level] * COUNT if isinstance(level, str) else level
-            self.told_at.append(tuple(levels))
-            added = sum(e.added for e in effects)
-            answer.append(
-                [
-                    Told(self._marker(at, i, added), np.zeros((SAMPLES, 2, 3)), np.zeros(SAMPLES))
-                    for i, at in enumerate(levels)
-                ]
-            )
-        return answer
-
-    def _marker(self, level, i, added):
-        marker = self._base[i] + added * self._slope[i]
-        if level in ("screening", "scenario"):
-            marker = marker + self._finer[0, i]
-        if level == "doubled":
-            marker = marker + self._finer[1, i]
-        if level == "screening" and i == ASTRAY and abs(added) > self._folds_from:
-            marker = marker + self._other
-        return marker
+from tests.discrepancy.made_up import ASTRAY, COUNT, TRUTH, MadeUp
 
 
 @pytest.fixture(params=[0, 1, 2])

@@ -1,0 +1,90 @@
+"""Simulations that are made up: linear, but for cloth that folds otherwise, and a decoy."""
+
+import numpy as np
+
+from drake_dress.discrepancy.experiment import Told
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.effects.fabric import StretchStiffness
+
+COUNT, SAMPLES, MARKERS, NOISE = 4, 200, 6, 1e-3
+TRUTH = 0.05
+ASTRAY = 2
+# Stretch stiffness, N/m, that changes as much as 1 kg/m² of weight.
+DECOY = 1e4
+
+
+class MadeUp:
+    """Simulations that move markers in proportion to what cloth weighs more.
+
+    From a weight on, the coarsest one folds the cloth of one recording another way. Finer ones are
+    `steeper` by that factor. Stretch stiffness is a decoy: it does what weight does and a little
+    that was seen besides, but what refining changes with it is larger than all of that. Effects
+    act `during` those samples only, by steady offsets, while cloth touches the person.
+    """
+
+    def __init__(self, rng, folds_from=0.02, steeper=1.0, besides=0.0, during=slice(None)):
+        time = np.arange(SAMPLES) * 0.02
+        self.told_at = []
+        self._folds_from, self._steeper = folds_from, steeper
+        self._base = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
+        self._slope = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
+        self._other = rng.normal(0.0, 0.03, (SAMPLES, MARKERS, 3))
+        self._besides = (
+            np.random.default_rng(7).normal(0.0, 1.0, (COUNT, SAMPLES, MARKERS, 3))
+            * besides
+            / TRUTH
+        )
+        self._touching = np.zeros(SAMPLES)
+        self._touching[during] = 1.0
+        for slope in (self._slope, self._besides):
+            if during != slice(None):
+                slope[:] = slope[:, :1] * self._touching[:, None, None]
+        self._finer = rng.normal(0.0, 0.2e-3, (2, COUNT, SAMPLES, MARKERS, 3))
+        path = np.zeros((SAMPLES, 2, 3))
+        self.recordings = []
+        for i in range(COUNT):
+            seen = self._marker("refined", i, TRUTH / steeper, 0.0)
+            seen = seen + TRUTH * self._besides[i]
+            seen = seen + rng.normal(0.0, NOISE, (SAMPLES, MARKERS, 3))
+            self.recordings.append(
+                Recording(
+                    f"r{i}", time, path, seen, np.zeros((MARKERS, 3)), None, None, NOISE, 0.05
+                )
+            )
+        self.samples = [np.arange(SAMPLES)] * COUNT
+
+    def slope(self, i):
+        return self._slope[i]
+
+    def tell(self, jobs, progress=None):
+        answer = []
+        for level, effects in jobs:
+            levels = [level] * COUNT if isinstance(level, str) else level
+            self.told_at.append(tuple(levels))
+            decoy = sum(e.added for e in effects if isinstance(e, StretchStiffness)) / DECOY
+            added = sum(e.added for e in effects if not isinstance(e, StretchStiffness))
+            answer.append(
+                [
+                    Told(
+                        self._marker(at, i, added, decoy),
+                        np.zeros((SAMPLES, 2, 3)),
+                        self._touching,
+                    )
+                    for i, at in enumerate(levels)
+                ]
+            )
+        return answer
+
+    def _marker(self, level, i, added, decoy):
+        steeper = 1.0 if level == "screening" else self._steeper
+        marker = self._base[i] + steeper * (added + decoy) * self._slope[i]
+        marker = marker + decoy * self._besides[i]
+        if level == "scenario" and decoy != 0.0:
+            marker = marker + 2.0 * self._touching[:, None, None] * self._other
+        if level in ("screening", "scenario"):
+            marker = marker + self._finer[0, i]
+        if level == "doubled":
+            marker = marker + self._finer[1, i]
+        if level == "screening" and i == ASTRAY and abs(added) > self._folds_from:
+            marker = marker + self._other
+        return marker

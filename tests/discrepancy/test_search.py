@@ -1,0 +1,60 @@
+"""The search for causes, on simulations that are made up."""
+
+import numpy as np
+import pytest
+
+from drake_dress.discrepancy import search
+from drake_dress.discrepancy.attribution import compare
+from drake_dress.discrepancy.candidates import Candidate, Probe
+from drake_dress.discrepancy.search import Search
+from drake_dress.models.effects.fabric import StretchStiffness
+from drake_dress.models.effects.mass import SurfaceDensity
+from tests.discrepancy.made_up import DECOY, TRUTH, MadeUp
+
+WEIGHT, STIFFNESS = SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY)
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """Returns what a search finds in a made-up lab among the effects that are given."""
+
+    def run(lab, *effects):
+        comparison = compare(lab)
+
+        def probe(experiment, comparison, progress=None):
+            columns = []
+            for e in effects:
+                (told,) = lab.tell([("screening", [e])])
+                column = comparison.whitening.vector(told) - comparison.vector["screening"]
+                candidate = Candidate(e.NAME, (Probe(e, "added", -np.inf),))
+                columns.append((candidate, column[:, None]))
+            return columns
+
+        monkeypatch.setattr(search, "probe", probe)
+        rng = np.random.default_rng(0)
+        return Search(lab, comparison, rng, lambda _: None, None).run()
+
+    return run
+
+
+@pytest.mark.parametrize("steeper", [1.0, 2.5])
+def test_a_cause_that_coarse_cloth_makes_too_large_is_polished_before_it_is_judged(found, steeper):
+    lab = MadeUp(np.random.default_rng(0), np.inf, steeper)
+    result = found(lab, WEIGHT)
+    assert [n.name for n in result.named] == ["surface_density"]
+    (effect,) = result.model.effects
+    std = result.model.fit.std["surface_density"]["added"]
+    assert abs(effect.added - TRUTH / steeper) < 4.0 * std
+
+
+def test_a_kin_whose_own_numerics_explain_as_much_makes_room_for_the_cause(found):
+    lab = MadeUp(np.random.default_rng(0), np.inf, besides=1e-3, during=slice(160, None))
+    # alone it is refused, and what is left is told by the noise that was there before it was tried
+    alone = found(lab, STIFFNESS)
+    assert alone.named == () and alone.model is alone.plain
+    left = np.mean((alone.comparison.whitening.data - alone.plain.predicted) ** 2)
+    assert left > 2.0
+    result = found(lab, STIFFNESS, WEIGHT)
+    assert result.fitted["stretch_stiffness"][1] > result.fitted["surface_density"][1]
+    assert [n.name for n in result.named] == ["surface_density"]
+    assert result.model.effects[0].added == pytest.approx(TRUTH, rel=0.1)
