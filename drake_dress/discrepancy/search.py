@@ -160,7 +160,10 @@ class Search:
             best, rest, confidence = self._best(model, fits)
             gain = self._gain(model, best)
             if gain < least or self._confidence(model, [best]) < _SURELY:
-                break
+                if not begun:
+                    break
+                refused.add(best.effects[-1].NAME)
+                continue
             news = [Named(best.effects[-1].NAME, gain, confidence)]
             if rest is not None and confidence < _SURE:
                 other = Named(rest.effects[-1].NAME, self._gain(model, rest), 1.0 - confidence)
