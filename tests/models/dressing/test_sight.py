@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from drake_dress.models.dressing.sight import (
     distance_to_opening,
@@ -90,13 +91,15 @@ def test_an_opening_at_the_eye_goes_back() -> None:
     assert move[2] < -0.05
 
 
-def test_the_move_turns_with_its_frame() -> None:
+@given(st.integers(0, 2**32 - 1))
+def test_the_move_turns_with_its_frame(seed: int) -> None:
+    # The edges of this curtain bar no line of sight by a hair: rounding does not choose the move.
     x = SMALL.copy()
-    x[24:] += [0.11, 0.06, 0.0]
+    x[24:] += [0.117, 0.043, 0.003]
     straight = move_into_sight(x, FACES, LOOP, UP, EYE, FAR, 1.0, np.eye(3))
-    q, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
-    turned = move_into_sight(x @ q.T, FACES, LOOP, q @ UP, q @ EYE, q @ FAR, 1.0, q.T)
     assert np.linalg.norm(straight) > 0.0
+    q = Rotation.random(rng=seed).as_matrix()
+    turned = move_into_sight(x @ q.T, FACES, LOOP, q @ UP, q @ EYE, q @ FAR, 1.0, q.T)
     np.testing.assert_allclose(turned, q @ straight, atol=1e-9)
 
 
