@@ -26,6 +26,8 @@ from drake_dress.models.effects.effect import Effect
 FloatArray = npt.NDArray[np.float64]
 
 DISCRETISATION = "discretisation"
+# A cause below this confidence is told as likely, not as found.
+BELIEVED = 0.9
 # Numerics are named where they are off by so many times the markers' noise, and refining them takes
 # away at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
@@ -107,6 +109,12 @@ class Explanation:
     def effects(self) -> tuple[Effect, ...]:
         """The physical effects found."""
         return tuple(c.effect for c in self.causes if c.effect is not None)
+
+    @property
+    def doubted(self) -> Cause | None:
+        """The cause with least confidence, where that is little."""
+        least = min(self.causes, key=lambda c: c.confidence, default=None)
+        return None if least is None or least.confidence >= BELIEVED else least
 
 
 def explain(

@@ -41,7 +41,7 @@ def report_page(
         scenario_text: resolved YAML of the scenario.
     """
     x = explanation
-    good = x.verdict in ("nothing", "named")
+    good = x.verdict in ("nothing", "named") and x.doubted is None
     residuals = _Residuals(x, experiment)
     parts = [
         f'<header class="{"good" if good else "bad"}"><h1>{html.escape(headline(x))}</h1>'

@@ -66,4 +66,9 @@ def headline(explanation: Explanation) -> str:
     ]
     if x.verdict == "ambiguous":
         return f"Either {' or '.join(names)}: these recordings do not tell them apart."
+    if x.doubted is not None:
+        sure = f"confidence {100.0 * x.doubted.confidence:.0f} %"
+        if len(names) > 1:
+            sure += f" in {plain(x.doubted.name)}"
+        return f"What the simulation lacks is likely {', and '.join(names)}; {sure}."
     return f"What the simulation lacks is {', and '.join(names)}."

@@ -17,6 +17,7 @@ from drake_dress.discrepancy.motions import MOTIONS
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.discrepancy.sentences import plain
+from drake_dress.models.effects.effect import Effect
 
 _DURATION, _RATE, _MARKERS = 4.0, 50.0, 40
 _WORDS = {
@@ -38,8 +39,8 @@ def suggest(
 ) -> str | None:
     """Returns which motion to record; None where nothing is open.
 
-    For two candidates every motion is simulated under both: that in which markers and forces differ
-    most, in units of their noise, tells them apart best.
+    For two candidates, or a doubted cause and the next best, every motion is simulated under
+    both: that in which markers and forces differ most, in units of their noise, tells them apart.
 
     Args:
         explanation: what was found.
@@ -52,9 +53,11 @@ def suggest(
             f"Record each of {', '.join(MOTIONS)} on its own, a few times, to see in "
             "which the residual appears; the list of effects may lack its cause."
         )
-    if explanation.verdict != "ambiguous":
+    rivals = _rivals(explanation)
+    if rivals is None:
         return None
-    first, second = explanation.causes[-2:]
+    first, second = rivals
+    beside = [e for e in explanation.effects if e not in rivals]
     p = scenario.plant
     numerics = levels(Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance))
     lab = Lab.of(scenario, base, numerics["screening"])
@@ -62,17 +65,34 @@ def suggest(
     for name in MOTIONS:
         stage(f"simulating {name} under both candidates")
         told = []
-        for cause in (first, second):
-            effects = [c.effect for c in (*explanation.causes[:-2], cause) if c.effect is not None]
-            told.append(Replayer(lab, _blank(lab, name)).run(effects, gain=0.0))
+        for rival in rivals:
+            told.append(Replayer(lab, _blank(lab, name)).run([*beside, rival], gain=0.0))
         markers = (told[0].marker_position - told[1].marker_position) / 1e-3
         forces = (told[0].gripper_force - told[1].gripper_force) / 0.05
         scores[name] = float(np.mean(markers**2) + np.mean(forces**2))
     best = max(scores, key=lambda n: scores[n])
     return (
-        f"To tell {plain(first.name)} from {plain(second.name)}, {_WORDS.get(best, best)} "
+        f"To tell {plain(first.NAME)} from {plain(second.NAME)}, {_WORDS.get(best, best)} "
         f"(motion {best}): there the two differ by {np.sqrt(scores[best]):.1f} times the noise."
     )
+
+
+def _rivals(explanation: Explanation) -> tuple[Effect, Effect] | None:
+    """Returns two effects of which one may be there; None where nothing is open.
+
+    A cause that is named with little confidence has the candidate that did best beside it for its
+    rival.
+    """
+    found = explanation.effects
+    if explanation.verdict == "ambiguous":
+        return found[-2], found[-1]
+    doubted = explanation.doubted
+    if explanation.verdict != "named" or doubted is None or doubted.effect is None:
+        return None
+    others = [s for s in explanation.scores if s.effect and s.name not in {e.NAME for e in found}]
+    # a fit may have gone astray, so what screening says counts as well
+    best = max(others, key=lambda s: max(s.screened, s.fitted or 0.0), default=None)
+    return None if best is None or best.effect is None else (doubted.effect, best.effect)
 
 
 def _blank(lab: Lab, motion: str) -> Recording:

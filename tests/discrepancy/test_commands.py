@@ -5,42 +5,72 @@ import signal
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 
 import pytest
 
-from drake_dress.discrepancy.explanation import Cause
+from drake_dress.discrepancy.explanation import Cause, Explanation, Score
 from drake_dress.discrepancy.motions import MOTIONS
+from drake_dress.discrepancy.sentences import headline
 from drake_dress.discrepancy.suggestion import suggest
 from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.models.effects.registry import EFFECTS
 from tests.discrepancy.data import QUICK, SCENARIO, quick_scenario, recordings
 
 
-def cause(name, **values):
-    return Cause(name, EFFECTS[name](**values), {}, 0.1, 0.5)
+def cause(name, confidence=0.95, **values):
+    return Cause(name, EFFECTS[name](**values), {}, 0.1, confidence)
+
+
+def found(verdict, *causes, scores=()):
+    none = (0.0, 0.0)
+    return Explanation(
+        verdict, list(causes), list(scores), {}, (0.0, 0.0, 0.0), none, none, none, 0.0, None, None
+    )
+
+
+def suggested(explanation):
+    return suggest(explanation, quick_scenario(), SCENARIO.parent)
+
+
+FRICTION = {"added": 0.3}
 
 
 def test_a_motion_is_suggested_that_tells_two_candidates_apart():
     # without contact both do nothing
-    pair = [cause("friction", added=0.3), cause("adhesion", strength=100.0)]
-    told = suggest(
-        SimpleNamespace(verdict="ambiguous", causes=pair), quick_scenario(), SCENARIO.parent
-    )
+    pair = cause("friction", **FRICTION), cause("adhesion", strength=100.0)
+    told = suggested(found("ambiguous", *pair))
     chosen = [m for m in MOTIONS if f"(motion {m})" in told]
     assert chosen and chosen[0] in ("drag", "shift", "dress")
     assert "friction" in told and "clings" in told
 
 
+def test_a_cause_that_is_doubted_is_told_as_likely_and_held_against_the_next_best():
+    scores = [
+        Score("friction", 0.2, 0.3, EFFECTS["friction"](**FRICTION)),
+        Score("wind", 0.01, None, EFFECTS["wind"](x=1.0)),
+        Score("adhesion", 0.1, -0.5, EFFECTS["adhesion"](strength=100.0)),
+    ]
+    doubted = found("named", cause("friction", 0.61, **FRICTION), scores=scores)
+    assert "likely" in headline(doubted) and "61 %" in headline(doubted)
+    told = suggested(doubted)
+    assert "friction" in told and "clings" in told
+
+
+def test_of_several_causes_the_doubted_one_is_told():
+    pair = cause("wind", 0.97, x=1.0), cause("friction", 0.5, **FRICTION)
+    assert "confidence 50 % in the friction" in headline(found("named", *pair))
+
+
 @pytest.mark.parametrize("verdict", ["nothing", "named"])
 def test_nothing_is_suggested_where_nothing_is_open(verdict):
-    found = SimpleNamespace(verdict=verdict, causes=[cause("friction", added=0.3)])
-    assert suggest(found, quick_scenario(), SCENARIO.parent) is None
+    causes = [] if verdict == "nothing" else [cause("friction", **FRICTION)]
+    sure = found(verdict, *causes)
+    assert suggested(sure) is None
+    assert "likely" not in headline(sure)
 
 
 def test_where_the_list_lacks_the_cause_more_recordings_are_asked_for():
-    found = SimpleNamespace(verdict="unexplained", causes=[])
-    assert "Record each of" in suggest(found, quick_scenario(), SCENARIO.parent)
+    assert "Record each of" in suggested(found("unexplained"))
 
 
 def test_ctrl_c_ends_at_once_and_leaves_nothing_half_written(tmp_path):
