@@ -1,6 +1,6 @@
 """How well the controller's garment foresees a dressing: step size, iterations and mesh.
 
-    python benchmarks/prediction.py out/dummy_standing-seed0/run.h5
+    python -m benchmarks.prediction out/dummy_standing-seed0/run.h5
 
 From moments of a run on, the controller's garment is led by the grippers as the run led them, past
 the person as it was: what is left is the garment's own error. After 1, 2 and 3 s the centre and
