@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import re
 import sys
 from collections.abc import Sequence
@@ -97,6 +98,12 @@ def _parser() -> argparse.ArgumentParser:
         default=0.0,
         metavar="R",
         help="at most R simulated seconds per second; 0: as fast as it goes (default)",
+    )
+    run.add_argument(
+        "--one-process",
+        action="store_true",
+        help="simulate the garment and solve for plans in this process, too, where other runs use "
+        "the other cores; the numbers are the same",
     )
     run.set_defaults(command=_run)
 
@@ -219,7 +226,8 @@ def _run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, options.set, options.seed)
     source = Path(options.scenario)
     out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
-    return run_scenario(scenario, source, out, options.meshcat, options.realtime_rate)
+    beside = not options.one_process and (os.cpu_count() or 1) > 1
+    return run_scenario(scenario, source, out, options.meshcat, options.realtime_rate, beside)
 
 
 def _replay(options: argparse.Namespace) -> int:

@@ -56,6 +56,7 @@ class Parts:
     policy: DressingPolicy
     limits: SafetyLimits
     page: Meshcat | None
+    beside: bool = False
 
 
 def garments(scenario: Scenario, source: Path) -> tuple[Garments, SafetyLimits]:
@@ -78,7 +79,11 @@ def garments(scenario: Scenario, source: Path) -> tuple[Garments, SafetyLimits]:
 
 
 def parts(
-    scenario: Scenario, meshes: Garments, limits: SafetyLimits, page: Meshcat | None = None
+    scenario: Scenario,
+    meshes: Garments,
+    limits: SafetyLimits,
+    page: Meshcat | None = None,
+    beside: bool = False,
 ) -> Parts:
     """Returns the parts of a scenario's diagram.
 
@@ -87,10 +92,12 @@ def parts(
         meshes: its garments.
         limits: within which it starts.
         page: where the run is shown, if it is.
+        beside: whether the true garment is stepped, and the global controller solves, in
+            processes of their own.
     """
-    station = plant_station(scenario, meshes.plant, page, meshes.belief)
+    station = plant_station(scenario, meshes.plant, page, meshes.belief, beside)
     policy = controller_policy(scenario, meshes.belief, station.person)
-    return Parts(scenario, meshes, station, policy, limits, page)
+    return Parts(scenario, meshes, station, policy, limits, page, beside)
 
 
 def hardware_parts(
@@ -154,4 +161,5 @@ def wired(
         p.page,
         predictor(p.scenario),
         local,
+        p.beside,
     )

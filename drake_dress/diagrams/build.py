@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -63,6 +63,7 @@ def plant_station(
     mesh: GarmentMesh,
     meshcat: Meshcat | None,
     belief: GarmentMesh | None = None,
+    beside: bool = False,
 ) -> SimulatedStation:
     """Returns the simulated station with the scenario's person and garment.
 
@@ -71,11 +72,13 @@ def plant_station(
         mesh: the true garment.
         meshcat: where it is shown, if it is.
         belief: the controller's garment, of which there are estimates then.
+        beside: whether the true garment is stepped in a process of its own.
     """
     sight = None
     if belief is not None:
         sight = Sight(barycentric_transfer(mesh, belief), 1.0 / scenario.controller.command_rate)
-    return make_simulated_station(station_parameters(scenario, mesh), meshcat, sight)
+    p = replace(station_parameters(scenario, mesh), beside=beside)
+    return make_simulated_station(p, meshcat, sight)
 
 
 def described_person(p: StationParameters) -> Person:

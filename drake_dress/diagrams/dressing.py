@@ -126,6 +126,7 @@ def make_dressing(
     meshcat: Meshcat | None = None,
     predictor: MotionPredictor | None = None,
     local: LocalSetup | None = None,
+    beside: bool = False,
 ) -> Dressing:
     """Returns station and controllers wired together.
 
@@ -139,6 +140,7 @@ def make_dressing(
         meshcat: where the run is shown, if it is.
         predictor: what is believed of how the arms move on; that they stay, when None.
         local: the local controller between plan and governor; the plan is followed when None.
+        beside: whether the global controller solves in a process of its own.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
@@ -154,6 +156,7 @@ def make_dressing(
             rates.global_period,
             rates.global_delay,
             waits=not isinstance(station, HardwareStation),
+            beside=beside,
         ),
     )
     if local is None:

@@ -47,6 +47,7 @@ def run_scenario(
     out: Path,
     meshcat: bool = True,
     realtime_rate: float = 0.0,
+    beside: bool = False,
 ) -> int:
     """Runs a scenario and writes log, summary, report and replay; returns the exit status.
 
@@ -57,6 +58,8 @@ def run_scenario(
         meshcat: whether to show the run live.
         realtime_rate: at most this many simulated seconds per second; 0 for no limit, which is 1
             for hardware.
+        beside: whether the simulated garment is stepped, and the global controller solves, in
+            processes of their own.
 
     Raises:
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
@@ -65,7 +68,7 @@ def run_scenario(
     scenario = apply_variation(scenario)
     meshes, limits = garments(scenario, source)
     page = _open_meshcat() if meshcat else None
-    p = _parts(scenario, source, meshes, limits, page)
+    p = _parts(scenario, source, meshes, limits, page, beside)
     if isinstance(p.station, HardwareStation):
         realtime_rate = realtime_rate or 1.0
 
@@ -98,13 +101,18 @@ def run_scenario(
 
 
 def _parts(
-    scenario: Scenario, source: Path, meshes: Garments, limits: SafetyLimits, page: Meshcat | None
+    scenario: Scenario,
+    source: Path,
+    meshes: Garments,
+    limits: SafetyLimits,
+    page: Meshcat | None,
+    beside: bool,
 ) -> Parts:
     """Returns the parts of the diagram; a problem with arms or hardware is the user's to know."""
     arms, hardware = "station.arms", "station.hardware"
     try:
         if scenario.station.kind == "simulated":
-            return parts(scenario, meshes, limits, page)
+            return parts(scenario, meshes, limits, page, beside)
         with caught_interrupt() as interrupt:
             print(f"listening: {scenario.station.hardware.lcm_url}", flush=True)
             p = hardware_parts(

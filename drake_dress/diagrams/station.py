@@ -105,7 +105,10 @@ _SETTLING_DAMPING = 0.03
 
 @dataclass(frozen=True)
 class StationParameters:
-    """What the simulated station is made of; SI units."""
+    """What the simulated station is made of; SI units.
+
+    `beside`: the garment is stepped in a process of its own.
+    """
 
     mesh: GarmentMesh
     material: Material
@@ -128,6 +131,7 @@ class StationParameters:
     placement: ArmPlacement | None = None
     mode: str = "position_velocity"
     cameras: tuple[Camera, ...] = ()
+    beside: bool = False
 
 
 @dataclass(frozen=True)
@@ -206,6 +210,7 @@ def make_simulated_station(
             person.capsules,
             person.body_indices,
             Mounts(p.effects),
+            p.beside,
         ),
     )
     builder.Connect(plant.get_body_poses_output_port(), cloth.GetInputPort("body_poses"))

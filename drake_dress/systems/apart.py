@@ -49,9 +49,14 @@ class Apart:
 def _begin(work: Callable[..., Any], parent: int) -> None:
     global _worker
     _worker = work
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # who sends commands goes first where cores are few
     os.nice(_NICENESS)
+    end_with(parent)
+
+
+def end_with(parent: int) -> None:
+    """Has this process end with its parent, however that ends, and leave Ctrl-C to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         # it ended before the kernel was told

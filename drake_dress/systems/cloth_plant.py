@@ -19,6 +19,7 @@ from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.human.body import Capsule
+from drake_dress.systems.garment_steps import Steps, StepsBeside, StepsHere, Surroundings
 
 FloatArray = np.ndarray
 
@@ -53,6 +54,9 @@ class ClothPlant(LeafSystem):
     of the garment on the gripper, N. person_forces: list of ExternallyAppliedSpatialForce, one for
     each body that is touched. All outputs depend on discrete state only.
 
+    The garment is one step behind bodies and grippers: a step that begins at k·h, from what they do
+    then, ends at (k + 1)·h, and may go on beside the rest of the diagram meanwhile.
+
     Args:
         cloth: the integrator; its held nodes are those of the left, then of the right gripper.
         held_count: how many nodes the left and the right gripper hold.
@@ -62,6 +66,7 @@ class ClothPlant(LeafSystem):
         body_indices: body name to its index in the plant.
         mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
             limbs that do not know of it.
+        beside: whether steps are made in a process of their own, so that another core can do them.
     """
 
     def __init__(
@@ -73,6 +78,7 @@ class ClothPlant(LeafSystem):
         capsules: Sequence[Capsule],
         body_indices: dict[str, BodyIndex],
         mounts: Mounts | None = None,
+        beside: bool = False,
     ) -> None:
         super().__init__()
         self.cloth = cloth
@@ -88,6 +94,10 @@ class ClothPlant(LeafSystem):
         self._a = np.array([c.a_B for c in capsules])
         self._b = np.array([c.b_B for c in capsules])
         self._radius = np.array([c.radius for c in capsules])
+        self._surroundings = Surroundings(self._radius, len(cloth.held))
+        self._steps: Steps = (StepsBeside if beside else StepsHere)(cloth, self._surroundings)
+        # what the step under way was begun with
+        self._begun: tuple[ClothState, FloatArray] | None = None
 
         self._mounts = mounts or Mounts([])
         self._moved_mass = self._mounts.moved_mass(cloth, self._side)
@@ -104,6 +114,8 @@ class ClothPlant(LeafSystem):
         # Force and moment about the body's origin, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
         self._mount = self.DeclareDiscreteState(MountState.at_rest(len(limbs)).flat())
+        # what the step under way depends on beside the garment; not finite before the first one
+        self._around = self.DeclareDiscreteState(np.full(self._surroundings.size, np.nan))
 
         self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self._velocities = self.DeclareAbstractInputPort(
@@ -157,10 +169,37 @@ class ClothPlant(LeafSystem):
         state = ClothState.at_rest(self.start_position - down)
         still = np.zeros((len(self.cloth.held), 3))
         for _ in range(2):
-            state, _ = self.cloth.step(state, bodies, still)
+            self._steps.begin(state, self._surroundings.flat(bodies, still))
+            state = self._steps.end()
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        n, h = self._n, self.cloth.time_step
+        # between the end of a step and the begin of the next one nothing is done that could be
+        # done while one is under way
+        h = self.cloth.time_step
+        target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
+        bodies = self.obstacles(context)
+        after = self._stepped(context)
+        if not self._mounts.rigid:
+            mount = self._mounted(context, after)
+            target += mount.held
+            bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
+            discrete.set_value(self._mount, mount.flat())
+        held = after.x[self.cloth.held]
+        velocity = (target[self._side] + self._offset - held) / h
+        around = self._surroundings.flat(bodies, velocity)
+        self._begin(after, around)
+
+        discrete.set_value(self._around, around)
+        discrete.set_value(self._x, after.x.ravel())
+        discrete.set_value(self._v, after.v.ravel())
+        discrete.set_value(self._mode, after.mode.astype(np.float64))
+        discrete.set_value(self._owner, after.owner.astype(np.float64))
+        discrete.set_value(self._reaction, after.reaction.ravel())
+        discrete.set_value(self._wrench, self._wrenches(context, after).ravel())
+
+    def _stepped(self, context: Context) -> ClothState:
+        """Returns the garment after the step under way, if there is one."""
+        n = self._n
         # copies: of what may not be written, kernels would be compiled once more
         state = ClothState(
             context.get_discrete_state(self._x).value().reshape(n, 3).copy(),
@@ -169,25 +208,30 @@ class ClothPlant(LeafSystem):
             context.get_discrete_state(self._reaction).value().reshape(n, 3).copy(),
             context.get_discrete_state(self._owner).value().astype(np.int32),
         )
-        held = state.x[self.cloth.held]
-        target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
-        bodies = self.obstacles(context)
-        if not self._mounts.rigid:
-            mount = self._mounted(context, state)
-            target += mount.held
-            bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
-            discrete.set_value(self._mount, mount.flat())
-        held_velocity = (target[self._side] + self._offset - held) / h
+        around = context.get_discrete_state(self._around).value()
+        if not np.isfinite(around).all():
+            return state
+        if not self._is_under_way(state, around):
+            # another context than the one that began it
+            self._begin(state, around.copy())
+        self._begun = None
         try:
-            after, _ = self.cloth.step(state, bodies, held_velocity)
+            return self._steps.end()
         except ValueError as error:
             raise ValueError(f"garment at {context.get_time():.3f} s: {error}") from error
-        discrete.set_value(self._x, after.x.ravel())
-        discrete.set_value(self._v, after.v.ravel())
-        discrete.set_value(self._mode, after.mode.astype(np.float64))
-        discrete.set_value(self._owner, after.owner.astype(np.float64))
-        discrete.set_value(self._reaction, after.reaction.ravel())
-        discrete.set_value(self._wrench, self._wrenches(context, state.x, after).ravel())
+
+    def _begin(self, state: ClothState, around: FloatArray) -> None:
+        self._steps.begin(state, around)
+        self._begun = state, around
+
+    def _is_under_way(self, state: ClothState, around: FloatArray) -> bool:
+        """Returns whether the step that was begun last is the one of these."""
+        if self._begun is None:
+            return False
+        begun, with_this = self._begun
+        return np.array_equal(around, with_this) and all(
+            np.array_equal(getattr(begun, k), value) for k, value in vars(state).items()
+        )
 
     def _mounted(self, context: Context, state: ClothState) -> MountState:
         """Returns how far grippers and limbs have given way at the end of this step."""
@@ -197,11 +241,11 @@ class ClothPlant(LeafSystem):
         h = self.cloth.time_step
         return self._mounts.step(mount, np.stack(pulled), force, h, self._moved_mass)
 
-    def _wrenches(self, context: Context, x: FloatArray, after: ClothState) -> FloatArray:
+    def _wrenches(self, context: Context, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
         poses = self._poses.Eval(context)
         origin = np.array([poses[i].translation() for i in self._index])
-        return body_wrenches(self._body_of, origin, x, after.owner, after.reaction)
+        return body_wrenches(self._body_of, origin, after.x, after.owner, after.reaction)
 
     def _calc(self, index):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:

@@ -79,13 +79,13 @@ class GlobalMpc(LeafSystem):
     the plan in use answers was seen, s.
 
     A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine. It runs on a thread of its
-    own meanwhile, beside the simulated garment. Where the world does not wait, `waits` is False:
-    it runs in a process of its own, a plan is used from k·period + delay on or from when it is
-    there, if that is later, and no solve begins before the one before it has ended. What the plan
-    before it does until then is part of the prediction and not changed. But no plan is used beyond
-    its end by more than a period: then the plan is to rest, until there is another. A solve that
-    fails, or takes longer than `patience`, was the last one.
+    however long it really took: the run is the same on any machine. It runs meanwhile on a thread,
+    or `beside` in a process of its own, which the rest of the diagram slows down less. Where the
+    world does not wait, `waits` is False: it runs in a process, a plan is used from
+    k·period + delay on or from when it is there, if that is later, and no solve begins before the
+    one before it has ended. What the plan before it does until then is part of the prediction and
+    not changed. But no plan is used beyond its end by more than a period: then the plan is to rest,
+    until there is another. A solve that fails, or takes longer than `patience`, was the last one.
 
     Args:
         policy: does the work.
@@ -94,6 +94,7 @@ class GlobalMpc(LeafSystem):
             the policy's committed steps.
         waits: whether the world waits for a solve that takes longer than its delay.
         patience: with a solve, where it does not, s.
+        beside: whether solves run in a process of their own where the world waits, too.
 
     Attributes:
         failure: why there are no plans any more; None while there are.
@@ -106,6 +107,7 @@ class GlobalMpc(LeafSystem):
         delay: float,
         waits: bool = True,
         patience: float = 10.0,
+        beside: bool = False,
     ) -> None:
         super().__init__()
         if not 0.0 < delay < period:
@@ -119,7 +121,7 @@ class GlobalMpc(LeafSystem):
         self._patience = patience
         self.failure: str | None = None
         solve = _Solve(policy)
-        self._apart = None if waits else Apart(solve)
+        self._apart = Apart(solve) if beside or not waits else None
         if self._apart is None:
             threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
             self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)

@@ -283,7 +283,8 @@ class ImplicitCloth:
         for start in (v.copy(), other):
             start[self.held] = held_velocity
             size = self._system.residual2(start, self._block, rhs, mode, normal)
-            if size < least:
+            # what is no number is taken, too: it is told at the end of the step
+            if not size >= least:
                 best, least = start, size
         return best
 

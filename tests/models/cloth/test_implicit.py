@@ -183,3 +183,12 @@ def test_input_that_is_not_finite_names_its_node_and_changes_nothing(name: str) 
     np.testing.assert_array_equal(state.v, kept[1])
     good, _ = cloth.step(ClothState.at_rest(x), Obstacles.none(), np.zeros((2, 3)))
     assert np.isfinite(good.x).all()
+
+
+def test_motion_of_held_nodes_that_is_not_finite_is_told() -> None:
+    x, e = sheet_elements(6, 6, 0.02)
+    cloth = ImplicitCloth(e, Material(), H, np.array([0, 5], dtype=np.int32))
+    motion = np.zeros((2, 3))
+    motion[1, 0] = np.nan
+    with pytest.raises(ValueError, match="held"):
+        cloth.step(ClothState.at_rest(x), Obstacles.none(), motion)

@@ -1,0 +1,227 @@
+"""Steps of a garment that go on while the rest of a diagram does: here, or in a process beside it.
+
+A step is begun with all that it depends on, and its result is asked for a period later. Which of
+the two it is makes no difference to the numbers.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.systems.apart import end_with
+
+FloatArray = npt.NDArray[np.float64]
+# The fields of a state that are vectors of the nodes, and those that are numbers of theirs.
+_VECTORS, _NUMBERS = ("x", "v", "reaction"), ("mode", "owner")
+# What is said of a step that begins: it goes on from the last one, or from a state that is given.
+_GO_ON, _FROM_GIVEN = b"\0", b"\1"
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """How all that a step depends on beside the garment stands in one array.
+
+    Attributes:
+        radius: (m,) of the capsules, m.
+        held_count: of nodes with prescribed motion.
+    """
+
+    radius: FloatArray
+    held_count: int
+
+    @property
+    def size(self) -> int:
+        """Of the array."""
+        return 12 * len(self.radius) + 3 * self.held_count
+
+    def flat(self, capsules: Obstacles, held_velocity: FloatArray) -> FloatArray:
+        """Returns the array of `size` for capsules and the velocities (k,3) of the held nodes."""
+        c = capsules
+        parts = (c.a, c.b, c.velocity, c.angular_velocity, held_velocity)
+        return np.concatenate([p.ravel() for p in parts])
+
+    def of(self, flat: FloatArray) -> tuple[Obstacles, FloatArray]:
+        """Returns capsules and velocities (k,3) that stand in an array."""
+        end = 12 * len(self.radius)
+        a, b, velocity, omega = flat[:end].reshape(4, -1, 3)
+        return Obstacles(a, b, self.radius, velocity, omega), flat[end:].reshape(-1, 3)
+
+
+class Steps(Protocol):
+    """Steps of a garment, one at a time."""
+
+    def begin(self, state: ClothState, around: FloatArray) -> None:
+        """Begins a step from `state`, `around` as `Surroundings` has it.
+
+        One that was begun and not ended is forgotten.
+        """
+
+    def end(self) -> ClothState:
+        """Returns the state after the step that was begun last.
+
+        Its arrays may be written to by the step after the next one.
+
+        Raises:
+            ValueError: something in it is not finite.
+            RuntimeError: no step was begun, or what steps the garment is gone.
+        """
+
+
+class StepsHere:
+    """Steps that are made when their result is asked for.
+
+    Args:
+        cloth: steps the garment.
+        surroundings: of it.
+    """
+
+    def __init__(self, cloth: Integrator, surroundings: Surroundings) -> None:
+        self._cloth, self._surroundings = cloth, surroundings
+        self._begun: tuple[ClothState, FloatArray] | None = None
+
+    def begin(self, state: ClothState, around: FloatArray) -> None:
+        """See `Steps`."""
+        self._begun = state, around
+
+    def end(self) -> ClothState:
+        """See `Steps`."""
+        if self._begun is None:
+            raise RuntimeError("no step was begun")
+        (state, around), self._begun = self._begun, None
+        return self._cloth.step(state, *self._surroundings.of(around))[0]
+
+
+class StepsBeside:
+    """Steps that are made in a process of their own from when they are begun.
+
+    States come in shared memory, in two places in turn, so that one is read while the next is made.
+    The process begins at once and ends with this one, however that ends.
+
+    Args:
+        cloth: steps the garment; it is copied.
+        surroundings: of it.
+    """
+
+    def __init__(self, cloth: Integrator, surroundings: Surroundings) -> None:
+        # forked from a process with threads, Numba and BLAS may hang
+        context = multiprocessing.get_context("spawn")
+        shared = _Shared(cloth.elements.node_count, surroundings.size, context.RawArray)
+        self._places, self._around = shared.states(), shared.around()
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(
+            target=_serve,
+            args=(cloth, surroundings, shared, other, os.getpid()),
+            daemon=True,
+            name="garment",
+        )
+        self._process.start()
+        other.close()
+        self._under_way = False
+        self._place = 0
+        self._last: ClothState | None = None
+
+    def begin(self, state: ClothState, around: FloatArray) -> None:
+        """See `Steps`."""
+        if self._under_way:
+            self._answer()
+        goes_on = state is self._last
+        self._place = 1 - self._place
+        if not goes_on:
+            _copy(state, self._places[self._place])
+        self._around[:] = around
+        try:
+            self._pipe.send_bytes(_GO_ON if goes_on else _FROM_GIVEN)
+        except OSError as error:
+            raise RuntimeError(self._gone()) from error
+        self._under_way = True
+
+    def end(self) -> ClothState:
+        """See `Steps`."""
+        if not self._under_way:
+            raise RuntimeError("no step was begun")
+        problem = self._answer()
+        if problem:
+            raise ValueError(problem)
+        self._last = self._places[self._place]
+        return self._last
+
+    def _answer(self) -> str:
+        """Waits for the step under way; returns what was wrong with it, if anything."""
+        self._under_way, self._last = False, None
+        try:
+            return self._pipe.recv_bytes().decode()
+        except (EOFError, OSError) as error:
+            raise RuntimeError(self._gone()) from error
+
+    def _gone(self) -> str:
+        self._process.join(1.0)
+        return f"the process that steps the garment has ended (exit {self._process.exitcode})"
+
+
+class _Shared:
+    """Memory that two processes share: two states, and what is around.
+
+    Args:
+        n: nodes.
+        size: of what is around.
+        make: makes an array of a C type that both see.
+    """
+
+    def __init__(self, n: int, size: int, make: Callable[[str, int], Any]) -> None:
+        self._around = make("d", size)
+        self._states = [
+            {k: make("d", 3 * n) for k in _VECTORS} | {k: make("i", n) for k in _NUMBERS}
+            for _ in range(2)
+        ]
+
+    def around(self) -> FloatArray:
+        """Returns the array."""
+        return np.frombuffer(self._around, np.float64)
+
+    def states(self) -> list[ClothState]:
+        """Returns the states whose arrays are that memory."""
+        found = []
+        for m in self._states:
+            x, v, reaction = (np.frombuffer(m[k], np.float64).reshape(-1, 3) for k in _VECTORS)
+            mode, owner = (np.frombuffer(m[k], np.int32) for k in _NUMBERS)
+            found.append(ClothState(x, v, mode, reaction, owner))
+        return found
+
+
+def _copy(source: ClothState, target: ClothState) -> None:
+    for name in (*_VECTORS, *_NUMBERS):
+        getattr(target, name)[:] = getattr(source, name)
+
+
+def _serve(
+    cloth: Integrator, surroundings: Surroundings, shared: _Shared, pipe: Connection, parent: int
+) -> None:
+    end_with(parent)
+    places, around = shared.states(), shared.around()
+    place, state = 0, places[0]
+    while True:
+        try:
+            word = pipe.recv_bytes()
+        except EOFError:
+            return
+        place = 1 - place
+        if word == _FROM_GIVEN:
+            state = ClothState(**{k: np.array(a) for k, a in vars(places[place]).items()})
+        try:
+            state, _ = cloth.step(state, *surroundings.of(around.copy()))
+        except ValueError as error:
+            pipe.send_bytes(str(error).encode())
+            continue
+        _copy(state, places[place])
+        pipe.send_bytes(b"")
