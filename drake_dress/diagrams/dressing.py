@@ -62,8 +62,8 @@ class LocalSetup:
     joints_count: int
     record: list[LocalProblem] | None = None
 
-    def system(self) -> LocalCompensation:
-        """Returns it as a system."""
+    def system(self, beside: bool = False) -> LocalCompensation:
+        """Returns it as a system; `beside` the rest it solves on a thread."""
         return LocalCompensation(
             self.controller,
             self.period,
@@ -72,6 +72,7 @@ class LocalSetup:
             self.joints_count,
             self.feedback,
             self.record,
+            beside,
         )
 
 
@@ -140,7 +141,7 @@ def make_dressing(
         meshcat: where the run is shown, if it is.
         predictor: what is believed of how the arms move on; that they stay, when None.
         local: the local controller between plan and governor; the plan is followed when None.
-        beside: whether the global controller solves in a process of its own.
+        beside: whether controllers solve beside the rest, the global one in a process of its own.
     """
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
@@ -162,7 +163,7 @@ def make_dressing(
     if local is None:
         asking = builder.AddNamedSystem("plan_follower", PlanFollower())
     else:
-        asking = builder.AddNamedSystem("local_controller", local.system())
+        asking = builder.AddNamedSystem("local_controller", local.system(beside))
     governor = builder.AddNamedSystem(
         "safety_governor",
         SafetyGovernor(station.start_grippers, rates.command_period, limits, policy.person),

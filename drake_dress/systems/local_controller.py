@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time as clock
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -53,7 +55,8 @@ class LocalCompensation(LeafSystem):
     and the count of solves ended.
 
     A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine.
+    however long it really took: the run is the same on any machine. It may run `beside` the rest of
+    the diagram meanwhile, on a thread.
 
     Args:
         controller: does the work.
@@ -63,6 +66,7 @@ class LocalCompensation(LeafSystem):
         joints_count: M, how many there are beyond now.
         feedback: whether to correct between solves.
         record: takes each problem solved, if given.
+        beside: whether to solve on a thread, while the rest of the diagram waits for others.
     """
 
     def __init__(
@@ -74,6 +78,7 @@ class LocalCompensation(LeafSystem):
         joints_count: int,
         feedback: bool = True,
         record: list | None = None,
+        beside: bool = False,
     ) -> None:
         super().__init__()
         if not 0.0 < delay < period:
@@ -82,6 +87,8 @@ class LocalCompensation(LeafSystem):
         self._joints_step = joints_step
         self._feedback = feedback
         self._record = record
+        self._threads = ThreadPoolExecutor(1, "local-controller") if beside else None
+        self._pending: Future[_Memory] | None = None
         idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
         resting = controller.resting(0.0)
         self._memory = self.DeclareAbstractState(Value(_Memory(LocalState(), resting)))
@@ -120,24 +127,35 @@ class LocalCompensation(LeafSystem):
         begin = clock.perf_counter()
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
         joints = self.GetInputPort("predicted_joint_position").Eval(context).reshape(-1, 6, 3)
-        outcome = self._controller.solve(
+        seen = (
             memory.state,
             self.GetInputPort("plan").Eval(context),
-            self._garment(context),
+            self._garment(context).copy(),
             self._grippers(context),
-            joints,
+            joints.copy(),
             self._joints_step,
             context.get_time(),
         )
+        looked = clock.perf_counter() - begin
+        if self._threads is not None:
+            self._pending = self._threads.submit(self._solved, looked, *seen)
+        else:
+            state.get_mutable_abstract_state(self._memory).set_value(self._solved(looked, *seen))
+
+    def _solved(self, looked: float, *seen: Any) -> _Memory:
+        """Returns what is known after a solve, for which it took `looked`, s, to see."""
+        begin = clock.perf_counter()
+        outcome = self._controller.solve(*seen)
         if self._record is not None and outcome.problem is not None:
             self._record.append(outcome.problem)
-        spent = np.nan if outcome.problem is None else clock.perf_counter() - begin
-        state.get_mutable_abstract_state(self._memory).set_value(
-            _Memory(outcome.state, outcome.plan, spent)
-        )
+        spent = np.nan if outcome.problem is None else looked + clock.perf_counter() - begin
+        return _Memory(outcome.state, outcome.plan, spent)
 
     def _adopt(self, context: Context, state: State) -> None:
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        if self._pending is not None:
+            memory, self._pending = self._pending.result(), None
+            state.get_mutable_abstract_state(self._memory).set_value(memory)
         state.get_mutable_abstract_state(self._plan).set_value(memory.plan)
         if np.isfinite(memory.solve_time):
             ended = context.get_discrete_state(self._shown).value()[1] + 1.0

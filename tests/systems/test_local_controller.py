@@ -26,10 +26,12 @@ def controller() -> LocalController:
     return LocalController(planner, LocalParameters())
 
 
-def simulator(controller: LocalController, feedback: bool = True):  # type: ignore[no-untyped-def]
+def simulator(  # type: ignore[no-untyped-def]
+    controller: LocalController, feedback: bool = True, beside: bool = False
+):
     """Returns a simulator of the system alone: a coat behind a person, and a plan to rest."""
     problems: list = []
-    system = LocalCompensation(controller, PERIOD, DELAY, 0.2, 5, feedback, problems)
+    system = LocalCompensation(controller, PERIOD, DELAY, 0.2, 5, feedback, problems, beside)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
     mesh = controller.planner.mesh
@@ -57,12 +59,13 @@ def asked(system: LocalCompensation, simulator: Simulator) -> np.ndarray:
     )
 
 
+@pytest.mark.parametrize("beside", [False, True])
 def test_a_solution_is_used_after_its_delay_and_says_when_it_was_seen(
-    controller: LocalController,
+    controller: LocalController, beside: bool
 ) -> None:
-    system, sim, problems = simulator(controller)
+    system, sim, problems = simulator(controller, beside=beside)
     sim.AdvanceTo(0.9 * DELAY)
-    assert len(problems) == 1
+    assert beside or len(problems) == 1
     np.testing.assert_array_equal(asked(system, sim), 0.0)
     sim.AdvanceTo(1.1 * DELAY)
     assert np.linalg.norm(asked(system, sim), axis=1).min() > 0.01
@@ -81,10 +84,10 @@ def test_it_solves_at_its_rate_and_tells_how_long_it_took(controller: LocalContr
     assert 0.0 < spent < 1.0
 
 
-def test_the_same_twice_is_the_same(controller: LocalController) -> None:
+def test_the_same_twice_is_the_same_also_on_a_thread(controller: LocalController) -> None:
     runs = []
-    for _ in range(2):
-        system, sim, _ = simulator(controller)
+    for beside in (False, True):
+        system, sim, _ = simulator(controller, beside=beside)
         sim.AdvanceTo(0.1)
         runs.append(asked(system, sim))
     np.testing.assert_array_equal(runs[0], runs[1])
