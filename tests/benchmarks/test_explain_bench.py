@@ -6,7 +6,13 @@ import pytest
 
 from benchmarks.explain.__main__ import main, name_of
 from benchmarks.explain.cases import study
-from benchmarks.explain.tables import parameter_error, reliability, right, tables
+from benchmarks.explain.tables import (
+    parameter_error,
+    reliability,
+    right,
+    right_but_for_numerics,
+    tables,
+)
 from benchmarks.kept import read_results, write_results
 from drake_dress.discrepancy.hidden import SIZES
 from drake_dress.errors import UserError
@@ -53,6 +59,15 @@ def test_only_the_whole_truth_and_nothing_else_is_right():
     assert not right(result(group="pair", hide="friction+wind"))
     assert right(result(group="nothing", hide="nothing", named=(), verdict="nothing"))
     assert right(result(group="coarse", hide="nothing", named=("discretisation",)))
+
+
+def test_numerics_that_are_named_too_are_counted_apart():
+    both = result(named=("discretisation", "friction"))
+    assert right_but_for_numerics(both) and not right(both)
+    assert not right_but_for_numerics(result())
+    assert not right_but_for_numerics(result(named=("discretisation",)))
+    assert not right_but_for_numerics(result(named=("discretisation", "adhesion")))
+    assert not right_but_for_numerics(result(group="coarse", hide="nothing"))
 
 
 def test_what_no_list_has_is_right_where_it_is_not_believed():
