@@ -12,10 +12,9 @@ def run_scenario(
     scenario: Path, out: Path, overrides: Sequence[str] = (), seed: int | None = None
 ) -> tuple[int, str]:
     """Returns the exit status, and why the run could not be used (empty where it could)."""
-    # others run beside it
     command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
-    command += ["--one-process"]
-    command += ["--out", str(out)]
+    # others run beside it
+    command += ["--one-process", "--out", str(out)]
     if seed is not None:
         command += ["--seed", str(seed)]
     for item in overrides:

@@ -92,7 +92,7 @@ def _rivals(explanation: Explanation) -> tuple[Effect, Effect] | None:
     others = [s for s in explanation.scores if s.effect and s.name not in {e.NAME for e in found}]
     # a fit may have gone astray, so what screening says counts as well
     best = max(others, key=lambda s: max(s.screened, s.fitted or 0.0), default=None)
-    return None if best is None or best.effect is None else (doubted.effect, best.effect)
+    return (doubted.effect, best.effect) if best and best.effect else None
 
 
 def _blank(lab: Lab, motion: str) -> Recording:

@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.person import JointParameters
-from drake_dress.diagrams.station import Station, StationParameters, make_simulated_station
-from drake_dress.models.cloth.material import Material
-from drake_dress.models.garment.coat import CoatParameters, make_coat
-from drake_dress.models.human.body import ArmPose, BodyMeasures
-
-H = 0.005
+from drake_dress.diagrams.station import Station
+from tests.systems.draped import H, draped_station
 
 
 @pytest.fixture(
@@ -19,23 +14,8 @@ H = 0.005
     ids=["implicit", "layered", "projective"],
 )
 def station(request: pytest.FixtureRequest) -> Station:
-    """A coat that hangs close behind the person, so that it drapes over the arms."""
     integrator, layered = request.param
-    pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
-    return make_simulated_station(
-        StationParameters(
-            mesh=make_coat(CoatParameters(), 0.05),
-            material=Material(stretch_stiffness=300.0),
-            time_step=H,
-            measures=BodyMeasures(),
-            posture="standing",
-            arms={"left": pose, "right": pose},
-            joints=JointParameters(),
-            distance_behind=0.35,
-            integrator=integrator,
-            self_collision=layered,
-        )
-    )
+    return draped_station(integrator=integrator, self_collision=layered)
 
 
 def test_forces_on_grippers_and_person_are_what_moves_the_garment(station: Station) -> None:

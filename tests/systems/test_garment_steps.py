@@ -12,31 +12,16 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.person import JointParameters
-from drake_dress.diagrams.station import (
-    SimulatedStation,
-    StationParameters,
-    make_simulated_station,
-)
+from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.garment.coat import CoatParameters, make_coat
-from drake_dress.models.human.body import ArmPose, BodyMeasures
 from drake_dress.systems.garment_steps import StepsBeside, StepsHere, Surroundings
+from tests.models.cloth.sheets import sheet_elements
+from tests.systems.draped import H, draped_station
 
-H = 0.005
 SIDE = 12
-GRID = np.stack(np.meshgrid(*[np.arange(SIDE + 1) * 0.03] * 2, indexing="ij"), axis=-1)
-SHEET = np.concatenate([GRID.reshape(-1, 2), np.zeros(((SIDE + 1) ** 2, 1))], axis=1)
-CORNER = np.arange((SIDE + 1) ** 2).reshape(SIDE + 1, SIDE + 1)
-FACES = np.concatenate(
-    [
-        np.stack([CORNER[:-1, :-1], CORNER[1:, :-1], CORNER[1:, 1:]], axis=-1).reshape(-1, 3),
-        np.stack([CORNER[:-1, :-1], CORNER[1:, 1:], CORNER[:-1, 1:]], axis=-1).reshape(-1, 3),
-    ]
-).astype(np.int32)
+SHEET, ELEMENTS = sheet_elements(SIDE + 1, SIDE + 1, 0.03)
 HELD = np.array([0, SIDE], dtype=np.int32)
 # a bar under the sheet
 BAR = Obstacles(
@@ -51,7 +36,7 @@ STILL = np.zeros((2, 3))
 
 
 def cloth() -> ImplicitCloth:
-    return ImplicitCloth(make_elements(SHEET, FACES), Material(), H, HELD)
+    return ImplicitCloth(ELEMENTS, Material(), H, HELD)
 
 
 @pytest.fixture
@@ -177,23 +162,6 @@ def test_it_ends_with_who_began_it() -> None:
     pytest.fail("the process went on")
 
 
-def station(beside: bool) -> SimulatedStation:
-    pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
-    return make_simulated_station(
-        StationParameters(
-            mesh=make_coat(CoatParameters(), 0.05),
-            material=Material(stretch_stiffness=300.0),
-            time_step=H,
-            measures=BodyMeasures(),
-            posture="standing",
-            arms={"left": pose, "right": pose},
-            joints=JointParameters(),
-            distance_behind=0.35,
-            beside=beside,
-        )
-    )
-
-
 def advanced(made: SimulatedStation) -> tuple[Simulator, np.ndarray]:
     simulator = Simulator(made.diagram)
     context = simulator.get_mutable_context()
@@ -205,17 +173,17 @@ def advanced(made: SimulatedStation) -> tuple[Simulator, np.ndarray]:
 
 
 def test_a_station_does_the_same_either_way() -> None:
-    made = station(beside=True)
+    made = draped_station(beside=True)
     try:
         _, there = advanced(made)
     finally:
         made.cloth._steps._process.kill()
-    _, here = advanced(station(beside=False))
+    _, here = advanced(draped_station(beside=False))
     np.testing.assert_array_equal(there, here)
 
 
 def test_a_copy_of_a_context_goes_on_as_the_first_does() -> None:
-    made = station(beside=False)
+    made = draped_station(beside=False)
     simulator, _ = advanced(made)
     copy = simulator.get_context().Clone()
     port = made.cloth.GetOutputPort("garment_position")
@@ -230,7 +198,7 @@ def test_a_copy_of_a_context_goes_on_as_the_first_does() -> None:
 
 
 def test_the_garment_is_one_step_behind_grippers_and_bodies() -> None:
-    made = station(beside=False)
+    made = draped_station(beside=False)
     simulator = Simulator(made.diagram)
     context = simulator.get_mutable_context()
     for i, side in enumerate(("left", "right")):

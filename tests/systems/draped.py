@@ -1,0 +1,35 @@
+"""A station whose coat hangs close behind the person, so that it drapes over the arms."""
+
+from typing import Any
+
+import numpy as np
+
+from drake_dress.diagrams.person import JointParameters
+from drake_dress.diagrams.station import (
+    SimulatedStation,
+    StationParameters,
+    make_simulated_station,
+)
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.body import ArmPose, BodyMeasures
+
+H = 0.005
+
+
+def draped_station(**changes: Any) -> SimulatedStation:
+    """Returns it, with changes of its parameters."""
+    pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
+    return make_simulated_station(
+        StationParameters(
+            mesh=make_coat(CoatParameters(), 0.05),
+            material=Material(stretch_stiffness=300.0),
+            time_step=H,
+            measures=BodyMeasures(),
+            posture="standing",
+            arms={"left": pose, "right": pose},
+            joints=JointParameters(),
+            distance_behind=0.35,
+            **changes,
+        )
+    )
