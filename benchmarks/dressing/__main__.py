@@ -32,8 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         around(options.into, _NAME)
     chosen = cases(options.methods, options.persons, options.coats, options.seeds)
     kept = {} if options.json is None else read_results(options.json, _name, _NAME)
-    new = [] if options.kept else [case for case in chosen if case.name not in kept]
-    print(f"{len(chosen)} runs, {len(new)} of them not run yet", flush=True)
+    missing = [case for case in chosen if case.name not in kept]
+    print(f"{len(chosen)} runs, {len(missing)} of them not run yet", flush=True)
+    new = [] if options.kept else missing
     with caught_interrupt() as stop, ThreadPoolExecutor(options.jobs) as pool:
         pending = {pool.submit(run, case, options.keep, options.set): case for case in new}
         for number, future in enumerate(as_completed(pending), 1):

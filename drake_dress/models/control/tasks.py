@@ -491,15 +491,11 @@ class TaskPlanner:
 
         Higher up than that the garment holds the other sleeve back; lower down it could slip off.
         """
-        least = self.parameters.stages.waiting_progress
-        steps = np.linspace(2.0, least, 41)
-        for s in steps:
-            if (
-                np.linalg.norm(axis.G(float(s)) - other)
-                < self.parameters.waiting_reach * self._reach
-            ):
-                return float(s)
-        return least
+        p = self.parameters
+        steps = np.linspace(2.0, p.stages.waiting_progress, 41)
+        offset = axis.points(steps) - other
+        reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
+        return float(steps[np.argmax(reached)]) if reached.any() else p.stages.waiting_progress
 
 
 def _ahead(axes: Sequence[ArmAxis]) -> Corridor:

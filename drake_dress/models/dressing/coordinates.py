@@ -112,6 +112,23 @@ class ArmAxis:
         )
         return point
 
+    def points(self, s: FloatArray) -> FloatArray:
+        """Returns the points (k,3) of the axis at `s` (k,), each as `G` gives it, m."""
+        s = np.clip(s, 0.0, 2.0)[:, None]
+        lower, upper = self._lower + self._half_arc, self._upper + self._half_arc
+        before = np.where(s <= 1.0, s * lower, lower + (s - 1.0) * upper)
+        after = np.where(s <= 1.0, (1.0 - s) * lower + upper, (2.0 - s) * upper)
+        distance = before - self._lower
+        if self._straight:
+            arc = self._start + distance * self._u
+        else:
+            phi = distance / self._radius
+            arc = self._start + self._radius * (
+                np.sin(phi) * self._u + (1.0 - np.cos(phi)) * self._inward
+            )
+        on_upper = np.where(after <= self._upper, self._shoulder - after * self._w, arc)
+        return np.where(before <= self._lower, self._hand + before * self._u, on_upper)
+
     def D(self, s: float) -> FloatArray:  # noqa: N802
         """Returns the unit direction (3,) hand → shoulder at `s`, limited to [0, 2].
 

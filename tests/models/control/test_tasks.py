@@ -248,6 +248,29 @@ def test_a_sleeve_that_is_up_leaves_the_garment_to_the_other(planner: TaskPlanne
     np.testing.assert_allclose(left, axes[0].G(p.final_progress))
 
 
+def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: TaskPlanner) -> None:
+    p, facts = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
+    given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
+    centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
+    reach = p.waiting_reach * np.linalg.norm(centers[0] - centers[1])
+    held = []
+    for across in np.linspace(0.0, 0.8, 17):  # the right hand comes over to the left arm
+        q = joints()
+        q[5] += across * (q[2] - q[5])
+        axis, other = arm_axes(q)
+        sleeves = [SleeveState(axis.G(1.5), axis.D(1.5)), SleeveState(other.G(0.0), other.D(0.0))]
+        waiting, prepared = planner.targets(given, sleeves, np.stack([q] * 2), STEP)
+        s = axis.coordinates(waiting.position[0]).s
+        held.append(s)
+        if s > p.stages.waiting_progress + 1e-6:
+            assert np.linalg.norm(axis.G(s) - prepared.position[0]) < reach
+        further = axis.points(np.linspace(s + 0.05, 2.0, 50))
+        if s < p.final_progress - 0.05:
+            assert np.linalg.norm(further - prepared.position[0], axis=1).min() > reach
+    assert min(held) == pytest.approx(p.stages.waiting_progress)
+    assert sum(p.stages.waiting_progress + 0.1 < s < p.final_progress - 0.1 for s in held) > 1
+
+
 def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner) -> None:
     """Whatever bars its sight, and with more weight on where the armhole is."""
     q = np.stack([joints()] * (HORIZON + 1))

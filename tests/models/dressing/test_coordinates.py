@@ -158,6 +158,15 @@ def test_nearly_straight_arm_behaves_like_a_straight_one(bend: float) -> None:
         assert np.isfinite(found.theta)
 
 
+@laws
+@given(seeds, st.booleans())
+def test_many_points_are_those_that_are_asked_for_one_by_one(seed: int, straight: bool) -> None:
+    hand, elbow, shoulder = random_arm(seed)
+    axis = ArmAxis(hand, elbow, 2.0 * elbow - hand if straight else shoulder)
+    s = np.linspace(-0.5, 2.5, 61)
+    np.testing.assert_allclose(axis.points(s), [axis.G(x) for x in s], atol=1e-14)
+
+
 def test_arc_has_the_radius_asked_for_as_far_as_the_limbs_allow() -> None:
     hand, elbow, shoulder = np.array([[0.3, 0, 0], [0.0, 0, 0], [0.0, 0.3, 0]])
     for radius in (0.02, 0.1):
