@@ -12,6 +12,7 @@ from benchmarks.hardware.two_processes import Plan, play
 from drake_dress.errors import UserError
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arms import arm_extremes
 from drake_dress.report.log import RunLog
 
 # Coarse: what is asked is how arms react, not how a coat is put on.
@@ -168,11 +169,11 @@ def _lab_facts(
     speed = np.maximum(*(_speed(time, log.gripper_position[side]) for side in SIDES))
     share = {"speed": 0.0, "torque": 0.0}
     for side in SIDES:
-        q, v, torque = (np.asarray(log.file[f"/arm/{side}/{n}"]) for n in ("q", "v", "torque"))
-        if np.any((q < LIMITS.lower) | (q > LIMITS.upper)):
+        least, most, speeds, torques = arm_extremes(log, side)
+        if np.any((least < LIMITS.lower) | (most > LIMITS.upper)):
             wrong.append(f"{side} arm beyond a joint's limit")
-        share["speed"] = max(share["speed"], float((np.abs(v) / LIMITS.speed).max()))
-        share["torque"] = max(share["torque"], float((np.abs(torque) / LIMITS.torque).max()))
+        share["speed"] = max(share["speed"], float((speeds / LIMITS.speed).max()))
+        share["torque"] = max(share["torque"], float((torques / LIMITS.torque).max()))
     wrong += [f"{name} at {x:.2f} of its limit" for name, x in share.items() if x > 1.0]
     if not speed[(time > 0.5) & (time < start)].max(initial=0.0) > 0.03:
         wrong.append("nothing moved before the fault")

@@ -303,6 +303,7 @@ def rates(scenario: schema.Scenario) -> Rates:
         command_period=1.0 / c.command_rate,
         log_period=1.0 / scenario.log.rate,
         arm_period=1.0 / scenario.station.arms.rate,
+        plant_period=scenario.plant.time_step,
     )
 
 

@@ -32,13 +32,14 @@ from drake_dress.systems.safety_governor import SafetyGovernor
 
 @dataclass(frozen=True)
 class Rates:
-    """Periods and delays of the controllers, s."""
+    """Periods and delays of the controllers, and of the plant, s."""
 
     global_period: float = 0.5
     global_delay: float = 0.2
     command_period: float = 0.01
     log_period: float = 1.0 / 30.0
     arm_period: float = 0.005
+    plant_period: float = 0.004
     arm_offset: float = 0.0005
 
 
@@ -231,7 +232,7 @@ def make_dressing(
                 rates.log_period,
                 rates.command_period,
                 local is not None,
-                arms is not None,
+                None if arms is None else rates.plant_period,
             ),
         )
         if arms is not None:

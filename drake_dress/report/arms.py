@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from drake_dress.models.arm.clearance import Capsules, clearance
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
-from drake_dress.models.sides import SIDES
+from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log import RunLog
 
 FloatArray = npt.NDArray[np.float64]
@@ -23,9 +23,9 @@ class ArmMeasures:
     """What arms did; of T samples, left and right.
 
     Attributes:
-        speed_share: (T,2) of a joint's limit of speed, the largest.
-        torque_share: (T,2) of a joint's limit of torque; NaN where not logged.
-        margin: (T,2) of a joint to its nearest limit, the least, rad; negative beyond.
+        speed_share: (T,2) of a joint's limit of speed, the largest since the sample before.
+        torque_share: (T,2) of a joint's limit of torque, the same; NaN where not logged.
+        margin: (T,2) of a joint to its nearest limit, the least since then, rad; negative beyond.
         off: (T,2) of the gripper from where its joints are commanded to be, m.
         apart: (T,) of the arms' capsules, m.
         to_person: (T,2) of an arm without its last link and hand to the person's capsules, m.
@@ -70,6 +70,25 @@ def arm_capsules(
     return a, b, np.concatenate([arm[0].radius for arm in placed])
 
 
+def arm_extremes(log: RunLog, side: Side) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Returns (T,7) least and largest joint, rad, and peaks of speed, rad/s, and torque, N·m.
+
+    Of all steps since the sample before; a log that was written before these were kept has only
+    the samples themselves.
+    """
+
+    def read(name: str, instead: str) -> FloatArray:
+        group = log.file[f"/arm/{side}"]
+        return np.asarray(group[name if name in group else instead], dtype=np.float64)
+
+    return (
+        read("q_least", "q"),
+        read("q_most", "q"),
+        np.abs(read("v_peak", "v")),
+        np.abs(read("torque_peak", "torque")),
+    )
+
+
 def measure_arms(log: RunLog) -> ArmMeasures | None:
     """Returns what arms did; None where there are none."""
     if "/arm/left/base" not in log.file:
@@ -82,16 +101,16 @@ def measure_arms(log: RunLog) -> ArmMeasures | None:
     series = {
         (side, name): np.asarray(log.file[f"/arm/{side}/{name}"], dtype=np.float64)
         for side in SIDES
-        for name in ("q", "v", "q_commanded", "torque")
+        for name in ("q", "q_commanded")
     }
     all_of = np.arange(len(SHAPE.link))
     both = _pairs(all_of, all_of)
     far = _pairs(np.flatnonzero(SHAPE.link <= arms[0].count - _NEAR_LINKS), np.arange(len(radius)))
     for k, side in enumerate(SIDES):
-        q, v = series[side, "q"], series[side, "v"]
-        speed[:, k] = (np.abs(v) / LIMITS.speed).max(axis=1)
-        torque[:, k] = (np.abs(series[side, "torque"]) / LIMITS.torque).max(axis=1)
-        margin[:, k] = np.minimum(q - LIMITS.lower, LIMITS.upper - q).min(axis=1)
+        least, most, fastest, strongest = arm_extremes(log, side)
+        speed[:, k] = (fastest / LIMITS.speed).max(axis=1)
+        torque[:, k] = (strongest / LIMITS.torque).max(axis=1)
+        margin[:, k] = np.minimum(least - LIMITS.lower, LIMITS.upper - most).min(axis=1)
     for i in range(count):
         placed = []
         for k, side in enumerate(SIDES):

@@ -44,7 +44,16 @@ JOINT_NAMES = (
     "right_hand",
 )
 _CLEARANCES = ("between arms", "left arm to person", "right arm to person")
-_ARM_SERIES = (("q", "rad"), ("v", "rad/s"), ("q_commanded", "rad"), ("torque", "N m"))
+_ARM_SERIES = (
+    ("q", "rad"),
+    ("v", "rad/s"),
+    ("q_commanded", "rad"),
+    ("torque", "N m"),
+    ("q_least", "rad"),
+    ("q_most", "rad"),
+    ("v_peak", "rad/s"),
+    ("torque_peak", "N m"),
+)
 STAGE_NAMES = ("prepare", "dress", "done")
 
 _FLUSH_PERIOD = 1.0  # s of wall time
@@ -56,12 +65,32 @@ _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
 
 @dataclass(frozen=True)
 class ArmSample:
-    """What is logged of one arm: `q`, `q_commanded` (7,) rad, `v` (7,) rad/s, `torque` (7,) N·m."""
+    """What is logged of one arm.
+
+    Attributes:
+        q, q_commanded: (7,) rad. v: (7,) rad/s. torque: (7,) N·m.
+        q_least, q_most: (7,) extremes since the sample before, rad; None: as now.
+        v_peak, torque_peak: (7,) largest magnitudes since then, rad/s, N·m; None: as now.
+    """
 
     q: npt.ArrayLike
     v: npt.ArrayLike
     q_commanded: npt.ArrayLike
     torque: npt.ArrayLike
+    q_least: npt.ArrayLike | None = None
+    q_most: npt.ArrayLike | None = None
+    v_peak: npt.ArrayLike | None = None
+    torque_peak: npt.ArrayLike | None = None
+
+    def rows(self) -> dict[str, npt.ArrayLike]:
+        """Returns what is written, by the series' names."""
+        now = {
+            "q_least": self.q,
+            "q_most": self.q,
+            "v_peak": np.abs(self.v),
+            "torque_peak": np.abs(self.torque),
+        }
+        return {name: now[name] if row is None else row for name, row in vars(self).items()}
 
 
 @dataclass(frozen=True)
@@ -307,7 +336,7 @@ class RunLogWriter:
                 rows[f"/dressing/{side}/{coordinate}"] = value
         if sample.arms is not None:
             for side, arm in sample.arms.items():
-                rows |= {f"/arm/{side}/{name}": row for name, row in vars(arm).items()}
+                rows |= {f"/arm/{side}/{name}": row for name, row in arm.rows().items()}
         optional = {
             "/garment/contact": sample.contact,
             "/garment/contact_force": sample.contact_force,

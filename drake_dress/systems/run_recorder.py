@@ -15,7 +15,8 @@ from drake_dress.models.dressing.linking import arm_linking_number, torso_interi
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
-from drake_dress.models.sides import SIDES
+from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.log import ArmSample, RunLogWriter, Sample
 
 # In the order of `ArmSample`.
@@ -58,7 +59,8 @@ class RunRecorder(LeafSystem):
     Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
     samples nothing is lost: a sample holds all their flags. local_solve_time is there where there
     is a local controller; of what it solves between samples the last is kept. The ports after it
-    are there with arms; of their clearance the least between two samples is kept. contact,
+    are there with arms; of their clearance the least between two samples is kept, of joints,
+    speeds, torques what was largest at any `arm_period`. contact,
     contact_force, body_poses are there where truth is known; stage, solve_time, verdict, clearance
     where there are controllers. Where something is connected to active (1,), samples are taken
     while it is positive, and time counts from the first.
@@ -72,7 +74,7 @@ class RunRecorder(LeafSystem):
         period: between samples, s.
         verdict_period: between verdicts, s.
         has_local: whether there is a local controller.
-        has_arms: whether there are arms.
+        arm_period: between looks at the arms, s; None: there are none.
         has_control: whether there are controllers.
     """
 
@@ -85,7 +87,7 @@ class RunRecorder(LeafSystem):
         period: float,
         verdict_period: float,
         has_local: bool = False,
-        has_arms: bool = False,
+        arm_period: float | None = None,
         has_control: bool = True,
     ) -> None:
         super().__init__()
@@ -99,7 +101,8 @@ class RunRecorder(LeafSystem):
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
         self._solves = {"solve_time": 0.0, "local_solve_time": 0.0}
         self._has_local = has_local
-        self._has_arms = has_arms
+        self._has_arms = arm_period is not None
+        self._extremes = {side: ArmExtremes() for side in SIDES}
         self._clearance = np.full(3, np.inf)
         self._verdict = np.zeros(2, dtype=int)
         n = len(mesh.rest_position)
@@ -120,7 +123,7 @@ class RunRecorder(LeafSystem):
             self.DeclareVectorInputPort("local_solve_time", 2)
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
-        if has_arms:
+        if arm_period is not None:
             for side in SIDES:
                 for name in _OF_ARM:
                     self.DeclareVectorInputPort(f"{side}_arm_{name}", 7)
@@ -129,6 +132,8 @@ class RunRecorder(LeafSystem):
         self.DeclareVectorInputPort("active", 1)
         if has_control:
             self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
+        if arm_period is not None:
+            self.DeclarePeriodicPublishEvent(arm_period, 0.0, self._watch_arms)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
 
     def _collect(self, context: Context) -> None:
@@ -136,6 +141,15 @@ class RunRecorder(LeafSystem):
         if self._has_arms:
             now = self.GetInputPort("clearance").Eval(context)
             self._clearance = np.minimum(self._clearance, now)
+
+    def _watch_arms(self, context: Context) -> None:
+        for side, extremes in self._extremes.items():
+            extremes.see(
+                *(
+                    self.GetInputPort(f"{side}_arm_{name}").Eval(context)
+                    for name in ("position", "velocity", "torque")
+                )
+            )
 
     def _append(self, context: Context) -> None:
         def value(name: str) -> np.ndarray:
@@ -176,7 +190,8 @@ class RunRecorder(LeafSystem):
         clearance, self._clearance = self._clearance, np.full(3, np.inf)
         arms = None
         if self._has_arms:
-            arms = {side: ArmSample(*(value(f"{side}_arm_{n}") for n in _OF_ARM)) for side in SIDES}
+            self._watch_arms(context)
+            arms = {side: self._arm(context, side) for side in SIDES}
         spent, solves = self._ended(context, "solve_time")
         local_spent, local_solves = self._ended(context, "local_solve_time")
         self._writer.append(
@@ -205,6 +220,13 @@ class RunRecorder(LeafSystem):
                 clearance=clearance if self._has_control else None,
             )
         )
+
+    def _arm(self, context: Context, side: Side) -> ArmSample:
+        q, v, command, torque = (
+            self.GetInputPort(f"{side}_arm_{name}").Eval(context) for name in _OF_ARM
+        )
+        least, most, fastest, strongest = self._extremes[side].taken()
+        return ArmSample(q, v, command, torque, least, most, fastest, strongest)
 
     def _ends(self, context: Context, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self._model is not None:

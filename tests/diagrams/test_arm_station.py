@@ -57,6 +57,19 @@ def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
             assert np.abs(q - asked).max() < 0.02
             assert (np.abs(log[f"arm/{side}/v"][:]) <= LIMITS.speed).all()
             assert (q > LIMITS.lower).all() and (q < LIMITS.upper).all()
+            # what joints came to between samples is in the log, too
+            least, most = log[f"arm/{side}/q_least"][:], log[f"arm/{side}/q_most"][:]
+            assert (least <= q).all() and (q <= most).all()
+            between = (least[1:] < np.minimum(q[1:], q[:-1])) | (
+                most[1:] > np.maximum(q[1:], q[:-1])
+            )
+            assert between.any()
+            peak, now = log[f"arm/{side}/v_peak"][:], np.abs(log[f"arm/{side}/v"][:])
+            assert (peak >= now).all() and (peak > now).mean() > 0.5
+            assert (peak <= LIMITS.speed).all()
+            torque = log[f"arm/{side}/torque_peak"][:]
+            assert (torque >= np.abs(log[f"arm/{side}/torque"][:])).all()
+            assert (torque <= LIMITS.torque).all()
             moved = np.linalg.norm(np.diff(log[f"gripper/{side}/position"][:], axis=0), axis=1)
             assert moved.sum() > 0.05
         assert log["arm/clearance"][:].min() > 0.045

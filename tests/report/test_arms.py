@@ -10,6 +10,7 @@ import pytest
 
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.arms import arm_capsules, measure_arms
 from drake_dress.report.log import ArmSample, RunLog, RunLogWriter, Sample
 from drake_dress.report.replay_html import write_replay_html
@@ -76,6 +77,10 @@ def test_arms_at_rest_are_as_placed(tmp_path: Path) -> None:
         (ArmSample(LIMITS.upper + 0.01, STILL, HOME, STILL), 1.0, "beyond its limits"),
         (ArmSample(HOME, 1.01 * LIMITS.speed, HOME, STILL), 1.0, "beyond its limits"),
         (ArmSample(HOME, STILL, HOME, -1.01 * LIMITS.torque), 1.0, "beyond its limits"),
+        (ArmSample(HOME, STILL, HOME, STILL, q_least=LIMITS.lower - 0.01), 1.0, "beyond its"),
+        (ArmSample(HOME, STILL, HOME, STILL, q_most=LIMITS.upper + 0.01), 1.0, "beyond its"),
+        (ArmSample(HOME, STILL, HOME, STILL, v_peak=1.01 * LIMITS.speed), 1.0, "beyond its"),
+        (ArmSample(HOME, STILL, HOME, STILL, torque_peak=1.01 * LIMITS.torque), 1.0, "beyond its"),
         (ArmSample(HOME, STILL, HOME, STILL), 0.2, "arms too near"),
     ],
 )
@@ -109,3 +114,18 @@ def test_a_log_without_arms_has_no_such_figures(tmp_path: Path) -> None:
         assert measure_arms(log) is None
         assert arm_capsules(log, np.arange(3))[0].shape == (3, 0, 3)
         assert "arm_tracking_mm" not in summarize(log, wall_time=1.0)
+
+
+def test_what_joints_came_to_between_samples_is_kept_once() -> None:
+    rng = np.random.default_rng(0)
+    q, v, torque = rng.normal(size=(3, 20, 7))
+    extremes = ArmExtremes()
+    for row in zip(q, v, torque, strict=True):
+        extremes.see(*row)
+    extremes.see(*np.full((3, 7), np.nan))
+    least, most, fastest, strongest = extremes.taken()
+    np.testing.assert_array_equal(least, q.min(axis=0))
+    np.testing.assert_array_equal(most, q.max(axis=0))
+    np.testing.assert_array_equal(fastest, np.abs(v).max(axis=0))
+    np.testing.assert_array_equal(strongest, np.abs(torque).max(axis=0))
+    assert np.isnan(extremes.taken()).all()
