@@ -19,6 +19,7 @@ UNUSABLE, INTERRUPTED = 2, 130
 # By name, what each measures; the first is the default.
 BENCHMARKS = {
     "cloth": "accuracy and speed of the garment, beside other simulators where installed",
+    "arms": "every scenario with floating grippers and with two arms; what the arms do",
     "dressing": "persons and coats under many seeds, by each method of control",
     "explain": "hidden effects that are named right",
     "hardware": "rates, latency, faults and memory of a run and a lab in two processes",

@@ -9,18 +9,17 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
-from benchmarks.kept import read_results, seed_range, write_results
+from benchmarks.kept import read_results, seed_range
 from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
 from benchmarks.section import END, around, begin, write_between
+from benchmarks.study import how_it_ended, run_missing
 from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
-from drake_dress.interrupt import caught_interrupt
 
 _NAME = "dressing"
 
@@ -34,20 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kept = {} if options.json is None else read_results(options.json, _name, _NAME)
     missing = [case for case in chosen if case.name not in kept]
     print(f"{len(chosen)} runs, {len(missing)} of them not run yet", flush=True)
-    new = [] if options.kept else missing
-    with caught_interrupt() as stop, ThreadPoolExecutor(options.jobs) as pool:
-        pending = {pool.submit(run, case, options.keep, options.set): case for case in new}
-        for number, future in enumerate(as_completed(pending), 1):
-            result = future.result()
-            kept[pending[future].name] = result
-            if options.json is not None:
-                # what failed to run is run again
-                done = {name: r for name, r in kept.items() if "summary" in r}
-                write_results(options.json, done)
-            print(f"{number}/{len(new)} {pending[future].name}: {_told(result)}", flush=True)
-            if stop.is_set():
-                pool.shutdown(wait=False, cancel_futures=True)
-                break
+    stopped = not options.kept and run_missing(
+        missing,
+        kept,
+        lambda case: run(case, options.keep, options.set),
+        how_it_ended,
+        options.jobs,
+        options.json,
+    )
     results = [kept[case.name] for case in chosen if case.name in kept]
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
     print(f"\n{shown}", flush=True)
@@ -55,19 +48,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_between(options.into, _NAME, shown)
     if options.plot:
         write_text(options.plot, figure(results))
-    if stop.is_set():
+    if stopped:
         return INTERRUPTED
     return int(any("problem" in result for result in results))
 
 
 def _name(case: dict[str, Any]) -> str:
     return Case(**case).name
-
-
-def _told(result: dict[str, Any]) -> str:
-    if "problem" in result:
-        return str(result["problem"])
-    return result["summary"]["reason"] or f"on in {result['summary']['dressing_time_s']:.0f} s"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,0 +1,1 @@
+"""All dressing scenarios, with floating grippers and with two Panda arms."""

@@ -1,0 +1,207 @@
+"""`python -m benchmarks.arms`: dresses in every scenario with and without arms, and measures them.
+
+Every run is a `drake-dress run` of its own. What was run stays in the file of `--json` and is not
+run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.cloth.table import Table
+from benchmarks.kept import read_results
+from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
+from benchmarks.scenario_run import run_scenario
+from benchmarks.section import END, around, begin, write_between
+from benchmarks.study import how_it_ended, run_missing
+from drake_dress.errors import UserError
+
+_NAME = "arms"
+_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+# Every scenario that dresses somebody.
+SCENARIOS = (
+    "dummy_standing",
+    "dummy_sitting",
+    "dummy_overcoat",
+    "dummy_varied",
+    "passive_standing",
+    "passive_sitting",
+    "active_standing",
+    "lab",
+)
+METHODS = ("global", "full")
+GRIPPERS = ("floating", "panda")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: `scenario` of SCENARIOS, `method` of METHODS, `grippers` of GRIPPERS."""
+
+    scenario: str
+    method: str
+    grippers: str
+
+    @property
+    def name(self) -> str:
+        """For files and tables."""
+        return f"{self.scenario}-{self.method}-{self.grippers}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    if options.into:
+        around(options.into, _NAME)
+    chosen = [
+        Case(*which)
+        for which in itertools.product(options.scenarios, options.methods, options.grippers)
+    ]
+    kept = {} if options.json is None else read_results(options.json, _name, _NAME)
+    missing = [case for case in chosen if case.name not in kept]
+    print(f"{len(chosen)} runs, {len(missing)} of them not run yet", flush=True)
+    stopped = not options.kept and run_missing(
+        missing,
+        kept,
+        lambda case: run(case, options.keep, options.set),
+        how_it_ended,
+        options.jobs,
+        options.json,
+    )
+    results = [kept[case.name] for case in chosen if case.name in kept]
+    shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
+    print(f"\n{shown}", flush=True)
+    if options.into:
+        write_between(options.into, _NAME, shown)
+    if stopped:
+        return INTERRUPTED
+    return int(any("problem" in result for result in results))
+
+
+def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Returns what one run came to.
+
+    Args:
+        case: which.
+        keep: folder for its log, report and replay; None to keep none.
+        overrides: further KEY=VALUE for the scenario.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) if keep is None else keep / case.name
+        settings = [
+            f"controller.method={case.method}",
+            f"station.arms.model={case.grippers}",
+            "duration=90.0",
+            *overrides,
+        ]
+        status, problem = run_scenario(_SCENARIOS / f"{case.scenario}.yaml", out, settings)
+        if problem:
+            return {"case": asdict(case), "problem": problem}
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    return {"case": asdict(case), "status": status, "summary": summary}
+
+
+def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
+    """Returns how dressings ended with floating grippers and on arms, and what the arms did."""
+    done = {_name(r["case"]): r["summary"] for r in results if "summary" in r}
+    cases = [Case(**r["case"]) for r in results if "summary" in r]
+    pairs = dict.fromkeys((c.scenario, c.method) for c in cases)
+    ended = []
+    for scenario, method in pairs:
+        cells: list[Any] = [f"{scenario}, {method}"]
+        for grippers in GRIPPERS:
+            summary = done.get(Case(scenario, method, grippers).name)
+            cells += [None] * 4 if summary is None else _dressing(summary)
+        ended.append(cells)
+    arms = [
+        [f"{c.scenario}, {c.method}", *_arms(done[c.name])] for c in cases if c.grippers == "panda"
+    ]
+    figures = ("on in, s", "force, N", "strain, %", "penetration, mm")
+    return [
+        Table("Dressings", ["", *figures, *(f"arms: {f}" for f in figures)], ended),
+        Table(
+            "Arms",
+            [
+                "",
+                "speed, share of limit",
+                "torque, share of limit",
+                "to a joint's limit, rad",
+                "off, median, mm",
+                "off, 99 %, mm",
+                "arms apart, cm",
+                "arm to person, cm",
+                "real-time factor",
+            ],
+            arms,
+        ),
+        Table(
+            "Why not",
+            ["", "reason"],
+            [[c.name, done[c.name]["reason"]] for c in cases if not done[c.name]["success"]],
+        ),
+    ]
+
+
+def _dressing(summary: dict[str, Any]) -> list[Any]:
+    return [
+        summary["dressing_time_s"] if summary["success"] else "no",
+        summary["max_gripper_force_N"],
+        100.0 * summary["max_edge_strain"],
+        1e3 * summary["max_penetration_m"],
+    ]
+
+
+def _arms(summary: dict[str, Any]) -> list[Any]:
+    return [
+        summary["max_joint_speed_share"],
+        summary["max_joint_torque_share"],
+        summary["min_joint_margin_rad"],
+        summary["arm_tracking_mm"]["median"],
+        summary["arm_tracking_mm"]["p99"],
+        100.0 * summary["min_arms_apart_m"],
+        100.0 * summary["min_arm_to_person_m"],
+        summary["realtime_factor"],
+    ]
+
+
+def _name(case: dict[str, Any]) -> str:
+    return Case(**case).name
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(prog="drake-dress bench arms", description=__doc__)
+    for name, known in (("scenarios", SCENARIOS), ("methods", METHODS), ("grippers", GRIPPERS)):
+        parser.add_argument(
+            f"--{name}",
+            type=some_of(known),
+            default=list(known),
+            metavar="NAME,…",
+            help=", ".join(known),
+        )
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
+    parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the tables between {begin(_NAME)} and {END}",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except UserError as error:
+        print(f"drake-dress: {error}", file=sys.stderr)
+        sys.exit(UNUSABLE)
