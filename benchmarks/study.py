@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
+import json
+import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from benchmarks.kept import write_results
+from benchmarks.cloth.table import Table
+from benchmarks.kept import read_results, write_results
+from benchmarks.parser import INTERRUPTED
+from benchmarks.scenario_run import run_scenario
+from benchmarks.section import END, around, begin, write_between
 from drake_dress.interrupt import caught_interrupt
 
 
@@ -19,40 +27,114 @@ class _Named(Protocol):
 C = TypeVar("C", bound=_Named)
 
 
-def run_missing(
+def add_study_options(parser: argparse.ArgumentParser, benchmark: str) -> None:
+    """Adds the options that `carry_out` reads."""
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
+    parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the tables between {begin(benchmark)} and {END}",
+    )
+
+
+def carry_out(
+    options: argparse.Namespace,
+    benchmark: str,
     cases: Sequence[C],
+    name_of: Callable[[dict[str, Any]], str],
+    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
+    tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
+) -> tuple[list[dict[str, Any]], bool]:
+    """Runs what is missing, prints the tables; returns the results and whether Ctrl-C ended it.
+
+    Args:
+        options: those of `add_study_options`.
+        benchmark: its name.
+        cases: of the study.
+        name_of: a case's name, from its fields in a file.
+        run: a case, with the folder to keep it in and further settings.
+        tables: of results.
+    """
+    if options.into:
+        around(options.into, benchmark)
+    kept = {} if options.json is None else read_results(options.json, name_of, benchmark)
+    missing = [case for case in cases if case.name not in kept]
+    print(f"{len(cases)} runs, {len(missing)} of them not run yet", flush=True)
+    stopped = False
+    if not options.kept:
+        stopped = _run_all(
+            missing, kept, lambda c: run(c, options.keep, options.set), options.jobs, options.json
+        )
+    results = [kept[case.name] for case in cases if case.name in kept]
+    shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
+    print(f"\n{shown}", flush=True)
+    if options.into:
+        write_between(options.into, benchmark, shown)
+    return results, stopped
+
+
+def exit_status(results: Sequence[dict[str, Any]], stopped: bool) -> int:
+    """Returns 130 after Ctrl-C, 1 if a run could not be used."""
+    return INTERRUPTED if stopped else int(any("problem" in result for result in results))
+
+
+def run_case(
+    case: Any,
+    scenario: Path,
+    folder: Path | None,
+    settings: Sequence[str],
+    seed: int | None = None,
+    look: Callable[[Path], dict[str, Any]] = lambda out: {},
+) -> dict[str, Any]:
+    """Returns what one `drake-dress run` came to: case, summary, and what else is looked at.
+
+    Args:
+        case: a dataclass with a name.
+        scenario: file.
+        folder: in which it is kept under the case's name; None to keep nothing.
+        settings: KEY=VALUE for the scenario.
+        seed: of the run; None for the scenario's own.
+        look: what to take from the folder that it wrote.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        out = Path(place) if folder is None else folder / case.name
+        status, problem = run_scenario(scenario, out, settings, seed)
+        if problem:
+            return {"case": asdict(case), "problem": problem}
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        return {"case": asdict(case), "status": status, "summary": summary, **look(out)}
+
+
+def _run_all(
+    new: Sequence[C],
     kept: dict[str, dict[str, Any]],
     run: Callable[[C], dict[str, Any]],
-    told: Callable[[dict[str, Any]], str],
     jobs: int,
     path: Path | None,
 ) -> bool:
-    """Runs the cases that are not in `kept` and puts them there; returns whether Ctrl-C ended it.
-
-    Args:
-        cases: of the study.
-        kept: results by the names of their cases; one without "summary" is run again next time.
-        run: one case, in a process of its own.
-        told: what to print of a result.
-        jobs: side by side.
-        path: file in which results are kept after each, if any.
-    """
-    new = [case for case in cases if case.name not in kept]
     with caught_interrupt() as stop, ThreadPoolExecutor(jobs) as pool:
         pending = {pool.submit(run, case): case for case in new}
         for number, future in enumerate(as_completed(pending), 1):
             result = future.result()
             kept[pending[future].name] = result
             if path is not None:
+                # what failed to run is run again
                 write_results(path, {name: r for name, r in kept.items() if "summary" in r})
-            print(f"{number}/{len(new)} {pending[future].name}: {told(result)}", flush=True)
+            print(
+                f"{number}/{len(new)} {pending[future].name}: {_how_it_ended(result)}", flush=True
+            )
             if stop.is_set():
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
     return stop.is_set()
 
 
-def how_it_ended(result: dict[str, Any]) -> str:
+def _how_it_ended(result: dict[str, Any]) -> str:
     """Returns how a run ended, in a few words."""
     if "problem" in result:
         return str(result["problem"])

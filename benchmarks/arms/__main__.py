@@ -8,20 +8,15 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import sys
-import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.cloth.table import Table
-from benchmarks.kept import read_results
-from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
-from benchmarks.scenario_run import run_scenario
-from benchmarks.section import END, around, begin, write_between
-from benchmarks.study import how_it_ended, run_missing
+from benchmarks.parser import UNUSABLE, OneLineParser, some_of
+from benchmarks.study import add_study_options, carry_out, exit_status, run_case
 from drake_dress.errors import UserError
 
 _NAME = "arms"
@@ -58,31 +53,11 @@ class Case:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    if options.into:
-        around(options.into, _NAME)
     chosen = [
         Case(*which)
         for which in itertools.product(options.scenarios, options.methods, options.grippers)
     ]
-    kept = {} if options.json is None else read_results(options.json, _name, _NAME)
-    missing = [case for case in chosen if case.name not in kept]
-    print(f"{len(chosen)} runs, {len(missing)} of them not run yet", flush=True)
-    stopped = not options.kept and run_missing(
-        missing,
-        kept,
-        lambda case: run(case, options.keep, options.set),
-        how_it_ended,
-        options.jobs,
-        options.json,
-    )
-    results = [kept[case.name] for case in chosen if case.name in kept]
-    shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
-    print(f"\n{shown}", flush=True)
-    if options.into:
-        write_between(options.into, _NAME, shown)
-    if stopped:
-        return INTERRUPTED
-    return int(any("problem" in result for result in results))
+    return exit_status(*carry_out(options, _NAME, chosen, _name, run, tables))
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -93,19 +68,13 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
         keep: folder for its log, report and replay; None to keep none.
         overrides: further KEY=VALUE for the scenario.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) if keep is None else keep / case.name
-        settings = [
-            f"controller.method={case.method}",
-            f"station.arms.model={case.grippers}",
-            "duration=90.0",
-            *overrides,
-        ]
-        status, problem = run_scenario(_SCENARIOS / f"{case.scenario}.yaml", out, settings)
-        if problem:
-            return {"case": asdict(case), "problem": problem}
-        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    return {"case": asdict(case), "status": status, "summary": summary}
+    settings = [
+        f"controller.method={case.method}",
+        f"station.arms.model={case.grippers}",
+        "duration=90.0",
+        *overrides,
+    ]
+    return run_case(case, _SCENARIOS / f"{case.scenario}.yaml", keep, settings)
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
@@ -185,17 +154,7 @@ def _parser() -> argparse.ArgumentParser:
             metavar="NAME,…",
             help=", ".join(known),
         )
-    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
-    parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
-    parser.add_argument(
-        "--into",
-        type=Path,
-        metavar="FILE.md",
-        help=f"put the tables between {begin(_NAME)} and {END}",
-    )
+    add_study_options(parser, _NAME)
     return parser
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import json
-import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.scenario_run import run_scenario
+from benchmarks.study import run_case
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
@@ -72,29 +70,19 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
         keep: folder for its log, report and replay; None to keep none.
         overrides: further KEY=VALUE for the scenario.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) if keep is None else keep / case.name
-        settings = [
-            f"controller.method={case.method}",
-            f"garment.coat={COATS[case.coat]}",
-            f"variation={VARIATION}",
-            *overrides,
-        ]
-        status, problem = run_scenario(
-            _SCENARIOS / PERSONS[case.person], out, settings, seed=case.seed
-        )
-        if problem:
-            return {"case": asdict(case), "problem": problem}
-        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-        with RunLog.open(out / "run.h5") as log:
-            series, force = _series(log)
-    return {
-        "case": asdict(case),
-        "status": status,
-        "summary": summary,
-        "force_p99": force,
-        "series": series,
-    }
+    settings = [
+        f"controller.method={case.method}",
+        f"garment.coat={COATS[case.coat]}",
+        f"variation={VARIATION}",
+        *overrides,
+    ]
+    return run_case(case, _SCENARIOS / PERSONS[case.person], keep, settings, case.seed, _measured)
+
+
+def _measured(out: Path) -> dict[str, Any]:
+    with RunLog.open(out / "run.h5") as log:
+        series, force = _series(log)
+    return {"force_p99": force, "series": series}
 
 
 def _series(log: RunLog) -> tuple[dict[str, list[Any]], float]:
