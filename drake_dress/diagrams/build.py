@@ -9,13 +9,13 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 
-from drake_dress.diagrams import scenario as schema
 from drake_dress.diagrams.arms import ArmPlacement, ArmSetup, set_up_arms
 from drake_dress.diagrams.behaviour import Behaviour, Kind
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.dressing import LocalSetup, Rates
 from drake_dress.diagrams.hardware_station import HardwareParameters, Links
 from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.station import (
     Sight,
     SimulatedStation,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from pathlib import Path
 
-from drake_dress.diagrams import scenario as schema
+from drake_dress.diagrams.scenario import schema
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
 

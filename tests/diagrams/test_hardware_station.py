@@ -37,7 +37,8 @@ from drake_dress.diagrams.hardware_station import (
     status_fault,
 )
 from drake_dress.diagrams.lab import Lab, make_lab
-from drake_dress.diagrams.scenario import LabFault, Scenario, apply_variation, load_scenario
+from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
+from drake_dress.diagrams.scenario.schema import LabFault
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES

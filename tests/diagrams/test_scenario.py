@@ -6,13 +6,12 @@ import pytest
 from drake_dress.diagrams.behaviour import Behaviour
 from drake_dress.diagrams.build import behaviour, predictor, safety_limits
 from drake_dress.diagrams.scenario import (
-    Arm,
     Scenario,
-    Variation,
     apply_variation,
     load_scenario,
     resolved_yaml,
 )
+from drake_dress.diagrams.scenario.schema import Arm, Variation
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.prediction import ConstantVelocityPredictor, StillPredictor

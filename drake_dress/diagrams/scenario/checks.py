@@ -1,0 +1,188 @@
+"""Holds the values of a scenario against each other."""
+
+import dataclasses
+import math
+import re
+
+from drake_dress.diagrams.scenario.ranges import SOURCES
+from drake_dress.diagrams.scenario.schema import (
+    Behaviour,
+    Controller,
+    Motion,
+    Safety,
+    Scenario,
+    Station,
+)
+from drake_dress.errors import UserError
+from drake_dress.models.human import motions
+
+
+def check_controller(source: str, controller: Controller) -> None:
+    """Holds periods, delays and steps of the controllers against each other."""
+    mpc = controller.global_mpc
+    if mpc.delay >= mpc.period:
+        raise UserError(
+            source,
+            "controller.global_mpc.delay",
+            f"is {mpc.delay} s, expected less than the period, {mpc.period} s",
+        )
+    local = controller.local
+    if local.delay >= local.period:
+        raise UserError(
+            source,
+            "controller.local.delay",
+            f"is {local.delay} s, expected less than the period, {local.period} s",
+        )
+    steps = mpc.delay / mpc.time_step
+    if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:
+        raise UserError(
+            source,
+            "controller.global_mpc.delay",
+            f"is {mpc.delay} s, expected a multiple of time_step, {mpc.time_step} s, "
+            "within the horizon",
+        )
+
+
+def check_safety(source: str, safety: Safety, command_period: float) -> None:
+    """Holds limits against each other."""
+    soft, least = safety.soft_force_limit, safety.least_distance
+    if soft is not None and soft >= safety.force_limit:
+        raise UserError(
+            source,
+            "safety.soft_force_limit",
+            f"is {soft} N, expected less than force_limit, {safety.force_limit} N",
+        )
+    if safety.max_braking < safety.max_acceleration:
+        raise UserError(
+            source,
+            "safety.max_braking",
+            f"is {safety.max_braking} m/s², expected max_acceleration, "
+            f"{safety.max_acceleration} m/s², at least",
+        )
+    if safety.largest_distance is not None and safety.largest_distance <= least:
+        raise UserError(
+            source,
+            "safety.largest_distance",
+            f"is {safety.largest_distance} m, expected more than least_distance, {least} m",
+        )
+    if safety.stale_time < command_period:
+        raise UserError(
+            source,
+            "safety.stale_time",
+            f"is {safety.stale_time} s, expected a period of the commands, "
+            f"{command_period:g} s, at least",
+        )
+    if safety.workspace is not None:
+        corners = {"low": safety.workspace.low, "high": safety.workspace.high}
+        for name, corner in corners.items():
+            if len(corner) != 3 or not all(math.isfinite(x) for x in corner):
+                raise UserError(
+                    source, f"safety.workspace.{name}", f"is {corner}, expected x, y, z in m"
+                )
+        if not all(low < high for low, high in zip(*corners.values(), strict=True)):
+            raise UserError(
+                source,
+                "safety.workspace.high",
+                f"is {corners['high']}, expected more than low, {corners['low']}, on each axis",
+            )
+
+
+def check_hardware(source: str, station: Station) -> None:
+    """Holds what hardware asks for: arms, and a bus."""
+    if station.kind == "hardware" and station.arms.model != "panda":
+        raise UserError(
+            source,
+            "station.arms.model",
+            f"is {station.arms.model}, expected panda with station.kind: hardware",
+        )
+    url = station.hardware.lcm_url
+    if not url.startswith(("udpm://", "memq://")):
+        raise UserError(
+            source,
+            "station.hardware.lcm_url",
+            f"is {url!r}, expected udpm://ADDRESS:PORT?ttl=0",
+        )
+
+
+def check_cameras(source: str, scenario: Scenario) -> None:
+    """Holds cameras, and what faults name, against each other."""
+    names: set[str] = set()
+    for i, camera in enumerate(scenario.station.cameras):
+        key = f"station.cameras[{i}]"
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", camera.name) or camera.name in names:
+            raise UserError(
+                source,
+                f"{key}.name",
+                f"is {camera.name!r}, expected a name of its own, such as front",
+            )
+        names.add(camera.name)
+        for name in ("position", "target"):
+            point = getattr(camera, name)
+            if len(point) != 3 or not all(math.isfinite(x) for x in point):
+                raise UserError(source, f"{key}.{name}", f"is {point}, expected x, y, z in m")
+        ahead = [t - p for t, p in zip(camera.target, camera.position, strict=True)]
+        if math.hypot(ahead[0], ahead[1]) < 1e-3:
+            raise UserError(
+                source, f"{key}.target", "is straight above or below, expected it to the side"
+            )
+    sources = [*SOURCES, *(f"camera_{name}" for name in sorted(names))]
+    for i, fault in enumerate(scenario.lab.faults):
+        if fault.source not in sources:
+            raise UserError(
+                source,
+                f"lab.faults[{i}].source",
+                f"is {fault.source!r}, expected {' or '.join(sources)}",
+            )
+
+
+def check_behaviour(source: str, behaviour: Behaviour) -> None:
+    """Holds the motions against each other and against the kind of person."""
+    key = "person.behaviour.motions"
+    if behaviour.motions and behaviour.kind != "active":
+        raise UserError(
+            source, key, f"are given to a {behaviour.kind} person, expected kind: active"
+        )
+    names = [entry.name for entry in dataclasses.fields(Motion)]
+    reaching: set[str] = set()
+    for i, motion in enumerate(behaviour.motions):
+        given = [name for name in names if getattr(motion, name) is not None]
+        if len(given) != 1:
+            came = " and ".join(given) or "nothing"
+            raise UserError(
+                source, f"{key}[{i}]", f"is {came}, expected just one of {', '.join(names)}"
+            )
+        _check_speed(source, f"{key}[{i}]", motion, behaviour.max_hand_speed)
+        if motion.reach is not None:
+            side = motion.reach.side
+            sides = {"left", "right"} if side == "both" else {side}
+            if sides & reaching:
+                raise UserError(
+                    source,
+                    f"{key}[{i}].reach.side",
+                    f"is {side}, expected one reach for each hand",
+                )
+            reaching |= sides
+
+
+def _check_speed(source: str, key: str, motion: Motion, max_hand_speed: float) -> None:
+    if motion.turn is not None:
+        turn = motions.Turn(
+            angle=math.radians(motion.turn.angle_deg), duration=motion.turn.duration
+        )
+        if turn.speed > motions.FASTEST_TURN:
+            raise UserError(
+                source,
+                f"{key}.turn.duration",
+                f"is {turn.duration} s, a turn at up to {turn.speed:.2g} rad/s, "
+                f"expected at most {motions.FASTEST_TURN} rad/s",
+            )
+    if motion.wave is not None:
+        w = motion.wave
+        wave = motions.Wave(duration=w.duration, amplitude=w.amplitude, frequency=w.frequency)
+        if wave.speed > max_hand_speed:
+            raise UserError(
+                source,
+                f"{key}.wave",
+                f"moves the hand at up to {wave.speed:.2g} m/s, "
+                f"expected at most max_hand_speed, {max_hand_speed:g} m/s",
+            )

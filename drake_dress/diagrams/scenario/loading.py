@@ -1,0 +1,145 @@
+"""Reads scenarios, writes them whole, and draws what their seeds vary.
+
+The file is held against the schema's types, filled in by Drake, and then held against ranges and
+against itself.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+
+from drake_dress.diagrams.scenario.checks import (
+    check_behaviour,
+    check_cameras,
+    check_controller,
+    check_hardware,
+    check_safety,
+)
+from drake_dress.diagrams.scenario.schema import Scenario, Variation
+from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
+from drake_dress.errors import UserError
+
+
+def load_scenario(
+    path: str | Path, overrides: Sequence[str] = (), seed: int | None = None
+) -> Scenario:
+    """Returns the scenario in `path`, with `KEY=VALUE` overrides and seed applied.
+
+    Raises:
+        UserError: file, key or value cannot be used.
+    """
+    source = str(path)
+    content = _read(Path(path))
+    for item in overrides:
+        key, separator, text = item.partition("=")
+        if not separator or not key:
+            raise UserError("--set", item, "expected KEY=VALUE, such as plant.spacing=0.015")
+        _override(content, key, text)
+    if seed is not None:
+        content["seed"] = seed
+    content = typed(source, "", content, Scenario)
+    try:
+        scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content))
+    except (RuntimeError, ValueError, TypeError) as error:
+        raise UserError(source, "", f"cannot be read: {error}") from error
+    check_ranges(source, "", scenario)
+    _move_force_limit(source, content, scenario)
+    check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
+    check_controller(source, scenario.controller)
+    check_behaviour(source, scenario.person.behaviour)
+    check_hardware(source, scenario.station)
+    check_cameras(source, scenario)
+    return scenario
+
+
+def resolved_yaml(scenario: Scenario) -> str:
+    """Returns the whole scenario as YAML that loads to the same."""
+    text: str = yaml_dump_typed(scenario)
+    return text
+
+
+def apply_variation(scenario: Scenario) -> Scenario:
+    """Returns the scenario with what its seed draws written in and no variation left."""
+    drawn: Scenario = yaml_load_typed(schema=Scenario, data=resolved_yaml(scenario))
+    v, rng = scenario.variation, np.random.default_rng(scenario.seed)
+
+    def draw(width: float) -> float:
+        return float(width * rng.uniform(-1.0, 1.0))
+
+    for arm in (drawn.person.left_arm, drawn.person.right_arm):
+        arm.abduction_deg += draw(v.arm_angle_deg)
+        arm.extension_deg += draw(v.arm_angle_deg)
+        arm.elbow_deg = max(0.0, arm.elbow_deg + draw(v.arm_angle_deg))
+    drawn.garment.coat.scale *= 1.0 + draw(v.coat_scale)
+    stiffness = 1.0 + draw(v.plant_stiffness)
+    drawn.plant.material.stretch_stiffness *= stiffness
+    drawn.plant.material.bending_stiffness *= stiffness
+    drawn.plant.material.friction *= 1.0 + draw(v.plant_friction)
+    drawn.station.start.distance_behind += draw(v.start_offset)
+    drawn.station.start.height_offset += draw(v.start_offset)
+    drawn.station.start.lateral_offset += draw(v.start_offset)
+    drawn.variation = Variation()
+    return drawn
+
+
+def _read(path: Path) -> dict[str, Any]:
+    source = str(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UserError(source, "", "no such file, expected a scenario in YAML") from None
+    except IsADirectoryError:
+        raise UserError(source, "", "is a directory, expected a scenario in YAML") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(source, "", f"cannot be read as text: {error}") from error
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "not YAML"
+        raise UserError(source, where, f"{problem}, expected YAML") from error
+    if content is None:
+        raise UserError(source, "", "is empty, expected a scenario in YAML")
+    if not isinstance(content, dict):
+        raise UserError(source, "", f"holds {kind_of(content)}, expected keys with values")
+    return content
+
+
+def _override(content: dict[str, Any], key: str, text: str) -> None:
+    """Writes the YAML value `text` at the dotted `key`."""
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise UserError("--set", key, f"{text!r} is not a YAML value") from None
+    *parents, last = key.split(".")
+    schema: Any = Scenario
+    place = content
+    for depth, name in enumerate(parents):
+        schema = field_type("--set", ".".join(parents[:depth]), name, schema)
+        if place.get(name) is None:
+            place[name] = {}
+        place = place[name]
+        if not isinstance(place, dict):
+            raise UserError("--set", key, f"{name} holds a value, expected keys below it")
+    hint = field_type("--set", ".".join(parents), last, schema)
+    place[last] = typed("--set", key, value, hint)
+
+
+def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:
+    """Takes the limit from where it stood before there was a group `safety`."""
+    mpc = scenario.controller.global_mpc
+    if mpc.force_limit is None:
+        return
+    if "force_limit" in content.get("safety", {}):
+        raise UserError(
+            source,
+            "controller.global_mpc.force_limit",
+            f"is {mpc.force_limit} N beside safety.force_limit, "
+            "expected the latter alone: this key is its old name",
+        )
+    scenario.safety.force_limit, mpc.force_limit = mpc.force_limit, None

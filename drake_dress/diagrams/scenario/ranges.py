@@ -1,0 +1,179 @@
+"""Which words and numbers a scenario's values may be."""
+
+import re
+
+from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.supervision.injection import KINDS
+
+# What the lab reports of, beside its cameras.
+SOURCES = ("left_arm", "right_arm", "garment", "person")
+# Words that a text may be (Drake's loader has no literal types).
+CHOICES = {
+    "garment.coat.preset": ("overcoat", "jacket"),
+    "garment.coat.grasp": ("patch", "seam"),
+    "garment.mesh.unit": ("m", "cm", "mm"),
+    "person.posture": ("standing", "sitting"),
+    "person.behaviour.kind": ("dummy", "passive", "active"),
+    **{
+        f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
+        for motion in ("reach", "withdraw", "wave")
+    },
+    "controller.predictor": ("still", "constant_velocity"),
+    "plant.integrator": ("implicit", "projective_dynamics"),
+    "controller.method": ("full", "global", "local"),
+    "controller.local.solver": ("constrained_ddp", "cone"),
+    "station.kind": ("simulated", "hardware"),
+    "lab.faults.kind": KINDS,
+    "station.arms.model": ("floating", "panda"),
+    "station.arms.mode": ("position_velocity", "position", "velocity"),
+}
+
+# Ranges by the end of the dotted key, both ends allowed; all other numbers must be finite.
+_RANGES: dict[str, tuple[float, float]] = {
+    "seed": (0, 2**63 - 1),
+    "duration": (0.1, 600.0),
+    "arms.distance_behind": (-5.0, 5.0),
+    "arms.spread": (0.0, 5.0),
+    "arms.height_offset": (-2.0, 2.0),
+    "arms.tilt_deg": (-180.0, 180.0),
+    "arms.rate": (50.0, 1000.0),
+    "hardware.status_rate": (20.0, 1000.0),
+    "hardware.estimate_rate": (1.0, 200.0),
+    "hardware.stale_status": (0.01, 1.0),
+    "hardware.stale_estimate": (0.02, 5.0),
+    "hardware.stale_camera": (0.05, 10.0),
+    "hardware.settle_time": (0.0, 10.0),
+    "hardware.patience": (0.0, 60.0),
+    "hardware.wait": (0.1, 3600.0),
+    "hardware.start_distance": (0.0, 0.2),
+    "hardware.start_angle": (0.0, 1.0),
+    "lab.stale_command": (0.01, 1.0),
+    "lab.wait": (0.1, 3600.0),
+    "lab.rest": (0.0, 60.0),
+    "lab.push": (0.0, 200.0),
+    "cameras.width": (16, 4096),
+    "cameras.height": (16, 4096),
+    "cameras.fov_deg": (5.0, 150.0),
+    "cameras.rate": (0.5, 60.0),
+    "lab.faults.start": (0.0, 1e4),
+    "lab.faults.duration": (0.0, 1e4),
+    "coat.scale": (0.7, 1.4),
+    "material.surface_density": (0.01, 5.0),
+    "material.stretch_stiffness": (1.0, 1e5),
+    "material.bending_stiffness": (0.0, 1.0),
+    "material.damping": (0.0, 1.0),
+    "material.friction": (0.0, 2.0),
+    "material.margin": (0.0, 0.02),
+    "plant.spacing": (0.01, 0.06),
+    "controller.spacing": (0.01, 0.06),
+    "plant.time_step": (1e-4, 0.05),
+    "plant.iterations": (1, 1000),
+    "plant.tolerance": (1e-10, 0.5),
+    "shoulder_stiffness": (0.0, 1000.0),
+    "shoulder_damping": (0.0, 1000.0),
+    "elbow_stiffness": (0.0, 1000.0),
+    "elbow_damping": (0.0, 1000.0),
+    "abduction_deg": (-30.0, 150.0),
+    "extension_deg": (-150.0, 70.0),
+    "rotation_deg": (-70.0, 70.0),
+    "elbow_deg": (0.0, 140.0),
+    "following.time_constant": (0.05, 1000.0),
+    "following.threshold": (0.0, 100.0),
+    "following.return_time_constant": (0.05, 1000.0),
+    "following.max_speed": (0.01, 5.0),
+    "behaviour.max_hand_speed": (0.01, 2.0),
+    "behaviour.max_joint_speed": (0.01, 10.0),
+    "reach.start": (0.0, 600.0),
+    "reach.within": (0.01, 1.0),
+    "reach.push": (0.0, 0.3),
+    "turn.angle_deg": (-90.0, 90.0),
+    "turn.start": (0.0, 600.0),
+    "turn.duration": (0.1, 60.0),
+    "withdraw.start": (0.0, 600.0),
+    "withdraw.duration": (0.1, 600.0),
+    "withdraw.distance": (0.01, 0.4),
+    "wave.start": (0.0, 600.0),
+    "wave.duration": (0.1, 600.0),
+    "wave.amplitude": (0.001, 0.3),
+    "wave.frequency": (0.1, 5.0),
+    "tremor.amplitude": (0.0, 0.05),
+    "tremor.frequency": (1.0, 15.0),
+    "global_mpc.period": (0.05, 10.0),
+    "global_mpc.delay": (0.001, 10.0),
+    "global_mpc.time_step": (0.005, 2.0),
+    "global_mpc.horizon": (1, 100),
+    "global_mpc.max_iterations": (1, 1000),
+    "global_mpc.inner_iterations": (1, 1000),
+    "global_mpc.max_speed": (0.001, 1.0),
+    "global_mpc.progress_step": (0.001, 1.0),
+    "global_mpc.approach_distance": (0.0, 1.0),
+    "global_mpc.waiting_progress": (0.05, 2.0),
+    "global_mpc.force_limit": (1.0, 200.0),
+    "local.period": (0.001, 1.0),
+    "local.delay": (1e-4, 1.0),
+    "local.time_step": (0.005, 1.0),
+    "local.horizon": (1, 200),
+    "local.position": (0.0, 1e6),
+    "local.speed": (1e-6, 1e6),
+    "local.max_speed": (0.001, 1.0),
+    "local.stretch": (0.1, 1.0),
+    "local.beside": (0.001, 1.0),
+    "local.beside_speed": (0.001, 10.0),
+    "weights.position": (0.0, 1e6),
+    "weights.direction": (0.0, 1e6),
+    "weights.speed": (0.0, 1e6),
+    "weights.safety": (0.0, 1e6),
+    "weights.free_force": (0.0, 1e3),
+    "weights.separation": (0.0, 1e6),
+    "weights.least_spread": (0.0, 1.0),
+    "weights.entering_spread": (0.0, 1.0),
+    "weights.clearance": (0.0, 1e6),
+    "weights.free_clearance": (0.0, 1.0),
+    "command_rate": (10.0, 1000.0),
+    "safety.max_speed": (0.001, 2.0),
+    "safety.max_acceleration": (0.01, 50.0),
+    "safety.max_braking": (0.01, 100.0),
+    "safety.force_limit": (1.0, 200.0),
+    "safety.soft_force_limit": (0.0, 200.0),
+    "safety.force_filter_time": (0.0, 1.0),
+    "safety.yield_rate": (0.0, 0.1),
+    "safety.yield_speed": (0.0, 1.0),
+    "safety.relax_speed": (0.001, 0.2),
+    "safety.stop_time": (0.0, 60.0),
+    "safety.max_lead": (0.001, 0.2),
+    "safety.stale_time": (0.005, 5.0),
+    "safety.person_distance": (0.0, 0.3),
+    "safety.least_distance": (0.0, 1.0),
+    "safety.largest_distance": (0.05, 3.0),
+    "gripper.max_speed": (0.001, 2.0),
+    "gripper.max_acceleration": (0.01, 50.0),
+    "start.distance_behind": (0.1, 2.0),
+    "start.height_offset": (-1.0, 1.0),
+    "start.lateral_offset": (-1.0, 1.0),
+    "variation.arm_angle_deg": (0.0, 45.0),
+    "variation.coat_scale": (0.0, 0.3),
+    "variation.plant_stiffness": (0.0, 0.9),
+    "variation.plant_friction": (0.0, 0.9),
+    "variation.start_offset": (0.0, 0.3),
+    "log.rate": (1.0, 250.0),
+}
+_OF_MEASURES = (0.005, 3.0)
+_OF_EFFECTS = {
+    f"effects.{name}.{p.name}": (p.low, p.high)
+    for name, effect in EFFECTS.items()
+    for p in effect.parameters()
+}
+
+
+def plain(key: str) -> str:
+    """Returns a dotted key without the indices of lists."""
+    return re.sub(r"\[\d+\]", "", key)
+
+
+def range_of(key: str) -> tuple[float, float] | None:
+    """Returns the range of the number at a dotted key, both ends allowed, if it has one."""
+    name = plain(key)
+    for end, bounds in _RANGES.items():
+        if name == end or name.endswith("." + end):
+            return bounds
+    return _OF_MEASURES if ".measures." in key else _OF_EFFECTS.get(key)

@@ -1,0 +1,468 @@
+"""What a scenario's YAML may say: plain dataclasses, which Drake's `yaml_load_typed` fills."""
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.registry import EFFECTS
+
+
+@dataclass
+class Coat:
+    """A parametric coat: a preset, scaled, with single measures replaced; m."""
+
+    preset: str = "overcoat"
+    scale: float = 1.0  # on all lengths
+    body_length: float | None = None  # shoulder tips to hem
+    chest: float | None = None  # girth
+    shoulder_width: float | None = None  # tip to tip
+    sleeve_length: float | None = None  # shoulder tip to cuff
+    armhole_girth: float | None = None
+    cuff_girth: float | None = None
+    collar_height: float | None = None
+    front_opening: float | None = None  # between the front edges, part of the chest girth
+    # What each gripper holds: a patch of ten nodes, or the whole shoulder seam, as a hanger does;
+    # the seam is the same at every spacing, a patch of nodes is not.
+    grasp: str = "patch"
+
+
+@dataclass
+class Mesh:
+    """A garment of the user's own, instead of the coat."""
+
+    file: str = ""  # OBJ, PLY or STL, relative to the scenario
+    unit: str = "m"  # of its coordinates
+    loops: dict[str, list[int]] = field(default_factory=dict)  # nodes in order, by loop name
+    grasp: dict[str, list[int]] = field(default_factory=dict)  # nodes held, by side
+
+
+@dataclass
+class Garment:
+    """The garment's pattern; plant and controller mesh it each at its own spacing."""
+
+    coat: Coat = field(default_factory=Coat)
+    mesh: Mesh | None = None
+
+
+@dataclass
+class Material:
+    """A fabric, SI units; see models/cloth/material.py."""
+
+    surface_density: float = 0.3  # kg/m²
+    stretch_stiffness: float = 100.0  # N/m
+    bending_stiffness: float = 1.5e-3  # N·m
+    damping: float = 0.003  # s, of the plant's integrator
+    friction: float = 0.3
+    margin: float = 0.003  # m, kept between node and skin
+
+
+@dataclass
+class Measures:
+    """Body sizes, m, and masses, kg."""
+
+    shoulder_height: float = 1.40  # of the joints, standing
+    shoulder_width: float = 0.36  # joint to joint
+    upper_arm_length: float = 0.29
+    forearm_length: float = 0.32  # elbow to middle of the hand
+    upper_arm_radius: float = 0.045
+    forearm_radius: float = 0.038
+    hand_radius: float = 0.040
+    chest_width: float = 0.32
+    chest_depth: float = 0.20
+    torso_length: float = 0.52
+    hip_width: float = 0.32
+    neck_radius: float = 0.055
+    head_radius: float = 0.095
+    leg_length: float = 0.85
+    thigh_radius: float = 0.075
+    upper_arm_mass: float = 1.6
+    forearm_mass: float = 1.2
+
+
+@dataclass
+class Arm:
+    """Rest pose of an arm, degrees; all zero hangs straight down."""
+
+    abduction_deg: float = 13.0  # sideways
+    extension_deg: float = 46.0  # backward
+    rotation_deg: float = 0.0  # about its own axis
+    elbow_deg: float = 10.0  # flexion
+
+
+@dataclass
+class Joints:
+    """How the arms yield: N·m/rad and N·m·s/rad."""
+
+    shoulder_stiffness: float = 6.0
+    shoulder_damping: float = 3.0
+    elbow_stiffness: float = 3.6
+    elbow_damping: float = 1.2
+
+
+@dataclass
+class Following:
+    """How a person gives way who lets the garment lead; see models/human/following.py."""
+
+    time_constant: float = 1.0  # in which a joint held away from where it was set is followed, s
+    threshold: float = 0.3  # of the torque at a joint, up to which nothing is followed, N·m
+    return_time_constant: float | None = None  # to the rest pose, s; empty: stays where it was led
+    max_speed: float = 1.0  # of a joint's set-point, rad/s
+
+
+@dataclass
+class Reach:
+    """The hand goes into the sleeve, once its armhole is near."""
+
+    side: str = "both"
+    start: float = 0.0  # s, at the earliest
+    within: float = 0.25  # from hand to armhole, m
+    push: float = 0.05  # of the hand beyond the armhole; then it follows, m
+
+
+@dataclass
+class Turn:
+    """The body turns about the vertical and stays so."""
+
+    angle_deg: float = 15.0  # leftward
+    start: float = 15.0  # s
+    duration: float = 3.0  # s
+
+
+@dataclass
+class Withdraw:
+    """The hand is drawn to the body's side for a while, then goes back."""
+
+    side: str = "both"
+    start: float = 10.0  # s
+    duration: float = 4.0  # s
+    distance: float = 0.10  # m
+
+
+@dataclass
+class Wave:
+    """The hand goes to and fro sideways."""
+
+    side: str = "both"
+    start: float = 10.0  # s
+    duration: float = 3.0  # s
+    amplitude: float = 0.05  # m
+    frequency: float = 1.0  # Hz
+
+
+@dataclass
+class Motion:
+    """One motion of an active person: just one of these."""
+
+    reach: Reach | None = None
+    turn: Turn | None = None
+    withdraw: Withdraw | None = None
+    wave: Wave | None = None
+
+
+@dataclass
+class Tremor:
+    """Shaking of both hands; 4 to 12 Hz and up to 2 cm, see models/human/tremor.py."""
+
+    amplitude: float = 0.005  # of the hand, m
+    frequency: float = 5.0  # Hz
+
+
+@dataclass
+class Behaviour:
+    """What the person does of its own; the controller is not told."""
+
+    # dummy: springs about the rest pose. passive: follows the garment. active: has motions of its
+    # own, and follows between them.
+    kind: str = "dummy"
+    following: Following = field(default_factory=Following)
+    motions: list[Motion] = field(default_factory=list)
+    max_hand_speed: float = 0.5  # of motions of the hand, m/s
+    max_joint_speed: float = 2.5  # likewise, rad/s
+    tremor: Tremor | None = None
+
+
+@dataclass
+class Person:
+    """The person, or a dummy: a person without will."""
+
+    posture: str = "standing"
+    measures: Measures = field(default_factory=Measures)
+    left_arm: Arm = field(default_factory=Arm)
+    right_arm: Arm = field(default_factory=Arm)
+    joints: Joints = field(default_factory=Joints)
+    behaviour: Behaviour = field(default_factory=Behaviour)
+
+
+@dataclass
+class Plant:
+    """The simulated truth."""
+
+    spacing: float = 0.02  # of the garment's mesh, m
+    time_step: float = 0.004  # s
+    integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
+    iterations: int = 40  # of the implicit integrator's linear solver, at most
+    tolerance: float = 5e-3  # relative residual at which it stops
+    self_collision: bool = False  # layers of the garment do not pass through each other
+    material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
+
+
+@dataclass
+class Weights:
+    """Of the global controller's costs; see models/control/global_mpc.py."""
+
+    position: float = 1.0
+    direction: float = 0.05
+    speed: float = 0.125
+    safety: float = 3e-4
+    free_force: float = 5.0  # N
+    separation: float = 1.0
+    least_spread: float = 0.5  # share of the grippers' distance at rest
+    entering_spread: float = 0.85  # the same while a sleeve is entered
+    level: float = 20.0  # on a garment that is turned on edge
+    least_level: float = 0.5  # of the grippers' distance at rest: the left one is left of the right
+    clearance: float = 10.0
+    free_clearance: float = 0.05  # m
+    corridor: float = 3.0  # on cloth that hangs ahead of a hand that is to go in
+    corridor_radius: float = 0.06  # m
+    corridor_length: float = 0.12  # m
+    passage: float = 3.0  # on cloth that would cross the forearm if the hand were in the armhole
+    passage_radius: float = 0.06  # m
+    passage_length: float = 0.25  # m
+
+
+@dataclass
+class GlobalMpc:
+    """The global controller."""
+
+    period: float = 0.5  # between solves, s
+    delay: float = 0.2  # from what is seen to the use of the plan, s; a multiple of time_step
+    time_step: float = 0.2  # of the prediction, s
+    horizon: int = 5  # steps
+    max_iterations: int = 3  # gradient steps per solve
+    inner_iterations: int = 8  # of the garment's linear solve; 1 is the paper's scheme
+    max_speed: float = 0.12  # of a gripper, m/s
+    weights: Weights = field(default_factory=Weights)
+    progress_step: float = 0.08  # advance of s asked for per step (k)
+    approach_distance: float = 0.20  # cap of l_h, m
+    waiting_progress: float = 0.3  # least s of a waiting sleeve
+    force_limit: float | None = None  # deprecated, N: is safety.force_limit now
+
+
+@dataclass
+class Local:
+    """The local controller; see models/control/local_model.py."""
+
+    period: float = 0.02  # between solves, s
+    delay: float = 0.002  # from what is seen to the use of the solution, s
+    time_step: float = 0.05  # of the problem, s
+    horizon: int = 20  # steps
+    position: float = 1.0  # weight of sleeves
+    speed: float = 0.1  # weight of the grippers' speed, s²/m² of a step
+    max_speed: float = 0.12  # of a gripper, m/s
+    stretch: float = 1.0  # share of the distances that the garment reaches, that is used
+    beside: float = 0.04  # that a dressed sleeve may be beside its target, m
+    beside_speed: float = 0.05  # that it may move beside its arm, m/s
+    dragged: float = 0.04  # how far a hand is taken to be pushed by the garment, m
+    # share of what a sleeve is off from where the plan foresaw it, that is made up for:
+    prepare_correction: float = 0.0  # while it is prepared
+    dress_correction: float = 1.0  # while it is drawn on
+    feedback: bool = True  # corrects between solves by the solution's gains
+    solver: str = "constrained_ddp"  # or cone: Clarabel, exact and slower
+
+
+@dataclass
+class Controller:
+    """What the controllers believe and how they act."""
+
+    spacing: float = 0.04  # of the believed garment's mesh, m
+    material: Material = field(default_factory=Material)
+    method: str = "global"  # global plan alone, local compensation alone, or full: both
+    global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
+    local: Local = field(default_factory=Local)
+    # how the arms are believed to move on: still, or constant_velocity
+    predictor: str = "still"
+    command_rate: float = 100.0  # Hz
+
+
+@dataclass
+class Workspace:
+    """A box in the world frame that the grippers' commands stay in; m."""
+
+    low: list[float] = field(default_factory=list)  # x, y, z
+    high: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Safety:
+    """Limits that no controller's request gets past; see models/control/safety.py."""
+
+    max_speed: float = 0.25  # of a gripper's command, m/s
+    max_acceleration: float = 2.0  # the same, m/s²
+    max_braking: float = 6.0  # where the other limits need it; never exceeded, m/s²
+    force_limit: float = 17.0  # no pulling from here on, N; beyond it grippers give way
+    soft_force_limit: float | None = None  # pulling fades from here on, N; half of it if empty
+    force_filter_time: float = 0.05  # of the force's low-pass, s
+    yield_rate: float = 0.005  # speed of giving way per force beyond the limit, m/s/N
+    yield_speed: float = 0.1  # of giving way, at most, m/s
+    relax_speed: float = 0.02  # of giving way while stopped, m/s
+    stop_time: float = 0.5  # beyond the force limit, after which both grippers stop, s
+    max_lead: float = 0.02  # of a command before its gripper, m
+    stale_time: float = 0.1  # age at which a request is not obeyed any more, s
+    person_distance: float = 0.03  # of a gripper to the person's skin, m
+    least_distance: float = 0.08  # between the grippers, m
+    largest_distance: float | None = None  # between the grippers, m; any if empty
+    workspace: Workspace | None = None  # everywhere if empty
+
+
+@dataclass
+class Gripper:
+    """Limits of a floating gripper: m/s, m/s²."""
+
+    max_speed: float = 0.25
+    max_acceleration: float = 2.0
+
+
+@dataclass
+class Start:
+    """Where the coat hangs at first, from the shoulders' middle, m."""
+
+    distance_behind: float = 0.75
+    height_offset: float = 0.0
+    lateral_offset: float = 0.0
+
+
+@dataclass
+class Arms:
+    """What carries the grippers: nothing (they float), or two Panda arms behind the person."""
+
+    model: str = "floating"  # or panda
+    distance_behind: float = 0.85  # of the arms' bases behind the person, m
+    spread: float = 1.0  # between them, m
+    height_offset: float = -0.45  # of both, over the person's shoulders, m
+    tilt_deg: float = 35.0  # of the hands, which point forward and this much down
+    rate: float = 200.0  # of the joints' commands, Hz
+    mode: str = "position_velocity"  # what is commanded: or position, or velocity alone
+
+
+@dataclass
+class Hardware:
+    """Of a station of kind hardware, and of the lab that `drake-dress sim-station` plays."""
+
+    # ttl 0 keeps messages on this machine
+    lcm_url: str = "udpm://239.255.76.67:7667?ttl=0"
+    status_channel: str = "PANDA_STATUS"  # of the arms; _LEFT and _RIGHT are appended
+    command_channel: str = "PANDA_COMMAND"  # the same
+    garment_channel: str = "GARMENT_ESTIMATE"
+    person_channel: str = "PERSON_ESTIMATE"
+    camera_channel: str = "CAMERA"  # _NAME is appended
+    status_rate: float = 200.0  # of the lab, Hz
+    estimate_rate: float = 50.0  # of the lab, Hz
+    stale_status: float = 0.05  # age at which arms hold, s
+    stale_estimate: float = 0.2  # the same
+    stale_camera: float = 0.5  # the same
+    settle_time: float = 0.2  # for which all must be well before arms go on, s
+    patience: float = 3.0  # with what is wrong, before the run ends, s
+    wait: float = 10.0  # for the first messages, s
+    start_distance: float = 0.02  # of a gripper from where the run begins, at most, m
+    start_angle: float = 0.1  # of a joint, rad
+
+
+@dataclass
+class Camera:
+    """A camera for colour and depth that looks at the person; world frame, m."""
+
+    name: str = ""
+    position: list[float] = field(default_factory=list)  # x, y, z
+    target: list[float] = field(default_factory=list)  # what is in the middle of its image
+    width: int = 320  # pixels
+    height: int = 240
+    fov_deg: float = 60.0  # vertical
+    rate: float = 5.0  # of images, Hz
+
+
+@dataclass
+class Station:
+    """Robots, or what stands in for them."""
+
+    kind: str = "simulated"  # or hardware: the same behind LCM messages
+    arms: Arms = field(default_factory=Arms)
+    hardware: Hardware = field(default_factory=Hardware)
+    gripper: Gripper = field(default_factory=Gripper)
+    start: Start = field(default_factory=Start)
+    cameras: list[Camera] = field(default_factory=list)
+
+
+@dataclass
+class LabFault:
+    """Something that goes wrong in the lab that `drake-dress sim-station` plays."""
+
+    kind: str = "stale"  # see models/supervision/injection.py
+    source: str = "left_arm"  # or right_arm, garment, person, camera_<name>; a lost bus is of all
+    start: float = 5.0  # s after the first command
+    duration: float = 1.0  # s
+
+
+@dataclass
+class Lab:
+    """The lab that `drake-dress sim-station` plays; a run does not know of it."""
+
+    faults: list[LabFault] = field(default_factory=list)
+    stale_command: float = 0.1  # age of commands at which arms stop by themselves, s
+    wait: float = 300.0  # for the first command, s
+    rest: float = 3.0  # after the last command, before the lab closes, s
+    push: float = 60.0  # of a fault of kind push, N
+
+
+@dataclass
+class Variation:
+    """What the seed draws, uniformly within ± these."""
+
+    arm_angle_deg: float = 0.0  # on each arm's abduction, extension and elbow
+    coat_scale: float = 0.0  # relative
+    plant_stiffness: float = 0.0  # relative, on stretch and bending
+    plant_friction: float = 0.0  # relative
+    start_offset: float = 0.0  # m, on each of the three
+
+
+def _effect_schema(effect: type[Effect]) -> type:
+    """Returns a dataclass with an effect's parameters and their standard deviations."""
+    entries: list[tuple[str, Any, Any]] = []
+    for p in effect.parameters():
+        entries.append((p.name, float, field(default=p.off)))
+        # as `drake-dress explain` found it; not used by the simulation
+        entries.append((f"{p.name}_std", float, field(default=0.0)))
+    return dataclasses.make_dataclass(effect.__name__, entries)
+
+
+EFFECT_SCHEMAS = {name: _effect_schema(effect) for name, effect in EFFECTS.items()}
+# Physical effects by name, each with its parameters in SI units; see models/effects/. One that is
+# not given is off.
+Effects = dataclasses.make_dataclass(
+    "Effects", [(n, t | None, field(default=None)) for n, t in EFFECT_SCHEMAS.items()]
+)
+
+
+@dataclass
+class Log:
+    """What is written while the run goes on."""
+
+    rate: float = 30.0  # Hz
+
+
+@dataclass
+class Scenario:
+    """One run."""
+
+    seed: int = 0
+    duration: float = 90.0  # at most, s
+    garment: Garment = field(default_factory=Garment)
+    person: Person = field(default_factory=Person)
+    plant: Plant = field(default_factory=Plant)
+    controller: Controller = field(default_factory=Controller)
+    safety: Safety = field(default_factory=Safety)
+    station: Station = field(default_factory=Station)
+    lab: Lab = field(default_factory=Lab)
+    variation: Variation = field(default_factory=Variation)
+    log: Log = field(default_factory=Log)
+    effects: Effects = field(default_factory=Effects)  # type: ignore[valid-type]

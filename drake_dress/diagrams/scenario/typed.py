@@ -1,0 +1,106 @@
+"""Holds what a YAML file says against the schema, so that a mistake is told with its dotted key."""
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from typing import Any
+
+from drake_dress.diagrams.scenario.ranges import CHOICES, plain, range_of
+from drake_dress.errors import UserError
+
+
+def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
+    """Returns the type of a dataclass's field, or says which names there are."""
+    schema = _without_none(schema)
+    dotted = f"{key}.{name}" if key else str(name)
+    if not dataclasses.is_dataclass(schema):
+        raise UserError(source, dotted, "unknown key, expected none below a value")
+    hints = typing.get_type_hints(schema)
+    if name not in hints:
+        near = difflib.get_close_matches(str(name), hints, n=1)
+        expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(hints)}"
+        raise UserError(source, dotted, f"unknown key, {expected}")
+    return hints[name]
+
+
+def typed(source: str, key: str, value: Any, schema: Any) -> Any:
+    """Holds a value read from YAML against a type; returns it, numbers as numbers."""
+    origin = typing.get_origin(schema)
+    if origin in (typing.Union, types.UnionType):
+        if value is None:
+            return None
+        schema = _without_none(schema)
+        origin = typing.get_origin(schema)
+    if dataclasses.is_dataclass(schema):
+        if not isinstance(value, dict):
+            raise UserError(source, key, f"is {kind_of(value)}, expected keys with values")
+        inner = {name: field_type(source, key, name, schema) for name in value}
+        return {
+            name: typed(source, f"{key}.{name}" if key else str(name), item, inner[name])
+            for name, item in value.items()
+        }
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise UserError(source, key, f"is {kind_of(value)}, expected names with lists")
+        below = typing.get_args(schema)[1]
+        return {name: typed(source, f"{key}.{name}", v, below) for name, v in value.items()}
+    if origin is list:
+        if not isinstance(value, list):
+            raise UserError(source, key, f"is {kind_of(value)}, expected a list")
+        below = typing.get_args(schema)[0]
+        return [typed(source, f"{key}[{i}]", item, below) for i, item in enumerate(value)]
+    if schema is float:
+        if isinstance(value, str):
+            # YAML 1.1 takes 1e9 for text
+            try:
+                return float(value)
+            except ValueError:
+                pass
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UserError(source, key, f"is {kind_of(value)}, expected a number")
+    elif schema is int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise UserError(source, key, f"is {kind_of(value)}, expected a whole number")
+    elif schema is str:
+        choices = CHOICES.get(plain(key))
+        if choices is not None and value not in choices:
+            raise UserError(source, key, f"is {kind_of(value)}, expected {' or '.join(choices)}")
+        if not isinstance(value, str):
+            raise UserError(source, key, f"is {kind_of(value)}, expected text")
+    return value
+
+
+def check_ranges(source: str, key: str, value: Any) -> None:
+    """Holds all numbers from a dotted key on against their ranges; all others must be finite."""
+    if dataclasses.is_dataclass(value):
+        for entry in dataclasses.fields(value):
+            inner = f"{key}.{entry.name}" if key else entry.name
+            check_ranges(source, inner, getattr(value, entry.name))
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            check_ranges(source, f"{key}[{i}]", item)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise UserError(source, key, f"is {value}, expected a finite number")
+        bounds = range_of(key)
+        if bounds is not None and not bounds[0] <= value <= bounds[1]:
+            raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
+
+
+def _without_none(schema: Any) -> Any:
+    if typing.get_origin(schema) in (typing.Union, types.UnionType):
+        return next(t for t in typing.get_args(schema) if t is not type(None))
+    return schema
+
+
+def kind_of(value: Any) -> str:
+    """Returns what was given, in words."""
+    if value is None:
+        return "empty"
+    if isinstance(value, dict):
+        return "a group of keys"
+    if isinstance(value, list):
+        return "a list"
+    return repr(value)
