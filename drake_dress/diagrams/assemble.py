@@ -35,7 +35,7 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.report.log import RunLogWriter
+from drake_dress.report.log_writer import RunLogWriter
 
 
 @dataclass(frozen=True)

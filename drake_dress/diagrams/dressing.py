@@ -19,7 +19,7 @@ from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log import RunLogWriter
+from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_controller import ArmController
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc

@@ -42,7 +42,7 @@ from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import InjectedFault
 from drake_dress.models.supervision.supervision import Patience
 from drake_dress.models.supervision.watch import Fault, WatchSettings
-from drake_dress.report.log import RunLogWriter
+from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.apart import Apart
 from drake_dress.systems.camera_outbox import CameraOutbox, Take
 from drake_dress.systems.fault_player import FaultPlayer

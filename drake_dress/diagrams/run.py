@@ -28,7 +28,8 @@ from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_ya
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.report.log import RunLog, RunLogWriter
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.report.measures import measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.report_html import write_report

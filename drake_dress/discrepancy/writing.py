@@ -12,7 +12,7 @@ import numpy as np
 from drake_dress import __version__
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log import JOINT_NAMES, SCHEMA
+from drake_dress.report.log_schema import JOINT_NAMES, SCHEMA
 
 
 def write_recordings(path: Path, recordings: Sequence[Recording], scenario_text: str) -> None:

@@ -19,7 +19,8 @@ import numpy.typing as npt
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
-from drake_dress.report.log import STAGE_NAMES, RunLog
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.stills import floor_height
 
 MAX_BYTES = 25_000_000

@@ -18,7 +18,8 @@ from matplotlib.axes import Axes
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
-from drake_dress.report.log import STAGE_NAMES, RunLog
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import chart, embedded, html_page
 from drake_dress.report.stills import CameraPose, render_still

@@ -17,7 +17,7 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arm_extremes import ArmExtremes
-from drake_dress.report.log import ArmSample, RunLogWriter, Sample
+from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
 
 # In the order of `ArmSample`.
 _OF_ARM = ("position", "velocity", "command", "torque")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log import RunLogWriter, Sample
+from drake_dress.report.log_writer import RunLogWriter, Sample
 
 FloatArray = npt.NDArray[np.float64]
 

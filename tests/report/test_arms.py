@@ -12,7 +12,8 @@ from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.arms import arm_capsules, measure_arms
-from drake_dress.report.log import ArmSample, RunLog, RunLogWriter, Sample
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import SuccessRules, summarize
 from tests.report import synthetic

@@ -16,7 +16,9 @@ import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log import JOINT_NAMES, RunLog, RunLogWriter
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_schema import JOINT_NAMES
+from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 
 
@@ -149,7 +151,7 @@ def test_killed_process_leaves_what_was_flushed(tmp_path):
 import time
 import numpy as np
 from dataclasses import replace
-from drake_dress.report.log import RunLogWriter
+from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 garment = synthetic.coat(0.06)
 sample = synthetic.dressing(garment, count=2)[0]

@@ -1,0 +1,437 @@
+"""Writes the log of a run, `run.h5`, while it runs.
+
+The file must be of use however the run ends. A run that is interrupted closes it with all samples
+whole. A disk that is nearly full ends the log before HDF5 is in trouble, which it does not survive:
+space to close the file is kept back for that. A process that is killed leaves what was flushed
+last: samples are written together about once a second, rows of bulky datasets are never rewritten,
+and HDF5 is told to keep its own bookkeeping in memory between flushes, so that the file on disk is
+consistent at all times but during a flush.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+import time as clock
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.errors import UserError
+from drake_dress.models.control.safety import Verdict
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.log_schema import (
+    ARM_SERIES,
+    CLEARANCES,
+    JOINT_NAMES,
+    LOOPS,
+    SCHEMA,
+    STAGE_NAMES,
+)
+
+_FLUSH_PERIOD = 1.0  # s of wall time
+# Kept back on the disk for the end, and what must be free beside it, bytes.
+_RESERVE, _LEAST_FREE = 16 << 20, 4 << 20
+_MOST_WAITING = 64  # samples that are kept in memory between flushes
+_SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+
+
+@dataclass(frozen=True)
+class ArmSample:
+    """What is logged of one arm.
+
+    Attributes:
+        q, q_commanded: (7,) rad. v: (7,) rad/s. torque: (7,) N·m.
+        q_least, q_most: (7,) extremes since the sample before, rad; None: as now.
+        v_peak, torque_peak: (7,) largest magnitudes since then, rad/s, N·m; None: as now.
+    """
+
+    q: npt.ArrayLike
+    v: npt.ArrayLike
+    q_commanded: npt.ArrayLike
+    torque: npt.ArrayLike
+    q_least: npt.ArrayLike | None = None
+    q_most: npt.ArrayLike | None = None
+    v_peak: npt.ArrayLike | None = None
+    torque_peak: npt.ArrayLike | None = None
+
+    def rows(self) -> dict[str, npt.ArrayLike]:
+        """Returns what is written, by the series' names."""
+        now = {
+            "q_least": self.q,
+            "q_most": self.q,
+            "v_peak": np.abs(self.v),
+            "torque_peak": np.abs(self.torque),
+        }
+        return {name: now[name] if row is None else row for name, row in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What is logged of one instant. Positions in the world frame, SI units.
+
+    Attributes:
+        time: s, greater than that of the sample before.
+        garment_position: (n,3) the plant's garment, m.
+        contact: (n,) 0 none, 1 stick, 2 slip; None where not known.
+        contact_force: (n,3) of the person on the garment, N; None where not known.
+        joint_position: (6,3) shoulder, elbow, hand of left, then of right, m.
+        gripper_position: side to (3,), m.
+        gripper_force: side to (3,) of the garment on the gripper, N.
+        dressing: side to (s, l in m, theta in rad).
+        stage: (2,) 0 prepare, 1 dress, 2 done; left, right.
+        global_solve_time, local_solve_time: of the last solve, s; NaN where none ended.
+        global_solves, local_solves: that ended since the sample before; None: as many as times.
+        estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
+        estimate_joint_position: (6,3), m; None where it has none.
+        capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
+        arms: of each side, where there are arms.
+        clearance: (3,) least distance since the sample before between the arms, and from the left
+            and the right one to the person, m, where there are arms.
+        safety: (2,) flags of `models.control.safety.Verdict` that came up since the sample before;
+            left, right.
+    """
+
+    time: float
+    garment_position: npt.ArrayLike
+    contact: npt.ArrayLike | None
+    contact_force: npt.ArrayLike | None
+    joint_position: npt.ArrayLike
+    gripper_position: dict[str, npt.ArrayLike]
+    gripper_force: dict[str, npt.ArrayLike]
+    dressing: Mapping[Side, tuple[float, float, float]]
+    stage: npt.ArrayLike
+    global_solve_time: float = np.nan
+    local_solve_time: float = np.nan
+    global_solves: int | None = None
+    local_solves: int | None = None
+    estimate_garment_position: npt.ArrayLike | None = None
+    estimate_joint_position: npt.ArrayLike | None = None
+    capsule_a: npt.ArrayLike | None = None
+    capsule_b: npt.ArrayLike | None = None
+    safety: npt.ArrayLike = (0, 0)
+    arms: Mapping[Side, ArmSample] | None = None
+    clearance: npt.ArrayLike | None = None
+
+
+class RunLogWriter:
+    """Writes a run's log sample by sample; a context manager.
+
+    Args:
+        path: of the HDF5 file; what was there is replaced.
+        garment: the plant's.
+        scenario_text: the resolved scenario, YAML.
+        version: of drake_dress.
+        seed: of the run.
+        radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
+        joint_names: names of these six.
+        capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
+        estimate_garment: the controller's garment; None: its positions are not logged.
+        flush_period: wall time between flushes, s.
+        bases: X_WB (4,4) of each arm, where samples have arms.
+        estimated: whether garment and person are as they were estimated, since truth is not known;
+            there is no contact then.
+
+    Raises:
+        UserError: the file cannot be written.
+        ValueError: a sample has another shape, or is not later than the one before.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        garment: GarmentMesh,
+        scenario_text: str,
+        version: str,
+        seed: int,
+        radius: npt.ArrayLike,
+        joint_names: Sequence[str] = JOINT_NAMES,
+        capsule_radius: npt.ArrayLike | None = None,
+        estimate_garment: GarmentMesh | None = None,
+        flush_period: float = _FLUSH_PERIOD,
+        bases: Mapping[Side, npt.ArrayLike] | None = None,
+        estimated: bool = False,
+    ) -> None:
+        self.path = Path(path)
+        try:
+            self._file = h5py.File(self.path, "w")
+        except OSError as error:
+            raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
+        _keep_metadata_until_flush(self._file)
+        self._reserve = _reserved(self.path.parent, _RESERVE)
+        if self._reserve is None:
+            self._file.close()
+            self.path.unlink()
+            raise UserError(str(path), "", "no room on the disk, expected 16 MB at least")
+        self._flush_period = flush_period
+        self._count = 0
+        self._last_time = -np.inf
+        self._series: dict[str, h5py.Dataset] = {}
+        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._waiting: list[dict[str, npt.NDArray[Any]]] = []
+
+        attributes = self._file.attrs
+        attributes["schema"] = SCHEMA
+        attributes["scenario"] = scenario_text
+        attributes["version"] = version
+        attributes["seed"] = seed
+
+        self._write_garment("/garment", garment)
+        self._fixed("/human/radius", np.asarray(radius, dtype=np.float64).reshape(6), "m")
+        n = len(garment.rest_position)
+        self._add("/time", (), "s", dtype="f8")
+        self._add("/garment/position", (n, 3), "m", "world")
+        if estimated:
+            attributes["source"] = "estimate"
+        else:
+            self._add("/garment/contact", (n,), "1", dtype="i1")
+            self._add("/garment/contact_force", (n, 3), "N", "world")
+        self._add("/human/joint_position", (6, 3), "m", "world", dtype="f8")
+        self._series["/human/joint_position"].attrs["names"] = list(joint_names)
+        for side in SIDES:
+            self._add(f"/gripper/{side}/position", (3,), "m", "world", dtype="f8")
+            self._add(f"/gripper/{side}/force", (3,), "N", "world", dtype="f8")
+            for name, unit in (("s", "1"), ("l", "m"), ("theta", "rad")):
+                self._add(f"/dressing/{side}/{name}", (), unit, dtype="f8")
+        self._add("/control/stage", (2,), "1", dtype="i1")
+        self._series["/control/stage"].attrs["names"] = list(SIDES)
+        self._series["/control/stage"].attrs["values"] = list(STAGE_NAMES)
+        self._add("/control/safety", (2,), "1", dtype="i2")
+        self._series["/control/safety"].attrs["names"] = list(SIDES)
+        self._series["/control/safety"].attrs["flags"] = [f"{v.value} {v.name}" for v in Verdict]
+        for name in ("global", "local"):
+            self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
+            self._add(f"/control/{name}/solves", (), "1", dtype="i2")
+        self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
+        self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
+        if bases is not None:
+            for side in SIDES:
+                self._fixed(f"/arm/{side}/base", np.asarray(bases[side], dtype=np.float64), "m")
+                for name, unit in ARM_SERIES:
+                    self._add(f"/arm/{side}/{name}", (7,), unit, dtype="f8")
+            self._add("/arm/clearance", (3,), "m", dtype="f8")
+            self._series["/arm/clearance"].attrs["names"] = list(CLEARANCES)
+        if estimate_garment is not None:
+            self._write_garment("/estimate/garment", estimate_garment)
+            m = len(estimate_garment.rest_position)
+            self._add("/estimate/garment/position", (m, 3), "m", "world")
+        if capsule_radius is not None:
+            capsules = np.asarray(capsule_radius, dtype=np.float64).ravel()
+            self._fixed("/human/capsule_radius", capsules, "m")
+            for end in "ab":
+                shape = (len(capsules), 3)
+                self._add(f"/human/capsule_{end}", shape, "m", "world", dtype="f8")
+        self._flush()
+
+    def append(self, sample: Sample) -> None:
+        """Appends one sample, and flushes if the last flush was a while ago.
+
+        Raises:
+            OSError: the disk is full; what was appended before is in the file.
+        """
+        if not sample.time > self._last_time:
+            raise ValueError(f"sample at {sample.time} s is not later than {self._last_time} s")
+        row = {name: np.asarray(value) for name, value in self._rows(sample).items()}
+        for name, value in row.items():
+            if value.shape != self._shapes[name]:
+                raise ValueError(
+                    f"{name}: shape {value.shape} given, {self._shapes[name]} expected"
+                )
+        # its own copy: what is waiting must not change
+        self._waiting.append({name: value.copy() for name, value in row.items()})
+        self._last_time = sample.time
+        if clock.monotonic() - self._flushed_at >= self._flush_period:
+            self._flush()
+        elif len(self._waiting) >= _MOST_WAITING:
+            self._write_waiting()
+
+    def note(self, name: str, value: str | float) -> None:
+        """Writes something about the run as an attribute of the file, which may be closed."""
+        with self._opened() as file:
+            file.attrs[name] = value
+
+    def series(self, name: str, rows: npt.ArrayLike, unit: str) -> None:
+        """Writes a series of its own, that has not a row a sample."""
+        with self._opened() as file:
+            _label(file.create_dataset(name, data=np.asarray(rows, dtype=np.float64)), unit, None)
+
+    @contextmanager
+    def _opened(self) -> Iterator[h5py.File]:
+        if self._file:
+            yield self._file
+        else:
+            with h5py.File(self.path, "a") as file:
+                yield file
+
+    def close(self) -> None:
+        """Closes the file with as many whole samples as were appended; may be called twice."""
+        if not self._file:
+            return
+        self._release()
+        self._write_waiting()
+        # An interrupt may have come in the middle of a sample.
+        for dataset in self._series.values():
+            if dataset.shape[0] != self._count:
+                dataset.resize(self._count, axis=0)
+        self._file.close()
+
+    def __enter__(self) -> RunLogWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _rows(self, sample: Sample) -> dict[str, Any]:
+        rows: dict[str, Any] = {
+            "/time": sample.time,
+            "/garment/position": sample.garment_position,
+            "/human/joint_position": sample.joint_position,
+            "/control/stage": sample.stage,
+            "/control/safety": sample.safety,
+            "/control/global/solve_time": sample.global_solve_time,
+            "/control/local/solve_time": sample.local_solve_time,
+        }
+        for name, solves, spent in (
+            ("global", sample.global_solves, sample.global_solve_time),
+            ("local", sample.local_solves, sample.local_solve_time),
+        ):
+            rows[f"/control/{name}/solves"] = np.isfinite(spent) if solves is None else solves
+        for side in SIDES:
+            rows[f"/gripper/{side}/position"] = sample.gripper_position[side]
+            rows[f"/gripper/{side}/force"] = sample.gripper_force[side]
+            for coordinate, value in zip(("s", "l", "theta"), sample.dressing[side], strict=True):
+                rows[f"/dressing/{side}/{coordinate}"] = value
+        if sample.arms is not None:
+            for side, arm in sample.arms.items():
+                rows |= {f"/arm/{side}/{name}": row for name, row in arm.rows().items()}
+        optional = {
+            "/garment/contact": sample.contact,
+            "/garment/contact_force": sample.contact_force,
+            "/arm/clearance": sample.clearance,
+            "/estimate/human/joint_position": sample.estimate_joint_position,
+            "/estimate/garment/position": sample.estimate_garment_position,
+            "/human/capsule_a": sample.capsule_a,
+            "/human/capsule_b": sample.capsule_b,
+        }
+        for name, array in optional.items():
+            if name in self._series:
+                shape = self._series[name].shape[1:]
+                rows[name] = np.full(shape, np.nan) if array is None else array
+        return rows
+
+    def _write_garment(self, group: str, garment: GarmentMesh) -> None:
+        self._fixed(f"{group}/faces", np.asarray(garment.faces, dtype=np.int32))
+        rest = np.asarray(garment.rest_position, dtype=np.float64)
+        self._fixed(f"{group}/rest_position", rest, "m", "garment")
+        for name in LOOPS:
+            self._fixed(f"{group}/loops/{name}", np.asarray(garment.loops[name], dtype=np.int32))
+
+    def _fixed(
+        self, name: str, value: npt.NDArray[Any], unit: str | None = None, frame: str | None = None
+    ) -> None:
+        _label(self._file.create_dataset(name, data=value), unit, frame)
+
+    def _add(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        unit: str,
+        frame: str | None = None,
+        dtype: str = "f4",
+    ) -> None:
+        bulky = int(np.prod(shape, dtype=int)) > 100
+        # Compressed rows are a chunk each: a chunk that grew would move, and a killed process
+        # could leave the file pointing at its old place.
+        options: dict[str, Any] = (
+            {"compression": "gzip", "compression_opts": 1, "shuffle": True} if bulky else {}
+        )
+        dataset = self._file.create_dataset(
+            name,
+            shape=(0, *shape),
+            maxshape=(None, *shape),
+            chunks=(1 if bulky else _SMALL_CHUNK, *shape),
+            dtype=dtype,
+            **options,
+        )
+        _label(dataset, unit, frame)
+        self._series[name], self._shapes[name] = dataset, shape
+
+    def _write_waiting(self) -> None:
+        """Writes the samples since the last flush, all of a dataset at once."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        self._check_space(waiting)
+        count = self._count + len(waiting)
+        for name in waiting[0]:
+            dataset = self._series[name]
+            dataset.resize(count, axis=0)
+            dataset[self._count :] = np.stack([row[name] for row in waiting])
+        self._count = count
+
+    def _check_space(self, waiting: list[dict[str, npt.NDArray[Any]]]) -> None:
+        if self._reserve is None:
+            return
+        needed = sum(value.nbytes for row in waiting for value in row.values())
+        disk = os.statvfs(self.path.parent)
+        if disk.f_bavail * disk.f_frsize < needed + _LEAST_FREE:
+            self._waiting = waiting
+            self.close()
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+
+    def _release(self) -> None:
+        """Gives back what was kept back on the disk."""
+        if self._reserve is not None:
+            os.close(self._reserve)
+            self._reserve = None
+
+    def _flush(self) -> None:
+        self._write_waiting()
+        self._file.flush()
+        self._flushed_at = clock.monotonic()
+
+
+def _reserved(directory: Path, size: int) -> int | None:
+    """Returns an open file without a name that takes so many bytes; None if there is no room."""
+    try:
+        number, name = tempfile.mkstemp(dir=directory)
+        os.unlink(name)
+        try:
+            os.posix_fallocate(number, 0, size)
+        except OSError:
+            os.close(number)
+            raise
+        return number
+    except OSError:
+        return None
+
+
+def _keep_metadata_until_flush(file: h5py.File) -> None:
+    configuration = file.id.get_mdc_config()
+    configuration.evictions_enabled = False
+    configuration.incr_mode = 0
+    configuration.flash_incr_mode = 0
+    configuration.decr_mode = 0
+    file.id.set_mdc_config(configuration)
+
+
+def _label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:
+    if unit is not None:
+        dataset.attrs["unit"] = unit
+    if frame is not None:
+        dataset.attrs["frame"] = frame
