@@ -25,6 +25,18 @@ _HEADER = [
     "penetration, mm",
     "real-time factor",
 ]
+_BESIDE = ["pairs", "both dressed", "full alone", "it alone", "neither", "longer by, s"]
+_STAGES = [
+    "first hand in, runs",
+    "after, s",
+    "second hand in, runs",
+    "after that, s",
+    "dressed, runs",
+    "after that, s",
+    "lost again, runs",
+]
+# A hand counts as in from when it stays in for so long, s.
+_LASTING = 2.0
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
@@ -43,8 +55,12 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         for m in methods
         for reason, count in _reasons(_of(done, method=m)).items()
     ]
+    stages = [[m, *_stages(_of(done, method=m))] for m in methods]
+    beside = [[m, *_beside(done, m)] for m in methods if m != "full" and "full" in methods]
     return [
         Table("Methods", ["", *_HEADER], by_method),
+        Table("Beside full, the same persons, coats and seeds", ["", *_BESIDE], beside),
+        Table("How far they came", ["", *_STAGES], stages),
         Table("Persons and coats", ["", *_HEADER], by_group),
         Table("Why not", ["method", "reason", "runs"], reasons),
     ]
@@ -97,6 +113,62 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         max(penetration, default=None),
         median("realtime_factor"),
     ]
+
+
+def _beside(done: Sequence[dict[str, Any]], method: str) -> list[Any]:
+    """Returns how pairs of runs of full and another method ended that have all else in common.
+
+    The time is the median of how much longer the other took where both dressed.
+    """
+
+    def by_rest(which: str) -> dict[tuple[Any, ...], dict[str, Any]]:
+        mine = _of(done, method=which)
+        return {tuple(r["case"][k] for k in ("person", "coat", "seed")): r["summary"] for r in mine}
+
+    full, other = by_rest("full"), by_rest(method)
+    pairs = [(full[key], other[key]) for key in full if key in other]
+    ended = [(bool(a["success"]), bool(b["success"])) for a, b in pairs]
+    longer = [
+        b["dressing_time_s"] - a["dressing_time_s"]
+        for a, b in pairs
+        if a["success"] and b["success"]
+    ]
+    counts = [ended.count(how) for how in ((True, True), (True, False), (False, True))]
+    rest = len(ended) - sum(counts)
+    return [len(pairs), *counts, rest, float(np.median(longer)) if longer else None]
+
+
+def _stages(results: Sequence[dict[str, Any]]) -> list[Any]:
+    """Returns how many runs had one hand, both hands in, both sleeves on, and how long each took.
+
+    Times are medians over those that came that far. Last, how many had a hand in and out again.
+    """
+    first, second, last, lost = [], [], [], 0
+    for r in results:
+        series, summary = r["series"], r["summary"]
+        inside = [np.array(series[f"s_{side}"], dtype=float) > 0.0 for side in SIDES]
+        came = [(_first_lasting(row), bool(row[-1])) for row in inside]
+        begun = sorted(time for time, _ in came if time is not None)
+        lost += any(time is not None and not stays for time, stays in came)
+        if begun:
+            first.append(begun[0])
+        if len(begun) == len(SIDES):
+            second.append(begun[1] - begun[0])
+            if summary["success"]:
+                last.append(summary["dressing_time_s"] - begun[1])
+    cells: list[Any] = []
+    for times in (first, second, last):
+        cells += [len(times), float(np.median(times)) if times else None]
+    return [*cells, lost]
+
+
+def _first_lasting(inside: np.ndarray) -> float | None:
+    """Returns when a hand came in to stay for `_LASTING`, s; None if it never did."""
+    count = round(_LASTING / SERIES_STEP)
+    for k in np.flatnonzero(inside):
+        if inside[k : k + count].all():
+            return float(k * SERIES_STEP)
+    return None
 
 
 def _reasons(results: Sequence[dict[str, Any]]) -> dict[str, int]:

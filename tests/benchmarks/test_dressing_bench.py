@@ -63,13 +63,38 @@ def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
 def test_tables_count_what_was_dressed_and_say_why_not():
     results = [result(seed=k, time=20.0 + k) for k in range(3)]
     results += [result("local", 0, False, "left sleeve not on: s = 0.00 < 1.9")]
-    by_method, by_group, reasons = tables(results)
+    by_method, beside, _, by_group, reasons = tables(results)
     assert by_method.rows[0][:3] == ["full", 3, 3]
     assert by_method.rows[0][4] == 21.0
     assert by_method.rows[1][:3] == ["local", 1, 0]
     assert [row[0] for row in by_group.rows] == ["full, dummy, jacket", "local, dummy, jacket"]
+    assert beside.rows == [["local", 1, 0, 1, 0, 0, None]]
     assert reasons.rows == [["local", "left sleeve not on", 1]]
     assert figure(results).lstrip().startswith("<?xml")
+
+
+def test_methods_are_held_against_full_where_all_else_is_the_same():
+    results = [result(seed=k, time=20.0) for k in range(4)]
+    results += [result("global", k, k < 2, "no", time=20.0 + 3.0 * k) for k in (0, 1, 2, 7)]
+    _, beside, *_ = tables(results)
+    assert beside.rows == [["global", 3, 2, 1, 0, 0, 1.5]]
+
+
+def test_how_far_runs_came_is_told_by_hands_that_stay_in():
+    def came(left, right, dressed=None):
+        r = result(seed=0, success=dressed is not None, time=dressed)
+        r["series"] |= {"s_left": left, "s_right": right}
+        return r
+
+    out, brief, on = [0.0] * 20, [0.0, 0.5, 0.5] + [0.0] * 17, [0.0] * 5 + [1.0] * 15
+    results = [
+        came(brief, out),  # a hand that slips out at once is not in
+        came(on, out),
+        came(on, [*on[:-1], 0.0]),  # in, and lost
+        came(on, [0.0] * 8 + [1.0] * 12, dressed=3.6),
+    ]
+    _, _, stages, _, _ = tables(results)
+    assert stages.rows == [["full", 3, 1.0, 2, pytest.approx(0.3), 1, pytest.approx(2.0), 1]]
 
 
 def test_runs_in_a_file_are_not_run_again(tmp_path, capsys, monkeypatch):
