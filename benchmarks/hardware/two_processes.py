@@ -15,6 +15,8 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+import psutil
+
 from drake_dress.diagrams.lab import OPEN
 
 _ROOT = Path(__file__).parents[2]
@@ -152,7 +154,7 @@ def _inside(plan: Plan) -> Outcome:
         if plan.sampled and now - sampled >= 1.0:
             sampled = now
             for name, p in process.items():
-                memory[name].append(_memory(p.pid))
+                memory[name].append(memory_of(p.pid))
     for file in files.values():
         file.close()
     if plan.fill_at is not None:
@@ -185,16 +187,13 @@ def _fill(path: Path) -> None:
         pass
 
 
-def _memory(pid: int) -> float:
-    """Returns the memory of a process that is its own, MB."""
+def memory_of(pid: int) -> float:
+    """Returns the memory that a process and those that it started have to themselves, MB."""
     try:
-        text = Path(f"/proc/{pid}/smaps_rollup").read_text()
-        return sum(
-            float(line.split()[1]) / 1024.0
-            for line in text.splitlines()
-            if line.startswith("Private_")
-        )
-    except (OSError, IndexError):
+        first = psutil.Process(pid)
+        of_all = [p.memory_full_info().uss for p in (first, *first.children(recursive=True))]
+        return float(sum(of_all)) / 2.0**20
+    except psutil.Error:
         return float("nan")
 
 

@@ -1,5 +1,7 @@
 """Lab and run in two processes, with a network of their own, and faults in between."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from benchmarks.hardware.__main__ import main
 from benchmarks.hardware.faults import REACTIONS, FaultCase, run_case
-from benchmarks.hardware.two_processes import Plan, available, play
+from benchmarks.hardware.two_processes import Plan, available, memory_of, play
 from drake_dress.errors import UserError
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
@@ -53,6 +55,19 @@ def test_a_fault_is_answered_as_stated(kind: str, tmp_path: Path) -> None:
     print(f"kind {kind}, seed {seed}")
     result = run_case(FaultCase(kind, seed), SCENARIO, tmp_path, rate=0.5)
     assert result["wrong"] == []
+
+
+def test_memory_is_that_of_a_process_and_of_those_it_started() -> None:
+    child = "kept = b'1' * (80 << 20); print(len(kept), flush=True); input()"
+    parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    with subprocess.Popen(
+        [sys.executable, "-c", parent], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert 80.0 < memory_of(process.pid) < 150.0
+        process.communicate(b"\n")
+    assert np.isnan(memory_of(process.pid))
 
 
 @needs_network
