@@ -29,6 +29,8 @@ HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 _SPEED_SHARE, _ROOM = 0.85, 0.02
 # Of the search for the joints at the start: step, s, steps, and what is near enough, m.
 _SEARCH_STEP, _SEARCH_STEPS, _NEAR = 0.01, 1500, 1e-3
+# Of the way of a dressing: steps to each place, what is there, and what a garment makes up for, m.
+_WAY_STEPS, _REACHED, _SHORT = 800, 0.01, 0.05
 
 
 class ArmReachError(ValueError):
@@ -116,6 +118,40 @@ def set_up_arms(
                 f"{np.round(grippers[i], 3).tolist()} m: it ends {100.0 * short:.1f} cm short"
             )
     return ArmSetup(pair, q)
+
+
+def check_reach(
+    setup: ArmSetup, placement: ArmPlacement, places: Mapping[str, np.ndarray], person: Capsules
+) -> None:
+    """Sends the arms, in numbers alone, where grippers have to come to in turn.
+
+    Args:
+        setup: at the start.
+        placement: of the arms.
+        places: what they are at, for messages, and p_WG (2,3) of left and right, m.
+        person: to keep away from.
+
+    Raises:
+        ArmReachError: an arm stays further away than a garment makes up for; the message tells
+            which, from where, and by how much.
+    """
+    q, rate = setup.start.copy(), np.zeros_like(setup.start)
+    for what, grippers in places.items():
+        goals = [GripperGoal(p, np.zeros(3), placement.hand) for p in grippers]
+        short = np.full(2, np.inf)
+        for _ in range(_WAY_STEPS):
+            rate = setup.pair.rates(q, rate, (goals[0], goals[1]), _SEARCH_STEP, person).rate
+            q = q + _SEARCH_STEP * rate
+            at = [arm.tool_position(row) for arm, row in zip(setup.pair.arms, q, strict=True)]
+            short = np.linalg.norm(np.stack(at) - grippers, axis=1)
+            if short.max() < _REACHED:
+                break
+        for i, side in enumerate(SIDES):
+            if short[i] > _SHORT:
+                raise ArmReachError(
+                    f"the {side} arm does not reach {what}, {np.round(grippers[i], 3).tolist()} m: "
+                    f"it ends {100.0 * short[i]:.1f} cm short"
+                )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 
-from drake_dress.diagrams.arms import ArmPlacement, ArmSetup, set_up_arms
+from drake_dress.diagrams.arms import ArmPlacement, ArmSetup
 from drake_dress.diagrams.behaviour import Behaviour, Kind
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.dressing import LocalSetup, Rates
@@ -21,8 +21,7 @@ from drake_dress.diagrams.station import (
     SimulatedStation,
     StationParameters,
     make_simulated_station,
-    person_at_rest,
-    start_grippers,
+    robots_at_start,
 )
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
@@ -92,11 +91,11 @@ def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
     """Returns two arms where a run begins.
 
     Raises:
-        ArmReachError: they do not reach there.
+        ArmReachError: they do not reach there, or not where a dressing leads.
     """
     if p.placement is None:
         raise ValueError("grippers float, expected arms")
-    return set_up_arms(p.placement, start_grippers(p), person_at_rest(p, p.measures, person))
+    return robots_at_start(p, p.placement, p.measures, person)
 
 
 def links(scenario: schema.Scenario) -> Links:

@@ -45,7 +45,14 @@ from pydrake.multibody.plant import (
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_dress.diagrams.arms import ArmPlacement, ArmSetup, PlantArm, add_arms, set_up_arms
+from drake_dress.diagrams.arms import (
+    ArmPlacement,
+    ArmSetup,
+    PlantArm,
+    add_arms,
+    check_reach,
+    set_up_arms,
+)
 from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
 from drake_dress.diagrams.cameras import Camera, export_cameras
 from drake_dress.diagrams.oracles import export_oracles
@@ -184,7 +191,7 @@ def make_simulated_station(
         sight: what is seen of garment and person; without it there are no estimates.
 
     Raises:
-        ArmReachError: the arms do not reach where the grippers are at first.
+        ArmReachError: the arms do not reach where the grippers are at first, or will have to be.
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.time_step)
@@ -192,7 +199,7 @@ def make_simulated_station(
     person = add_person(plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
     robots = None
     if p.placement is not None:
-        robots = set_up_arms(p.placement, start_grippers(p), person_at_rest(p, body, person))
+        robots = robots_at_start(p, p.placement, body, person)
         arms = add_arms(plant, {side: p.placement.base(side) for side in SIDES})
     plant.Finalize()
 
@@ -372,6 +379,35 @@ def start_grippers(p: StationParameters) -> FloatArray:
     """Returns where left and right gripper are at first, p_WG (2,3), m."""
     hung = hung_garment(p)
     return np.stack([hung[p.mesh.grasp[side]].mean(axis=0) for side in SIDES])
+
+
+def robots_at_start(
+    p: StationParameters, placement: ArmPlacement, body: BodyMeasures, person: Person
+) -> ArmSetup:
+    """Returns two arms whose grippers hold the coat where a run begins.
+
+    Raises:
+        ArmReachError: they do not reach there, or not where a dressing leads: an armhole hangs
+            below its gripper, and goes over the hand and up to the shoulder.
+    """
+    capsules = person_at_rest(p, body, person)
+    setup = set_up_arms(placement, start_grippers(p), capsules)
+    joints = np.stack([arm_points(body, p.posture, side, p.arms[side]) for side in SIDES])
+    rest = p.mesh.rest_position
+    drop = [
+        np.linalg.norm(
+            rest[p.mesh.grasp[side]].mean(axis=0)
+            - rest[p.mesh.loops[f"{side}_armhole"]].mean(axis=0)
+        )
+        for side in SIDES
+    ]
+    above = np.outer(drop, [0.0, 0.0, 1.0])
+    places = {
+        "above the person's hand": joints[:, 2] + above,
+        "above the person's shoulder": joints[:, 0] + above,
+    }
+    check_reach(setup, placement, places, capsules)
+    return setup
 
 
 def _integrator(p: StationParameters, held: np.ndarray) -> Integrator:

@@ -41,9 +41,15 @@ def test_a_place_out_of_reach_is_told() -> None:
         set_up_arms(BEHIND, GRIPPERS + [1.5, 0.0, 0.0], NOBODY)
 
 
-def test_a_run_that_cannot_start_writes_nothing(tmp_path: Path) -> None:
-    scenario = load_scenario(SCENARIO, [*COARSE, "station.arms.distance_behind=3.0"])
-    with pytest.raises(UserError, match="station.arms: the left arm does not reach"):
+@pytest.mark.parametrize(
+    ("behind", "where"),
+    [(3.0, "its gripper's place at the start"), (1.0, "above the person's shoulder")],
+)
+def test_a_run_that_cannot_succeed_writes_nothing(
+    behind: float, where: str, tmp_path: Path
+) -> None:
+    scenario = load_scenario(SCENARIO, [*COARSE, f"station.arms.distance_behind={behind}"])
+    with pytest.raises(UserError, match=f"station.arms: the left arm does not reach {where}"):
         run_scenario(scenario, SCENARIO, tmp_path / "out", meshcat=False)
     assert not (tmp_path / "out").exists()
 
