@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.cloth.contact.corners import held_off_corners
 from drake_dress.models.cloth.contact.detection import cannot_land, find_proximity, nothing_near
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
@@ -196,6 +197,7 @@ class ImplicitCloth:
             near = nothing_near(len(x))
         else:
             near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)
+            near = held_off_corners(near, x, obstacles, m.margin)
         contact = ImplicitContact(
             near,
             v,

@@ -123,7 +123,7 @@ def find_proximity(
     nearest_obstacle(x, shapes, gap, owner)
     if obstacles.count and edge is not None and triangle is not None:
         gap = _with_elements(x, shapes, edge, triangle, gap)
-    return Proximity(gap - margin, owner, *_surface(x, obstacles, owner))
+    return Proximity(gap - margin, owner, *surfaces_of(x, obstacles, owner))
 
 
 def depth_of_elements(
@@ -283,10 +283,10 @@ def _contacts(
     obstacles: Obstacles,
     margin: float,
 ) -> Contacts:
-    return Contacts(nodes, distance - margin, owner, *_surface(at, obstacles, owner))
+    return Contacts(nodes, distance - margin, owner, *surfaces_of(at, obstacles, owner))
 
 
-def _surface(
+def surfaces_of(
     x: FloatArray, obstacles: Obstacles, owner: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Returns normals (k,3), slopes (k,) and velocities (k,3) of the owners' surfaces at `x`."""

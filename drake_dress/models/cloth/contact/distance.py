@@ -180,6 +180,35 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
 
 
 @nb.njit(cache=True, nogil=True)
+def nearest_other(
+    x: FloatArray, shapes: Any, owner: IntArray, distance: FloatArray, other: IntArray
+) -> None:
+    """Writes for each point of `x` (k,3) the nearest body but `owner` (k,), and its distance, m."""
+    a, b, radius, point, normal, solids = shapes
+    m, k = radius.shape[0], point.shape[0]
+    gradient = np.empty(3)
+    hessian = np.empty((3, 3))
+    for i in range(x.shape[0]):
+        p0, p1, p2 = x[i, 0], x[i, 1], x[i, 2]
+        distance[i] = _FAR
+        other[i] = -1
+        for j in range(m + k + solids[0].shape[0]):
+            if j == owner[i]:
+                continue
+            if j < m:
+                d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+            elif j < m + k:
+                d = 0.0
+                for c in range(3):
+                    d += (x[i, c] - point[j - m, c]) * normal[j - m, c]
+            else:
+                d = _solid(p0, p1, p2, solids, j - m - k, gradient, hessian, 0)
+            if d < distance[i]:
+                distance[i] = d
+                other[i] = j
+
+
+@nb.njit(cache=True, nogil=True)
 def _nearest_solid(x, solids, first, distance, owner):  # type: ignore[no-untyped-def]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
