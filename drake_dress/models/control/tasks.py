@@ -27,6 +27,7 @@ from drake_dress.models.dressing.stages import (
     advance_stages,
     eases,
     retreats,
+    withdraws,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.heading import Heading, heading
@@ -80,6 +81,7 @@ class TaskParameters:
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
+        withdrawal_distance: behind the shoulders, to where both sleeves are taken back, m.
         widening: growth of the cap of l_h with each attempt that missed the hand.
         outlook_distance: from the hand, within which a tethered sleeve goes where it is seen, m.
         outlook_reach: share of the distance between both armholes at rest at which it stays then.
@@ -131,6 +133,7 @@ class TaskParameters:
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
+    withdrawal_distance: float = 0.65
     widening: float = 0.1
     outlook_distance: float = 0.35
     outlook_reach: float = 1.04
@@ -160,7 +163,8 @@ class Assignment:
     Attributes:
         tasks: of each. facts: of each. retreat: whether it keeps away from the hand. ease: whether
             it gives way. attempts: how often it has missed the hand. outlook: place from the hand
-            at which the hand sees the armhole of a tethered sleeve, (3,) m.
+            at which the hand sees the armhole of a tethered sleeve, (3,) m. withdraw: whether both
+            are taken back behind the person.
     """
 
     tasks: tuple[Task, Task]
@@ -169,6 +173,7 @@ class Assignment:
     ease: tuple[bool, bool] = (False, False)
     attempts: tuple[int, int] = (0, 0)
     outlook: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    withdraw: bool = False
 
 
 def arm_axes(joints: FloatArray) -> tuple[ArmAxis, ArmAxis]:
@@ -239,6 +244,7 @@ class TaskPlanner:
                 self._outlook(x, joints[2], to, sleeves, 0, linked, missed[0]),
                 self._outlook(x, joints[5], to, sleeves, 1, linked, missed[1]),
             ),
+            withdraws(stages, facts, p.stages, time),
         )
 
     def renewed(
@@ -446,7 +452,9 @@ class TaskPlanner:
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
             if entering:
-                if facts[side].touches and not given.retreat[side]:
+                if given.withdraw:
+                    position[j] = axis.G(2.0) - p.withdrawal_distance * to.front
+                elif facts[side].touches and not given.retreat[side]:
                     position[j] = axis.G((j + 1) * time_step * p.progress_rate)
                 else:
                     position[j] = self._prepared(
@@ -471,7 +479,7 @@ class TaskPlanner:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
             target = SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
-            if given.retreat[side]:
+            if given.retreat[side] or given.withdraw:
                 return target
             ahead = _ahead([a[side] for a in axes[1:]])
             target = replace(target, passage=ahead.into)

@@ -248,6 +248,20 @@ def test_a_sleeve_that_is_up_leaves_the_garment_to_the_other(planner: TaskPlanne
     np.testing.assert_allclose(left, axes[0].G(p.final_progress))
 
 
+def test_a_garment_that_is_taken_back_goes_behind_both_shoulders(planner: TaskPlanner) -> None:
+    p, yaw = planner.parameters, 0.4
+    q, turn = joints(yaw), frame(yaw)[0]
+    off = SleeveFacts(False, 0.0, 0.1, 0.1, 0.0, touches=True)
+    given = Assignment((Task.PREPARE, Task.PREPARE), (off, off), (True, False), withdraw=True)
+    sleeves = [SleeveState(a.G(0.0), a.D(0.0)) for a in arm_axes(q)]
+    for axis, target in zip(
+        arm_axes(q), planner.targets(given, sleeves, np.stack([q] * 2), STEP), strict=True
+    ):
+        behind = turn.T @ (axis.G(2.0) - target.position[0])
+        np.testing.assert_allclose(behind, [p.withdrawal_distance, 0.0, 0.0], atol=1e-12)
+        assert target.entering and target.corridor is None and target.passage is None
+
+
 def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: TaskPlanner) -> None:
     p, facts = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))

@@ -11,6 +11,7 @@ from drake_dress.models.dressing.stages import (
     advance_stages,
     eases,
     retreats,
+    withdraws,
 )
 
 P = StageParameters(reach=0.45, waiting_progress=0.5)
@@ -81,6 +82,63 @@ def test_a_sleeve_that_misses_the_hand_keeps_away_before_it_tries_again() -> Non
     assert not retreats(state, 0, P, late + P.retreat_time + 0.1)
 
 
+def test_an_armhole_that_lingers_at_a_hand_is_taken_back() -> None:
+    at = facts(hand=P.lingering_distance - 0.01)
+    away = facts(hand=P.lingering_distance + 0.01)
+    state = StageState()
+    for time in (0.0, P.lingering_timeout - 0.1):
+        state, _ = advance_stages(state, (at, facts()), P, FAR, time)
+        assert state.attempts == (0, 0)
+    # one that has been away begins anew
+    gone, _ = advance_stages(state, (away, facts()), P, FAR, P.lingering_timeout)
+    gone, _ = advance_stages(gone, (at, facts()), P, FAR, P.lingering_timeout + 0.2)
+    assert gone.attempts == (0, 0)
+    # and one that has the arm in it does not linger
+    inside = facts(linked=True, s=0.1, hand=0.05)
+    on, _ = advance_stages(state, (inside, facts()), P, FAR, P.lingering_timeout + 0.1)
+    assert on.attempts == (0, 0) and on.close_since[0] is None
+    back, _ = advance_stages(state, (at, facts()), P, FAR, P.lingering_timeout + 0.1)
+    assert back.attempts == (1, 0) and back.stage[0] == Stage.PREPARE
+    assert back.close_since == (None, None)
+
+
+def test_after_misses_of_the_first_hand_both_sleeves_are_taken_back_and_tried_anew() -> None:
+    beside = replace(facts(hand=0.1), passed=0.1)
+    state = StageState(first=0)
+    for k in range(1, 2 * P.withdrawal_after + 1):
+        time = 20.0 * k
+        drawn = replace(state, stage=(Stage.DRESS, Stage.PREPARE))
+        state, _ = advance_stages(drawn, (beside, facts()), P, FAR, time)
+        assert state.attempts == (k, 0)
+        due = k % P.withdrawal_after == 0
+        assert withdraws(state, (beside, facts()), P, time) == due
+        soon, tasks = advance_stages(state, (beside, facts()), P, FAR, time + 0.5)
+        assert tasks == ((Task.PREPARE, Task.PREPARE) if due else (Task.PREPARE, Task.REST))
+        if not due:
+            continue
+        # nothing on the way back counts, neither a hand that comes along nor one in line
+        along = replace(beside, hand=(0.5, 0.0, 0.0), away=(1.0, 0.0, 0.0), prepared_error=0.0)
+        later, _ = advance_stages(soon, (along, facts()), P, FAR, time + P.withdrawal_time - 0.1)
+        assert later == state
+        # then it goes on, and a hand that is barred has as long as always
+        barred = replace(facts(hand=0.3), sight=0.1)
+        after = time + P.withdrawal_time + P.barred_timeout
+        waits, tasks = advance_stages(state, (barred, facts()), P, FAR, after - 0.1)
+        assert tasks == (Task.PREPARE, Task.REST) and waits.attempts == state.attempts
+        gone, _ = advance_stages(state, (barred, facts()), P, FAR, after + 0.1)
+        assert gone.attempts[0] == k + 1
+
+
+def test_a_garment_that_is_on_an_arm_is_not_taken_back() -> None:
+    missed = StageState(first=0, attempts=(P.withdrawal_after, P.withdrawal_after))
+    on = facts(linked=True, s=0.5)
+    assert withdraws(missed, (facts(), facts()), P, 0.5)
+    for both in ((on, facts()), (facts(), on), (on, on)):
+        assert not withdraws(missed, both, P, 0.5)
+    assert not withdraws(replace(missed, attempts=(0, P.withdrawal_after)), (on, facts()), P, 0.5)
+    assert not withdraws(StageState(), (facts(), facts()), P, 0.5)
+
+
 def test_an_opening_that_the_hand_does_not_see_is_not_dressed() -> None:
     seen = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0)
     barred = SleeveFacts(False, 0.0, 0.05, 0.01, passed=0.0, sight=0.0)
@@ -104,8 +162,9 @@ def test_a_hand_that_loses_part_of_its_sight_is_not_given_up() -> None:
     assert state.stage[0] == Stage.DRESS
     assert state.attempts == (0, 0)
     # nor is one taken back that is prepared for long
-    state, _ = advance_stages(StageState(), (half, facts()), P, FAR, 0.0)
-    state, _ = advance_stages(state, (half, facts()), P, FAR, P.barred_timeout + 0.1)
+    further = replace(half, hand_distance=0.2)
+    state, _ = advance_stages(StageState(), (further, facts()), P, FAR, 0.0)
+    state, _ = advance_stages(state, (further, facts()), P, FAR, P.barred_timeout + 0.1)
     assert state.attempts == (0, 0)
 
 
