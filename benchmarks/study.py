@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED
+from benchmarks.parser import INTERRUPTED, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.interrupt import caught_interrupt
@@ -25,6 +25,18 @@ class _Named(Protocol):
 
 
 C = TypeVar("C", bound=_Named)
+
+
+def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> None:
+    """Adds an option for each keyword, that takes some of its names; all by default."""
+    for option, names in known.items():
+        parser.add_argument(
+            f"--{option}",
+            type=some_of(tuple(names)),
+            default=list(names),
+            metavar="NAME,…",
+            help=", ".join(names),
+        )
 
 
 def add_study_options(parser: argparse.ArgumentParser, benchmark: str) -> None:
@@ -45,8 +57,8 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str) -> None:
 def carry_out(
     options: argparse.Namespace,
     benchmark: str,
+    case_type: Callable[..., C],
     cases: Sequence[C],
-    name_of: Callable[[dict[str, Any]], str],
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
     tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
 ) -> tuple[list[dict[str, Any]], bool]:
@@ -55,14 +67,16 @@ def carry_out(
     Args:
         options: those of `add_study_options`.
         benchmark: its name.
+        case_type: makes a case of its fields in a file.
         cases: of the study.
-        name_of: a case's name, from its fields in a file.
         run: a case, with the folder to keep it in and further settings.
         tables: of results.
     """
     if options.into:
         around(options.into, benchmark)
-    kept = {} if options.json is None else read_results(options.json, name_of, benchmark)
+    kept = {}
+    if options.json is not None:
+        kept = read_results(options.json, lambda case: case_type(**case).name, benchmark)
     missing = [case for case in cases if case.name not in kept]
     print(f"{len(cases)} runs, {len(missing)} of them not run yet", flush=True)
     stopped = False

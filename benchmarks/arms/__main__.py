@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.cloth.table import Table
-from benchmarks.parser import UNUSABLE, OneLineParser, some_of
-from benchmarks.study import add_study_options, carry_out, exit_status, run_case
+from benchmarks.parser import UNUSABLE, OneLineParser
+from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, run_case
 from drake_dress.errors import UserError
 
 _NAME = "arms"
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Case(*which)
         for which in itertools.product(options.scenarios, options.methods, options.grippers)
     ]
-    return exit_status(*carry_out(options, _NAME, chosen, _name, run, tables))
+    return exit_status(*carry_out(options, _NAME, Case, chosen, run, tables))
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     """Returns how dressings ended with floating grippers and on arms, and what the arms did."""
-    done = {_name(r["case"]): r["summary"] for r in results if "summary" in r}
+    done = {Case(**r["case"]).name: r["summary"] for r in results if "summary" in r}
     cases = [Case(**r["case"]) for r in results if "summary" in r]
     pairs = dict.fromkeys((c.scenario, c.method) for c in cases)
     ended = []
@@ -140,20 +140,9 @@ def _arms(summary: dict[str, Any]) -> list[Any]:
     ]
 
 
-def _name(case: dict[str, Any]) -> str:
-    return Case(**case).name
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench arms", description=__doc__)
-    for name, known in (("scenarios", SCENARIOS), ("methods", METHODS), ("grippers", GRIPPERS)):
-        parser.add_argument(
-            f"--{name}",
-            type=some_of(known),
-            default=list(known),
-            metavar="NAME,…",
-            help=", ".join(known),
-        )
+    add_choices(parser, scenarios=SCENARIOS, methods=METHODS, grippers=GRIPPERS)
     add_study_options(parser, _NAME)
     return parser
 

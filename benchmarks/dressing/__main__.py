@@ -10,13 +10,12 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import seed_range
-from benchmarks.parser import UNUSABLE, OneLineParser, some_of
-from benchmarks.study import add_study_options, carry_out, exit_status
+from benchmarks.parser import UNUSABLE, OneLineParser
+from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
 from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
 
@@ -27,26 +26,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     chosen = cases(options.methods, options.persons, options.coats, options.seeds)
-    results, stopped = carry_out(options, _NAME, chosen, _name, run, tables)
+    results, stopped = carry_out(options, _NAME, Case, chosen, run, tables)
     if options.plot:
         write_text(options.plot, figure(results))
     return exit_status(results, stopped)
 
 
-def _name(case: dict[str, Any]) -> str:
-    return Case(**case).name
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench dressing", description=__doc__)
-    for name, known in (("methods", METHODS), ("persons", PERSONS), ("coats", COATS)):
-        parser.add_argument(
-            f"--{name}",
-            type=some_of(tuple(known)),
-            default=list(known),
-            metavar="NAME,…",
-            help=", ".join(known),
-        )
+    add_choices(parser, methods=METHODS, persons=PERSONS, coats=COATS)
     parser.add_argument("--seeds", type=seed_range, default=range(13), metavar="A-B")
     add_study_options(parser, _NAME)
     parser.add_argument("--plot", type=Path, metavar="FILE", help="s, l and force over time, SVG")

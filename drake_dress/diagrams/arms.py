@@ -105,19 +105,58 @@ def set_up_arms(
     pair = ArmPair(
         (left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, parameters or RateParameters()
     )
-    q, rate = pair.home.copy(), np.zeros((2, 7))
+    still = np.zeros_like(pair.home)
+    q, _ = _sent(
+        pair, pair.home, still, grippers, "its gripper's place at the start", placement, person
+    )
+    return ArmSetup(pair, q)
+
+
+def _sent(
+    pair: ArmPair,
+    q: np.ndarray,
+    rate: np.ndarray,
+    grippers: np.ndarray,
+    what: str,
+    placement: ArmPlacement,
+    person: Capsules,
+    steps: int = _SEARCH_STEPS,
+    reached: float = 0.0,
+    allowed: float = _NEAR,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns joints and their rates (2,7) of arms that were sent to `grippers` (2,3), m.
+
+    Args:
+        pair: of arms.
+        q: (2,7) joints from where on, rad.
+        rate: (2,7) of them then, rad/s.
+        grippers: left, then right.
+        what: they are at, for messages.
+        placement: of the arms.
+        person: to keep away from.
+        steps: at most.
+        reached: so near, m, they need go no further.
+        allowed: by which they may end short, m.
+
+    Raises:
+        ArmReachError: one ends further away.
+    """
     goals = [GripperGoal(p, np.zeros(3), placement.hand) for p in grippers]
-    for _ in range(_SEARCH_STEPS):
+    short = np.full(2, np.inf)
+    for _ in range(steps):
         rate = pair.rates(q, rate, (goals[0], goals[1]), _SEARCH_STEP, person).rate
         q = q + _SEARCH_STEP * rate
+        at = [arm.tool_position(row) for arm, row in zip(pair.arms, q, strict=True)]
+        short = np.linalg.norm(np.stack(at) - grippers, axis=1)
+        if short.max() < reached:
+            break
     for i, side in enumerate(SIDES):
-        short = float(np.linalg.norm(pair.arms[i].tool_position(q[i]) - grippers[i]))
-        if short > _NEAR:
+        if short[i] > allowed:
             raise ArmReachError(
-                f"the {side} arm does not reach its gripper's place at the start, "
-                f"{np.round(grippers[i], 3).tolist()} m: it ends {100.0 * short:.1f} cm short"
+                f"the {side} arm does not reach {what}, {np.round(grippers[i], 3).tolist()} m: "
+                f"it ends {100.0 * short[i]:.1f} cm short"
             )
-    return ArmSetup(pair, q)
+    return q, rate
 
 
 def check_reach(
@@ -135,23 +174,20 @@ def check_reach(
         ArmReachError: an arm stays further away than a garment makes up for; the message tells
             which, from where, and by how much.
     """
-    q, rate = setup.start.copy(), np.zeros_like(setup.start)
+    q, rate = setup.start, np.zeros_like(setup.start)
     for what, grippers in places.items():
-        goals = [GripperGoal(p, np.zeros(3), placement.hand) for p in grippers]
-        short = np.full(2, np.inf)
-        for _ in range(_WAY_STEPS):
-            rate = setup.pair.rates(q, rate, (goals[0], goals[1]), _SEARCH_STEP, person).rate
-            q = q + _SEARCH_STEP * rate
-            at = [arm.tool_position(row) for arm, row in zip(setup.pair.arms, q, strict=True)]
-            short = np.linalg.norm(np.stack(at) - grippers, axis=1)
-            if short.max() < _REACHED:
-                break
-        for i, side in enumerate(SIDES):
-            if short[i] > _SHORT:
-                raise ArmReachError(
-                    f"the {side} arm does not reach {what}, {np.round(grippers[i], 3).tolist()} m: "
-                    f"it ends {100.0 * short[i]:.1f} cm short"
-                )
+        q, rate = _sent(
+            setup.pair,
+            q,
+            rate,
+            grippers,
+            what,
+            placement,
+            person,
+            steps=_WAY_STEPS,
+            reached=_REACHED,
+            allowed=_SHORT,
+        )
 
 
 @dataclass(frozen=True)

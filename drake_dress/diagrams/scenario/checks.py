@@ -20,19 +20,13 @@ from drake_dress.models.human import motions
 def check_controller(source: str, controller: Controller) -> None:
     """Holds periods, delays and steps of the controllers against each other."""
     mpc = controller.global_mpc
-    if mpc.delay >= mpc.period:
-        raise UserError(
-            source,
-            "controller.global_mpc.delay",
-            f"is {mpc.delay} s, expected less than the period, {mpc.period} s",
-        )
-    local = controller.local
-    if local.delay >= local.period:
-        raise UserError(
-            source,
-            "controller.local.delay",
-            f"is {local.delay} s, expected less than the period, {local.period} s",
-        )
+    for name, part in (("global_mpc", mpc), ("local", controller.local)):
+        if part.delay >= part.period:
+            raise UserError(
+                source,
+                f"controller.{name}.delay",
+                f"is {part.delay} s, expected less than the period, {part.period} s",
+            )
     steps = mpc.delay / mpc.time_step
     if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:
         raise UserError(
