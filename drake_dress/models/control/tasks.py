@@ -27,6 +27,7 @@ from drake_dress.models.dressing.stages import (
     advance_stages,
     eases,
     retreats,
+    swings,
     withdraws,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -78,10 +79,15 @@ class TaskParameters:
         tethered_approaches: the same with the other sleeve on, begun with the first.
         flat, steep: level part of a forearm's direction from which on it is flat; up to which it
             is steep.
+        led_inward: inward part of a forearm's direction, hand to elbow, below which the hand has
+            been led inward. led_approach: to such an arm.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         withdrawal_distance: behind the shoulders, to where both sleeves are taken back, m.
+        swing_reach: how far from the first armhole the second one is swung back, as a share of the
+            distance between both at rest.
+        swing_outward: outward part of the way there, for each part backward.
         widening: growth of the cap of l_h with each attempt that missed the hand.
         outlook_distance: from the hand, within which a tethered sleeve goes where it is seen, m.
         outlook_reach: share of the distance between both armholes at rest at which it stays then.
@@ -128,12 +134,16 @@ class TaskParameters:
         Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
+    led_inward: float = -0.03
+    led_approach: Approach = Approach(0.9, 0.9, 3.0)
     flat: float = 0.65
     steep: float = 0.47
     behind_distance: float = 0.30
     tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     withdrawal_distance: float = 0.65
+    swing_reach: float = 0.9
+    swing_outward: float = 0.5
     widening: float = 0.1
     outlook_distance: float = 0.35
     outlook_reach: float = 1.04
@@ -164,7 +174,7 @@ class Assignment:
         tasks: of each. facts: of each. retreat: whether it keeps away from the hand. ease: whether
             it gives way. attempts: how often it has missed the hand. outlook: place from the hand
             at which the hand sees the armhole of a tethered sleeve, (3,) m. withdraw: whether both
-            are taken back behind the person.
+            are taken back behind the person. swing: whether it is, with the other one on its arm.
     """
 
     tasks: tuple[Task, Task]
@@ -174,6 +184,7 @@ class Assignment:
     attempts: tuple[int, int] = (0, 0)
     outlook: tuple[FloatArray | None, FloatArray | None] = (None, None)
     withdraw: bool = False
+    swing: tuple[bool, bool] = (False, False)
 
 
 def arm_axes(joints: FloatArray) -> tuple[ArmAxis, ArmAxis]:
@@ -226,7 +237,7 @@ class TaskPlanner:
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
         missed = stages.attempts
         linked = [self._linked(x, joints, side) for side in (0, 1)]
-        ways = [self._approach(axes[i], missed[i], linked[1 - i]) for i in (0, 1)]
+        ways = [self._approach(axes[i], to, i, missed[i], linked[1 - i]) for i in (0, 1)]
         facts = (
             self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
             self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
@@ -245,6 +256,10 @@ class TaskPlanner:
                 self._outlook(x, joints[5], to, sleeves, 1, linked, missed[1]),
             ),
             withdraws(stages, facts, p.stages, time),
+            (
+                swings(stages, 0, facts, p.stages, time),
+                swings(stages, 1, facts, p.stages, time),
+            ),
         )
 
     def renewed(
@@ -283,14 +298,20 @@ class TaskPlanner:
             self._target(assignment, 1, axes, headings, sleeves, time_step),
         )
 
-    def _approach(self, axis: ArmAxis, attempts: int, tethered: bool) -> Approach:
+    def _approach(
+        self, axis: ArmAxis, to: Heading, side: int, attempts: int, tethered: bool
+    ) -> Approach:
         """Returns how to go about a hand that was missed so often.
 
         What misses a hand once mostly misses it again: an arm that another approach suits gets it.
         A flat forearm goes into an armhole that is turned toward it about the vertical, a steep one
-        into one that comes from the side.
+        into one that comes from the side. From the side an armhole that misses also pushes an arm
+        that follows further inward each time, where it is led behind the back in the end: such an
+        arm is gone about along its forearm every other time.
         """
         p = self.parameters
+        if attempts % 2 and float(axis.D(0.0) @ _inward(to, side)) < p.led_inward:
+            return p.led_approach
         if tethered:
             return p.tethered_approaches[attempts % len(p.tethered_approaches)]
         level = float(np.linalg.norm(axis.D(0.0)[:2]))
@@ -397,7 +418,7 @@ class TaskPlanner:
         fact, tethered = given.facts[side], given.facts[1 - side].linked
         attempts, outlook = given.attempts[side], given.outlook[side]
         hand = axis.G(0.0)
-        way = self._approach(axis, attempts, tethered)
+        way = self._approach(axis, to, side, attempts, tethered)
         direction = way.direction(axis, to, side)
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
@@ -447,20 +468,31 @@ class TaskPlanner:
         facts = given.facts
         task, step = given.tasks[side], (-1.0 if given.ease[side] else 1.0) * p.progress_rate
         position, direction = np.empty((n, 3)), np.empty((n, 3))
-        way = self._approach(axes[0][side], given.attempts[side], facts[1 - side].linked)
+        way = self._approach(
+            axes[0][side], headings[0], side, given.attempts[side], facts[1 - side].linked
+        )
         entering = task in (Task.PREPARE, Task.REST) or not facts[side].linked
+        away = given.retreat[side] or given.swing[side] or given.withdraw
         for j in range(n):
             axis, to = axes[j + 1][side], headings[j + 1]
             if entering:
                 if given.withdraw:
                     position[j] = axis.G(2.0) - p.withdrawal_distance * to.front
-                elif facts[side].touches and not given.retreat[side]:
+                elif given.swing[side]:
+                    position[j] = self._swung(to, side, sleeves[1 - side])
+                elif facts[side].touches and not away:
                     position[j] = axis.G((j + 1) * time_step * p.progress_rate)
                 else:
                     position[j] = self._prepared(
                         given, side, axis, to, sleeves[side], given.retreat[side]
                     )
                 direction[j] = way.entry(axis, to, side)
+                continue
+            if task == Task.HOLD:
+                now, at = axes[0][side], facts[side].s
+                s = min(p.final_progress, max(at, p.stages.done_progress))
+                position[j] = axis.G(s) + sleeves[side].p_c - now.G(at)
+                direction[j] = axis.D(s)
                 continue
             if task == Task.DRESS:
                 s = facts[side].s + (j + 1) * time_step * step
@@ -479,7 +511,7 @@ class TaskPlanner:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
             target = SleeveTarget(position, direction, direction_weight=way.emphasis, entering=True)
-            if given.retreat[side] or given.withdraw:
+            if away:
                 return target
             ahead = _ahead([a[side] for a in axes[1:]])
             target = replace(target, passage=ahead.into)
@@ -494,16 +526,28 @@ class TaskPlanner:
         weight = p.dressing_position if facts[0].linked and facts[1].linked else 1.0
         return SleeveTarget(position, direction, weight, p.dressing_direction)
 
+    def _swung(self, to: Heading, side: int, other: SleeveState) -> FloatArray:
+        """Returns where a sleeve is swung back to, (3,) m, with the other one on its arm.
+
+        Behind the first one, where the coat hangs free of the hand that was missed.
+        """
+        p = self.parameters
+        way = -to.front - p.swing_outward * _inward(to, side)
+        place: FloatArray = other.p_c + p.swing_reach * self._reach * way / np.linalg.norm(way)
+        return place
+
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
         """Returns the largest s from which the garment reaches `other` (3,), m (J_w).
 
         Higher up than that the garment holds the other sleeve back; lower down it could slip off.
+        Never on the upper arm: an armhole whose coat hangs from there lies across its forearm.
         """
         p = self.parameters
-        steps = np.linspace(2.0, p.stages.waiting_progress, 41)
+        least = p.stages.waiting_progress
+        steps = np.linspace(max(p.stages.highest_waiting_progress, least), least, 41)
         offset = axis.points(steps) - other
         reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
-        return float(steps[np.argmax(reached)]) if reached.any() else p.stages.waiting_progress
+        return float(steps[np.argmax(reached)]) if reached.any() else least
 
 
 def _ahead(axes: Sequence[ArmAxis]) -> Corridor:

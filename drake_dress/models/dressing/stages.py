@@ -3,7 +3,8 @@
 A sleeve is prepared (brought behind the hand), dressed (drawn up the arm), and done. With two
 sleeves of one coat the paper prepares the nearer one alone while the garment cannot reach both
 hands, then lets it wait on its arm while the other is prepared, and draws both up together. When
-both are on, both rest: drawn further they pull against each other, and one slips down again.
+both are on, both are held: drawn further they pull against each other, and one slips down again;
+let go they slip as well.
 
 Three things differ from the print, all measured. The garment's reach is judged by the distance of
 the two targets, not only of the two armholes (which else rises to the limit first and makes the
@@ -30,10 +31,11 @@ class Stage(IntEnum):
 class Task(IntEnum):
     """What the cost of one sleeve is made of."""
 
-    REST = 0  # no cost: the gripper serves the other sleeve, or both are done
+    REST = 0  # no cost: the gripper serves the other sleeve
     PREPARE = 1  # J_p
     DRESS = 2  # J_d
     WAIT = 3  # J_w
+    HOLD = 4  # both are done: it stays where it is on its arm
 
 
 Place = tuple[float, float, float]
@@ -81,6 +83,8 @@ class StageParameters:
         missed_distance: an armhole that has gone this far past the hand without the arm in it
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
+        highest_waiting_progress: largest one. Where hands are close together the coat reaches from
+            the upper arm; the other armhole then lies across its forearm.
         done_progress: s from which a sleeve is done.
         kept_progress: s down to which it stays done, and from which one that does not come any
             further is done.
@@ -101,6 +105,9 @@ class StageParameters:
         withdrawal_after: misses of the first hand, each so many of which both sleeves are taken
             back behind the person: a coat that hangs over an arm misses it again and again.
         withdrawal_time: for which they are, s.
+        swing_after: misses of the second hand, each so many of which its sleeve is swung back
+            behind the person, the first one staying on its arm.
+        swing_time: for which it is, s.
         alike: arms whose openings differ by less than this are alike.
     """
 
@@ -109,6 +116,7 @@ class StageParameters:
     lost_sight: float = 0.25
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
+    highest_waiting_progress: float = 0.55
     done_progress: float = 1.925
     kept_progress: float = 1.91
     reach: float = 0.45
@@ -125,6 +133,8 @@ class StageParameters:
     retreat_time: float = 2.5
     withdrawal_after: int = 2
     withdrawal_time: float = 4.0
+    swing_after: int = 3
+    swing_time: float = 4.0
     alike: float = 0.03
 
 
@@ -183,7 +193,7 @@ def advance_stages(
     f = 1 - n
     tasks = [Task.REST, Task.REST]
     if all(stage == Stage.DONE for stage in state.stage):
-        return state, (Task.REST, Task.REST)
+        return state, (Task.HOLD, Task.HOLD)
     if all(on_arm) or target_distance < parameters.reach:
         for side in (0, 1):
             tasks[side] = Task.PREPARE if state.stage[side] == Stage.PREPARE else Task.DRESS
@@ -228,7 +238,7 @@ def _advance(
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance and fact.sight >= p.least_sight:
             new = Stage.DRESS
-        elif _stuck(fact, p, time - state.since[side] - _withdrawn(state, facts, p)):
+        elif _stuck(fact, p, time - state.since[side] - _kept_away(state, side, facts, p)):
             return _again(state, side, time)
     elif (
         fact.passed > p.missed_distance
@@ -348,6 +358,34 @@ def _withdrawn(
     missed = state.attempts[state.first]
     due = missed > 0 and missed % p.withdrawal_after == 0
     return p.withdrawal_time if due and not (facts[0].linked or facts[1].linked) else 0.0
+
+
+def swings(
+    state: StageState,
+    side: int,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    parameters: StageParameters,
+    time: float,
+) -> bool:
+    """Returns whether a sleeve whose other one is on its arm shall be swung back behind."""
+    lasting = _swung(state, side, facts, parameters)
+    return state.stage[side] == Stage.PREPARE and time - state.since[side] < lasting
+
+
+def _swung(
+    state: StageState, side: int, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
+) -> float:
+    """Returns for how long, s, a sleeve is swung back after the last miss."""
+    missed = state.attempts[side]
+    due = missed > 0 and missed % p.swing_after == 0
+    return p.swing_time if due and facts[1 - side].linked and not facts[side].linked else 0.0
+
+
+def _kept_away(
+    state: StageState, side: int, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
+) -> float:
+    """Returns for how long, s, a sleeve is kept far from its hand after the last miss."""
+    return _withdrawn(state, facts, p) + _swung(state, side, facts, p)
 
 
 def retreats(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:

@@ -148,6 +148,37 @@ def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
     np.testing.assert_allclose(asked, [ways[i].entry(axis, to, 0) for i in order])
 
 
+@pytest.mark.parametrize("tethered", [False, True])
+@pytest.mark.parametrize("side", [0, 1])
+def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
+    planner: TaskPlanner, side: int, tethered: bool
+) -> None:
+    """Every other time, and only once it was missed."""
+    p, off = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
+    other = replace(off, linked=tethered, s=0.5)
+    for inward in (-0.2, 0.1):
+        q = joints()
+        to = heading(q)
+        across = to.leftward * (-1.0 if side == 0 else 1.0)
+        hand, elbow = q[3 * side + 2], q[3 * side + 1]
+        level = np.sqrt(1.0 - 0.8**2 - inward**2)
+        q[3 * side + 1] = hand + np.linalg.norm(elbow - hand) * (
+            inward * across + level * to.front + [0.0, 0.0, 0.8]
+        )
+        axis, rows = arm_axes(q)[side], np.stack([q] * 2)
+        assert float(axis.D(0.0) @ across) == pytest.approx(inward)
+        sleeves = [SleeveState(a.G(0.0) - 0.4 * a.D(0.0), a.D(0.0)) for a in arm_axes(q)]
+        for missed in range(4):
+            given = Assignment(
+                (Task.PREPARE, Task.WAIT) if side == 0 else (Task.WAIT, Task.PREPARE),
+                (off, other) if side == 0 else (other, off),
+                attempts=(missed, 0) if side == 0 else (0, missed),
+            )
+            asked = planner.targets(given, sleeves, rows, STEP)[side].direction[0]
+            along = p.led_approach.entry(axis, to, side)
+            assert np.allclose(asked, along) == (inward < p.led_inward and missed % 2 == 1)
+
+
 @pytest.mark.parametrize("side", [0, 1])
 def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
     planner: TaskPlanner, side: int
@@ -262,8 +293,52 @@ def test_a_garment_that_is_taken_back_goes_behind_both_shoulders(planner: TaskPl
         assert target.entering and target.corridor is None and target.passage is None
 
 
-def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: TaskPlanner) -> None:
-    p, facts = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_second_sleeve_is_swung_back_behind_the_first(planner: TaskPlanner, side: int) -> None:
+    p, yaw = planner.parameters, 0.4
+    q, turn = joints(yaw), frame(yaw)[0]
+    off = SleeveFacts(False, 0.0, 0.1, 0.1, 0.0, touches=True)
+    on = SleeveFacts(True, 0.5, 0.2, 0.2, 0.0)
+    sleeves = [SleeveState(a.G(0.5), a.D(0.5)) for a in arm_axes(q)]
+    given = Assignment(
+        (Task.PREPARE, Task.WAIT) if side == 0 else (Task.WAIT, Task.PREPARE),
+        (off, on) if side == 0 else (on, off),
+        swing=(side == 0, side == 1),
+    )
+    target = planner.targets(given, sleeves, np.stack([q] * 2), STEP)[side]
+    backward, outward, up = turn.T @ (sleeves[1 - side].p_c - target.position[0])
+    assert backward > 0.0 and up == pytest.approx(0.0)
+    assert (outward < 0.0) == (side == 0)
+    centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
+    reach = float(np.linalg.norm(centers[0] - centers[1]))
+    assert np.hypot(backward, outward) == pytest.approx(p.swing_reach * reach)
+    assert target.corridor is None and target.passage is None
+
+
+def test_sleeves_that_are_done_stay_where_they_are_on_their_arms(planner: TaskPlanner) -> None:
+    q, moved = joints(), joints() + [0.1, 0.0, 0.0]
+    p, beside = planner.parameters, np.array([0.0, 0.01, 0.01])
+    on = [SleeveFacts(True, s, 0.5, 0.5, 0.0) for s in (1.95, 1.91)]
+    sleeves = [
+        SleeveState(a.G(f.s) + beside, a.D(f.s)) for a, f in zip(arm_axes(q), on, strict=True)
+    ]
+    given = Assignment((Task.HOLD, Task.HOLD), (on[0], on[1]))
+    left, right = planner.targets(given, sleeves, np.stack([q, q, moved]), STEP)
+    np.testing.assert_allclose(left.position[0], sleeves[0].p_c)
+    np.testing.assert_allclose(left.position[1], sleeves[0].p_c + [0.1, 0.0, 0.0])
+    # one that has slipped to where it only just counts is drawn up again
+    axis = arm_axes(q)[1]
+    np.testing.assert_allclose(right.position[0], axis.G(p.stages.done_progress) + beside)
+    assert left.position_weight > 0.0
+
+
+@pytest.mark.parametrize("highest", [2.0, 0.55])
+def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(
+    planner: TaskPlanner, highest: float
+) -> None:
+    stages = replace(planner.parameters.stages, highest_waiting_progress=highest)
+    p, facts = replace(planner.parameters, stages=stages), SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
+    planner = TaskPlanner(planner.mesh, p)
     given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
     centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
     reach = p.waiting_reach * np.linalg.norm(centers[0] - centers[1])
@@ -278,11 +353,15 @@ def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: Ta
         held.append(s)
         if s > p.stages.waiting_progress + 1e-6:
             assert np.linalg.norm(axis.G(s) - prepared.position[0]) < reach
-        further = axis.points(np.linspace(s + 0.05, 2.0, 50))
-        if s < p.final_progress - 0.05:
+        if s < min(highest, p.final_progress) - 0.05:
+            further = axis.points(np.linspace(s + 0.05, highest, 50))
             assert np.linalg.norm(further - prepared.position[0], axis=1).min() > reach
     assert min(held) == pytest.approx(p.stages.waiting_progress)
-    assert sum(p.stages.waiting_progress + 0.1 < s < p.final_progress - 0.1 for s in held) > 1
+    assert max(held) <= highest + 1e-9
+    if highest < 2.0:
+        assert max(held) == pytest.approx(highest)
+    else:
+        assert sum(min(held) + 0.1 < s < p.final_progress - 0.1 for s in held) > 1
 
 
 def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner) -> None:

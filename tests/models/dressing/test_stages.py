@@ -11,6 +11,7 @@ from drake_dress.models.dressing.stages import (
     advance_stages,
     eases,
     retreats,
+    swings,
     withdraws,
 )
 
@@ -251,10 +252,10 @@ def test_progress_is_no_stall() -> None:
         assert not eases(state, 0, P, float(k))
 
 
-def test_both_rest_while_both_are_on() -> None:
+def test_both_are_held_while_both_are_on() -> None:
     both = (facts(linked=True, s=1.95), facts(linked=True, s=1.97))
     state, tasks = advance_stages(StageState(), both, P, FAR, 1.0)
-    assert tasks == (Task.REST, Task.REST)
+    assert tasks == (Task.HOLD, Task.HOLD)
     slipped = (facts(linked=True, s=1.85), facts(linked=True, s=1.97))
     _, tasks = advance_stages(state, slipped, P, FAR, 1.5)
     assert tasks == (Task.DRESS, Task.DRESS)
@@ -278,3 +279,29 @@ def test_a_sleeve_that_comes_no_further_near_the_shoulder_is_done() -> None:
     for time in (2.5, 3.0, 4.0, 5.0, 5.9):
         state, _ = advance_stages(state, both, P, FAR, time)
     assert state.stage == (Stage.DONE, Stage.DONE)
+
+
+def test_a_second_sleeve_that_missed_again_and_again_is_swung_back_for_a_while() -> None:
+    on, off = facts(linked=True, s=0.5), facts(hand=0.1, error=0.2)
+    state, swung = StageState(first=0), []
+    for k in range(1, 2 * P.swing_after + 1):
+        # the hand was passed, and the armhole is in line again
+        state, _ = advance_stages(state, (on, replace(off, prepared_error=0.0)), P, FAR, 20.0 * k)
+        state, _ = advance_stages(state, (on, replace(off, passed=1.0)), P, FAR, 20.0 * k + 1.0)
+        assert state.attempts == (0, k) and state.stage[1] == Stage.PREPARE
+        swung.append(swings(state, 1, (on, off), P, 20.0 * k + 1.0))
+        assert not swings(state, 0, (on, off), P, 20.0 * k + 1.0)
+        assert not swings(state, 1, (on, off), P, 20.0 * k + 1.1 + P.swing_time)
+        # without the first one on its arm both are taken back instead
+        assert not swings(state, 1, (off, off), P, 20.0 * k + 1.0)
+    assert swung == [k % P.swing_after == 0 for k in range(1, 2 * P.swing_after + 1)]
+
+
+def test_a_sleeve_that_is_swung_back_is_not_taken_to_be_stuck() -> None:
+    on, barred = facts(linked=True, s=0.5), replace(facts(hand=0.3), sight=0.0)
+    start = StageState((Stage.DRESS, Stage.PREPARE), 0, attempts=(0, P.swing_after))
+    late = P.barred_timeout + 1.0
+    state, _ = advance_stages(start, (on, barred), P, FAR, late)
+    assert state.attempts == (0, P.swing_after)
+    state, _ = advance_stages(start, (on, barred), P, FAR, late + P.swing_time)
+    assert state.attempts == (0, P.swing_after + 1)
