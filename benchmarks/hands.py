@@ -1,0 +1,230 @@
+"""What lets a hand go into its armhole: moments of runs, and how soon after them it went in.
+
+    python -m benchmarks.hands out/*/run.h5
+
+From runs that dressed and such that did not, six times a second and from the first second on until
+a hand is in: where the hand is to its armhole, how the coat hangs, where the arms are. For each of
+these quantities the moments are put in order and split into sixths; told are the bounds of each
+sixth and the share of its moments after which the hand went in within `--within` seconds. First
+hands and second ones apart, for the coat of a second one hangs on the other arm; while neither is
+in, the one counts that goes in first, or came nearest to it. A quantity by which the share goes
+from none to half is worth a look; that a controller should change it does not follow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cloth.table import Table
+from drake_dress.errors import UserError
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.dressing.sight import distance_to_opening
+from drake_dress.models.dressing.sleeve import SleeveState, sleeve_state
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
+
+# Between moments, and from the start to the first one, s.
+_STEP, _FROM = 1.0 / 6.0, 1.0
+# A hand is in where s stays above this for so long, s.
+_IN, _STAYS = 0.02, 0.5
+_PARTS = 6
+# A hand this close to the surface that spans its armhole touches it, m; how soon it goes in then,
+# and how long it has to be away to touch anew, s.
+_TOUCH, _SOON = 0.03, 2.0
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A hand that is not in, at a moment.
+
+    Attributes:
+        run: whose it is. time: s. side: of the hand.
+        second: whether the other one is in.
+        wait: time until it goes in, s; None if it never does.
+        touches: whether it begins to touch the opening.
+        values: quantity, with its unit, to its value.
+    """
+
+    run: str
+    time: float
+    side: str
+    second: bool
+    wait: float | None
+    touches: bool
+    values: dict[str, float]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Reads the runs and prints the tables; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("log", type=Path, nargs="+", metavar="run.h5")
+    parser.add_argument("--within", type=float, default=3.0, metavar="S", help="default 3")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="keep the moments")
+    options = parser.parse_args(arguments)
+    found: list[Moment] = []
+    try:
+        for k, path in enumerate(options.log):
+            with RunLog.open(path) as log:
+                found += moments(log, str(path))
+            print(f"{k + 1}/{len(options.log)} {path}", file=sys.stderr, flush=True)
+    except UserError as error:
+        print(f"hands: {error}", file=sys.stderr)
+        return 2
+    for table in tables(found, options.within):
+        print(table.text(), end="\n\n")
+    if options.json:
+        options.json.write_text(json.dumps([asdict(m) for m in found], indent=1) + "\n")
+    return 0
+
+
+def tables(found: Sequence[Moment], within: float) -> Iterator[Table]:
+    """Yields shares by sixths for first and second hands, at any moment and where they touch."""
+    for second, which in ((False, "First hand"), (True, "Second hand")):
+        of = [m for m in found if m.second == second]
+        touching = [m for m in of if m.touches]
+        for moments_of, title, soon in (
+            (of, f"{which}: goes in within {within:g} s", within),
+            (touching, f"{which}, where it touches: within {_SOON:g} s", _SOON),
+        ):
+            if len(moments_of) >= _PARTS:
+                yield _shares(title, moments_of, soon)
+
+
+def _shares(title: str, of: Sequence[Moment], within: float) -> Table:
+    right = np.array([m.wait is not None and m.wait <= within for m in of])
+    title = f"{title}: {int(right.sum())} of {len(of)} moments"
+    header = ["", *(f"sixth {k + 1}" for k in range(_PARTS))]
+    rows = []
+    for name in of[0].values:
+        values = np.array([m.values[name] for m in of])
+        order = np.argsort(values, kind="stable")
+        cells = []
+        for part in np.array_split(order, _PARTS):
+            low, high = values[part[0]], values[part[-1]]
+            cells.append(f"{low:.3g} to {high:.3g}: {100 * float(right[part].mean()):.0f} %")
+        rows.append([name, *cells])
+    return Table(title, header, rows)
+
+
+def moments(log: RunLog, run: str) -> list[Moment]:
+    """Returns the moments of a run."""
+    time = log.time
+    s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
+    is_in = [_stays(time, s[:, i] > _IN) for i in (0, 1)]
+    signs = [_sign(log, side) for side in SIDES]
+    centers = [log.rest_position[log.loops[f"{side}_armhole"]].mean(axis=0) for side in SIDES]
+    reach = float(np.linalg.norm(centers[0] - centers[1]))
+    touched = [-np.inf, -np.inf]
+    found = []
+    for t in np.arange(_FROM, time[-1] - _STAYS, _STEP):
+        k = int(np.searchsorted(time, t))
+        if is_in[0][k] and is_in[1][k]:
+            continue
+        x, q = log.garment_position(k), log.joint_position[k]
+        loops = [log.loops[f"{side}_armhole"] for side in SIDES]
+        sleeves = [sleeve_state(x, loops[i], signs[i]) for i in (0, 1)]
+        grippers = [log.gripper_position[side][k] for side in SIDES]
+        for i, side in enumerate(SIDES):
+            if is_in[i][k]:
+                continue
+            near = distance_to_opening(x[loops[i]], q[3 * i + 2]) < _TOUCH
+            begins = near and time[k] - touched[i] > _SOON
+            touched[i] = time[k] if near else touched[i]
+            after = np.flatnonzero(is_in[i][k:])
+            wait = float(time[k + after[0]] - time[k]) if len(after) else None
+            values = quantities(i, q, sleeves, grippers, reach)
+            second = bool(is_in[1 - i][k])
+            if second:
+                values["s of the first sleeve"] = float(s[k, 1 - i])
+            found.append(Moment(run, float(time[k]), side, second, wait, begins, values))
+    side = _gone_about(found)
+    return [m for m in found if m.second or m.side == side]
+
+
+def _gone_about(found: Sequence[Moment]) -> str:
+    """Returns the side of the hand that goes in first, or that came nearest to it."""
+    free = [m for m in found if not m.second]
+    if not free:
+        return ""
+    return min(free, key=lambda m: (np.inf if m.wait is None else m.wait + m.time, _far(m))).side
+
+
+def _far(moment: Moment) -> float:
+    return moment.values["hand to the armhole's centre, cm"]
+
+
+def quantities(
+    i: int,
+    joints: FloatArray,
+    sleeves: Sequence[SleeveState],
+    grippers: Sequence[FloatArray],
+    reach: float,
+) -> dict[str, float]:
+    """Returns what may matter for a hand.
+
+    Args:
+        i: 0 the left hand, 1 the right one.
+        joints: (6,3) shoulder, elbow, hand of left, then of right, m.
+        sleeves: left and right.
+        grippers: (3,) each, m.
+        reach: between both armholes at rest, m.
+    """
+    sleeve, other, hand = sleeves[i], sleeves[1 - i], joints[3 * i + 2]
+    forearm = joints[3 * i + 1] - hand
+    forearm = forearm / np.linalg.norm(forearm)
+    across = joints[0] - joints[3]
+    outward = across / np.linalg.norm(across) * (1.0 if i == 0 else -1.0)
+    offset = hand - sleeve.p_c
+    line = offset - (offset @ forearm) * forearm
+    plane = offset - (offset @ sleeve.v_c) * sleeve.v_c
+    hands = float(np.linalg.norm(joints[2] - joints[5]))
+    return {
+        "hand to the armhole's centre, cm": 100 * float(np.linalg.norm(offset)),
+        "hand beside the armhole's normal, cm": 100 * float(np.linalg.norm(plane)),
+        "centre beside the forearm's line, cm": 100 * float(np.linalg.norm(line)),
+        "normal off the forearm, °": _degrees(float(sleeve.v_c @ forearm)),
+        "armholes apart, share of rest": float(np.linalg.norm(sleeve.p_c - other.p_c)) / reach,
+        "gripper over the other one, cm": 100 * float((grippers[i] - grippers[1 - i])[2]),
+        "hands apart, share of armholes at rest": hands / reach,
+        "forearm below level, °": 90.0 - _degrees(float(forearm[2])),
+        "forearm inward from hand to elbow, °": _degrees(float(forearm @ outward)) - 90.0,
+    }
+
+
+def _degrees(cosine: float) -> float:
+    return float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _sign(log: RunLog, side: str) -> float:
+    """Returns the sign with which an armhole's area vector points from cuff to armhole at rest."""
+    x = log.rest_position
+    sleeve = sleeve_state(x, log.loops[f"{side}_armhole"], 1.0)
+    toward = sleeve.p_c - x[log.loops[f"{side}_cuff"]].mean(axis=0)
+    return 1.0 if sleeve.v_c @ toward > 0.0 else -1.0
+
+
+def _stays(time: FloatArray, holds: np.ndarray) -> np.ndarray:
+    """Returns (T,) where something holds from then on for a while, or did and still does."""
+    stays = np.zeros(len(time), dtype=bool)
+    k = 0
+    while k < len(time):
+        if not holds[k]:
+            k += 1
+            continue
+        end = k
+        while end + 1 < len(time) and holds[end + 1]:
+            end += 1
+        stays[k : end + 1] = time[end] - time[k] >= _STAYS
+        k = end + 1
+    return stays
+
+
+if __name__ == "__main__":
+    sys.exit(main())
