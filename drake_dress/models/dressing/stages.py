@@ -133,7 +133,7 @@ class StageParameters:
     retreat_time: float = 2.5
     withdrawal_after: int = 2
     withdrawal_time: float = 4.0
-    swing_after: int = 3
+    swing_after: int = 5
     swing_time: float = 4.0
     alike: float = 0.03
 
