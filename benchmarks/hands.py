@@ -26,7 +26,8 @@ from benchmarks.cloth.table import Table
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.dressing.sight import distance_to_opening
-from drake_dress.models.dressing.sleeve import SleeveState, sleeve_state
+from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
+from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
@@ -89,12 +90,10 @@ def tables(found: Sequence[Moment], within: float) -> Iterator[Table]:
     for second, which in ((False, "First hand"), (True, "Second hand")):
         of = [m for m in found if m.second == second]
         touching = [m for m in of if m.touches]
-        for moments_of, title, soon in (
-            (of, f"{which}: goes in within {within:g} s", within),
-            (touching, f"{which}, where it touches: within {_SOON:g} s", _SOON),
-        ):
-            if len(moments_of) >= _PARTS:
-                yield _shares(title, moments_of, soon)
+        if len(of) >= _PARTS:
+            yield _shares(f"{which}: goes in within {within:g} s", of, within)
+        if len(touching) >= _PARTS:
+            yield _shares(f"{which}, where it touches: within {_SOON:g} s", touching, _SOON)
 
 
 def _shares(title: str, of: Sequence[Moment], within: float) -> Table:
@@ -118,8 +117,9 @@ def moments(log: RunLog, run: str) -> list[Moment]:
     time = log.time
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
     is_in = [_stays(time, s[:, i] > _IN) for i in (0, 1)]
-    signs = [_sign(log, side) for side in SIDES]
-    centers = [log.rest_position[log.loops[f"{side}_armhole"]].mean(axis=0) for side in SIDES]
+    signs = [loop_orientation(log, side) for side in SIDES]
+    loops = [log.loops[f"{side}_armhole"] for side in SIDES]
+    centers = [log.rest_position[loop].mean(axis=0) for loop in loops]
     reach = float(np.linalg.norm(centers[0] - centers[1]))
     touched = [-np.inf, -np.inf]
     found = []
@@ -128,7 +128,6 @@ def moments(log: RunLog, run: str) -> list[Moment]:
         if is_in[0][k] and is_in[1][k]:
             continue
         x, q = log.garment_position(k), log.joint_position[k]
-        loops = [log.loops[f"{side}_armhole"] for side in SIDES]
         sleeves = [sleeve_state(x, loops[i], signs[i]) for i in (0, 1)]
         grippers = [log.gripper_position[side][k] for side in SIDES]
         for i, side in enumerate(SIDES):
@@ -179,8 +178,7 @@ def quantities(
     sleeve, other, hand = sleeves[i], sleeves[1 - i], joints[3 * i + 2]
     forearm = joints[3 * i + 1] - hand
     forearm = forearm / np.linalg.norm(forearm)
-    across = joints[0] - joints[3]
-    outward = across / np.linalg.norm(across) * (1.0 if i == 0 else -1.0)
+    outward = heading(joints).leftward * (1.0 if i == 0 else -1.0)
     offset = hand - sleeve.p_c
     line = offset - (offset @ forearm) * forearm
     plane = offset - (offset @ sleeve.v_c) * sleeve.v_c
@@ -202,27 +200,12 @@ def _degrees(cosine: float) -> float:
     return float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
-def _sign(log: RunLog, side: str) -> float:
-    """Returns the sign with which an armhole's area vector points from cuff to armhole at rest."""
-    x = log.rest_position
-    sleeve = sleeve_state(x, log.loops[f"{side}_armhole"], 1.0)
-    toward = sleeve.p_c - x[log.loops[f"{side}_cuff"]].mean(axis=0)
-    return 1.0 if sleeve.v_c @ toward > 0.0 else -1.0
-
-
 def _stays(time: FloatArray, holds: np.ndarray) -> np.ndarray:
     """Returns (T,) where something holds from then on for a while, or did and still does."""
     stays = np.zeros(len(time), dtype=bool)
-    k = 0
-    while k < len(time):
-        if not holds[k]:
-            k += 1
-            continue
-        end = k
-        while end + 1 < len(time) and holds[end + 1]:
-            end += 1
-        stays[k : end + 1] = time[end] - time[k] >= _STAYS
-        k = end + 1
+    changes = np.flatnonzero(np.diff(holds, prepend=False, append=False))
+    for begin, end in changes.reshape(-1, 2):
+        stays[begin:end] = time[end - 1] - time[begin] >= _STAYS
     return stays
 
 

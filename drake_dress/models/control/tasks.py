@@ -310,7 +310,7 @@ class TaskPlanner:
         arm is gone about along its forearm every other time.
         """
         p = self.parameters
-        if attempts % 2 and float(axis.D(0.0) @ _inward(to, side)) < p.led_inward:
+        if attempts % 2 and _opening(axis, to, side) < p.led_inward:
             return p.led_approach
         if tethered:
             return p.tethered_approaches[attempts % len(p.tethered_approaches)]
@@ -388,7 +388,7 @@ class TaskPlanner:
             hand_distance=float(np.linalg.norm(offset)),
             prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
-            opening=float(axis.D(0.0) @ _inward(to, side)),
+            opening=_opening(axis, to, side),
             touches=touches,
             hand=_place(hand),
             away=_place(offset / max(float(np.linalg.norm(offset)), 1e-12)),
@@ -489,12 +489,8 @@ class TaskPlanner:
                 direction[j] = way.entry(axis, to, side)
                 continue
             if task == Task.HOLD:
-                now, at = axes[0][side], facts[side].s
-                s = min(p.final_progress, max(at, p.stages.done_progress))
-                position[j] = axis.G(s) + sleeves[side].p_c - now.G(at)
-                direction[j] = axis.D(s)
-                continue
-            if task == Task.DRESS:
+                s = max(facts[side].s, p.stages.done_progress)
+            elif task == Task.DRESS:
                 s = facts[side].s + (j + 1) * time_step * step
                 other_fact = facts[1 - side]
                 if other_fact.linked:
@@ -507,6 +503,9 @@ class TaskPlanner:
                 s = self._waiting_progress(axis, other)
             s = min(p.final_progress, max(0.0, s))
             position[j], direction[j] = axis.G(s), axis.D(s)
+        if task == Task.HOLD and not entering:
+            # as far beside the arm as it is
+            position = position + sleeves[side].p_c - axes[0][side].G(facts[side].s)
         if task == Task.REST:
             return SleeveTarget(position, direction, 0.0, 0.0)
         if entering:
@@ -563,6 +562,11 @@ def _place(point: FloatArray) -> Place:
 def _inward(to: Heading, side: int) -> FloatArray:
     """Returns the unit vector from a side of the person to the other."""
     return to.leftward * (-1.0 if side == 0 else 1.0)
+
+
+def _opening(axis: ArmAxis, to: Heading, side: int) -> float:
+    """Returns the inward part of a forearm's direction from hand to elbow."""
+    return float(axis.D(0.0) @ _inward(to, side))
 
 
 def _aside(offset: FloatArray, direction: FloatArray) -> float:

@@ -10,8 +10,9 @@ derivative, while the PCA's axis has none of its own and jumps where two compone
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numba as nb
 import numpy as np
@@ -40,7 +41,19 @@ class SleeveState:
     v_c: FloatArray
 
 
-def loop_orientation(mesh: GarmentMesh, side: str) -> float:
+class AtRest(Protocol):
+    """What knows a garment's openings at rest: its mesh, or a run's log."""
+
+    @property
+    def rest_position(self) -> FloatArray:
+        """(n,3) m."""
+
+    @property
+    def loops(self) -> Mapping[str, npt.NDArray[np.integer]]:
+        """Name of an opening to the nodes around it, in order."""
+
+
+def loop_orientation(garment: AtRest, side: str) -> float:
     """Returns ±1, such that the signed area vector of the armhole points from cuff to armhole.
 
     Raises:
@@ -49,8 +62,8 @@ def loop_orientation(mesh: GarmentMesh, side: str) -> float:
     """
     if side not in SIDES:
         raise UserError("garment", "side", f"is {side!r}, expected one of {', '.join(SIDES)}")
-    armhole = mesh.rest_position[mesh.loops[f"{side}_armhole"]]
-    cuff = mesh.rest_position[mesh.loops[f"{side}_cuff"]]
+    armhole = garment.rest_position[garment.loops[f"{side}_armhole"]]
+    cuff = garment.rest_position[garment.loops[f"{side}_cuff"]]
     toward = _curve_center(armhole) - _curve_center(cuff)
     area = _area_vector(armhole)
     product = float(area @ toward)

@@ -347,16 +347,14 @@ def withdraws(
     """Returns whether both sleeves shall be taken back behind the person before they are tried."""
     if state.first < 0:
         return False
-    lasting = _withdrawn(state, facts, parameters)
-    return state.stage[state.first] == Stage.PREPARE and time - state.since[state.first] < lasting
+    return _just_began(state, state.first, _withdrawn(state, facts, parameters), time)
 
 
 def _withdrawn(
     state: StageState, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
 ) -> float:
     """Returns for how long, s, sleeves are taken back behind the person after the last miss."""
-    missed = state.attempts[state.first]
-    due = missed > 0 and missed % p.withdrawal_after == 0
+    due = _is_due(state.attempts[state.first], p.withdrawal_after)
     return p.withdrawal_time if due and not (facts[0].linked or facts[1].linked) else 0.0
 
 
@@ -368,16 +366,14 @@ def swings(
     time: float,
 ) -> bool:
     """Returns whether a sleeve whose other one is on its arm shall be swung back behind."""
-    lasting = _swung(state, side, facts, parameters)
-    return state.stage[side] == Stage.PREPARE and time - state.since[side] < lasting
+    return _just_began(state, side, _swung(state, side, facts, parameters), time)
 
 
 def _swung(
     state: StageState, side: int, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
 ) -> float:
     """Returns for how long, s, a sleeve is swung back after the last miss."""
-    missed = state.attempts[side]
-    due = missed > 0 and missed % p.swing_after == 0
+    due = _is_due(state.attempts[side], p.swing_after)
     return p.swing_time if due and facts[1 - side].linked and not facts[side].linked else 0.0
 
 
@@ -390,8 +386,15 @@ def _kept_away(
 
 def retreats(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
     """Returns whether a sleeve has missed the hand a moment ago and shall keep away from it."""
-    return (
-        state.attempts[side] > 0
-        and state.stage[side] == Stage.PREPARE
-        and time - state.since[side] < parameters.retreat_time
-    )
+    missed = state.attempts[side] > 0
+    return missed and _just_began(state, side, parameters.retreat_time, time)
+
+
+def _is_due(missed: int, every: int) -> bool:
+    """Returns whether what is done after each so many misses is to be done after this one."""
+    return missed > 0 and missed % every == 0
+
+
+def _just_began(state: StageState, side: int, lasting: float, time: float) -> bool:
+    """Returns whether it is less than `lasting`, s, since a sleeve began to be prepared."""
+    return state.stage[side] == Stage.PREPARE and time - state.since[side] < lasting

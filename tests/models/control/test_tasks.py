@@ -37,6 +37,11 @@ def joints(yaw: float = 0.0, place: tuple[float, float] = (0.0, 0.0)) -> np.ndar
     return np.vstack([arm_points(M, "sitting", side, POSE, where) for side in SIDES])
 
 
+def armholes_apart(planner: TaskPlanner) -> float:
+    centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
+    return float(np.linalg.norm(centers[0] - centers[1]))
+
+
 @pytest.mark.parametrize("yaw", [-0.5, 0.26, 2.0])
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("task", [Task.PREPARE, Task.DRESS])
@@ -309,8 +314,7 @@ def test_a_second_sleeve_is_swung_back_behind_the_first(planner: TaskPlanner, si
     backward, outward, up = turn.T @ (sleeves[1 - side].p_c - target.position[0])
     assert backward > 0.0 and up == pytest.approx(0.0)
     assert (outward < 0.0) == (side == 0)
-    centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
-    reach = float(np.linalg.norm(centers[0] - centers[1]))
+    reach = armholes_apart(planner)
     assert np.hypot(backward, outward) == pytest.approx(p.swing_reach * reach)
     assert target.corridor is None and target.passage is None
 
@@ -340,8 +344,7 @@ def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(
     p, facts = replace(planner.parameters, stages=stages), SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     planner = TaskPlanner(planner.mesh, p)
     given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
-    centers = [planner.mesh.rest_position[loop].mean(axis=0) for loop in planner.armholes]
-    reach = p.waiting_reach * np.linalg.norm(centers[0] - centers[1])
+    reach = p.waiting_reach * armholes_apart(planner)
     held = []
     for across in np.linspace(0.0, 0.8, 17):  # the right hand comes over to the left arm
         q = joints()
