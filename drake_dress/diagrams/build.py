@@ -30,7 +30,7 @@ from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.models.control.tasks import TaskParameters
+from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS

@@ -11,7 +11,8 @@ from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import GlobalController, Plan, Weights
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
-from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner
+from drake_dress.models.control.task_parameters import TaskParameters
+from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.sleeve import find_entry
 from drake_dress.models.dressing.stages import StageState
 from drake_dress.models.garment.mesh import GarmentMesh

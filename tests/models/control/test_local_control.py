@@ -16,7 +16,8 @@ from drake_dress.models.control.local_control import (
 )
 from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
-from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner
+from drake_dress.models.control.task_parameters import TaskParameters
+from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.stages import SleeveFacts, Task
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from drake_dress.models.control.global_mpc import SleeveTarget
-from drake_dress.models.control.tasks import Assignment, TaskParameters, TaskPlanner, arm_axes
+from drake_dress.models.control.task_parameters import TaskParameters
+from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts, StageState, Task
 from drake_dress.models.garment.coat import CoatParameters, make_coat

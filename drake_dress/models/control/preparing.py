@@ -1,0 +1,150 @@
+"""Where a sleeve goes that is to go over a hand (Eq. Jpi)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.control.task_parameters import Approach, TaskParameters, inward
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.sleeve import SleeveState
+from drake_dress.models.dressing.stages import SleeveFacts
+from drake_dress.models.human.heading import Heading
+
+
+def choose_approach(
+    p: TaskParameters, axis: ArmAxis, to: Heading, side: int, attempts: int, tethered: bool
+) -> Approach:
+    """Returns how to go about a hand that was missed so often.
+
+    What misses a hand once mostly misses it again: an arm that another approach suits gets it. A
+    flat forearm goes into an armhole that is turned toward it about the vertical, a steep one into
+    one that comes from the side. From the side an armhole that misses also pushes an arm that
+    follows further inward each time, where it is led behind the back in the end: such an arm is
+    gone about along its forearm every other time.
+    """
+    if attempts % 2 and opening(axis, to, side) < p.led_inward:
+        return p.led_approach
+    if tethered:
+        return p.tethered_approaches[attempts % len(p.tethered_approaches)]
+    level = float(np.linalg.norm(axis.D(0.0)[:2]))
+    best = 1 if level >= p.flat else 2 if level <= p.steep else 0
+    turn = attempts % len(p.approaches)
+    # the best goes first, the others keep their order
+    return p.approaches[best if turn == 0 else turn - 1 if turn <= best else turn]
+
+
+def opening(axis: ArmAxis, to: Heading, side: int) -> float:
+    """Returns the inward part of a forearm's direction from hand to elbow."""
+    return float(axis.D(0.0) @ inward(to, side))
+
+
+def distance_aside(offset: FloatArray, direction: FloatArray) -> float:
+    """Returns the length of `offset` across the unit vector `direction`."""
+    return float(np.linalg.norm(offset - direction * (direction @ offset)))
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """One sleeve that is to go over its hand.
+
+    The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
+    outside the hand, and further back (against v_f) until it is in line: so the hand comes in by
+    the open front. An arm that comes from anywhere else meets the outside of the front panel, with
+    the armhole's centre at the hand and the hand not in it; so an opening that the hand does not
+    see stays outside. The garment does not reach that far with its other sleeve on an arm: the
+    second one goes where the hand comes to see it. One that faces the hand is drawn along its own
+    normal, and along the forearm once the hand is in it: further inward it would be pulled past it.
+
+    Attributes:
+        parameters: settings.
+        side: of the sleeve.
+        fact: of the sleeve.
+        tethered: the other sleeve is on its arm.
+        attempts: how often it has missed the hand.
+        outlook: place from the hand at which the hand sees the armhole, (3,) m.
+        retreat: it keeps away from the hand.
+    """
+
+    parameters: TaskParameters
+    side: int
+    fact: SleeveFacts
+    tethered: bool
+    attempts: int
+    outlook: FloatArray | None
+    retreat: bool = False
+
+    def place(self, axis: ArmAxis, to: Heading, sleeve: SleeveState) -> FloatArray:
+        """Returns where the armhole's centre is asked to be, (3,) m.
+
+        Args:
+            axis: of the arm.
+            to: heading of the person.
+            sleeve: where it is.
+        """
+        p, hand = self.parameters, axis.G(0.0)
+        way = choose_approach(p, axis, to, self.side, self.attempts, self.tethered)
+        direction = way.direction(axis, to, self.side)
+        cap = p.tethered_approach_distance if self.tethered else p.approach_distance
+        cap *= 1.0 + p.widening * min(self.attempts, 3)
+        if self.retreat:
+            return hand - cap * direction - p.retreat_distance * to.front
+        offset = hand - sleeve.p_c
+        # Depth of the hand behind the opening, and how far it is beside the opening's normal.
+        depth = float(offset @ -sleeve.v_c)
+        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
+        facing = self._facing(beside)
+        inside = facing * _ramp(depth, -0.02, 0.02)
+        # not over the hand before it is in line: what is beside goes first
+        ahead = _ramp(beside, p.funnel_wide, p.funnel_narrow) if depth < 0.0 else 1.0
+        if self.outlook is not None:
+            onward = (1.0 - inside) * sleeve.v_c + inside * axis.D(0.0)
+            onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
+            there: FloatArray = hand + (1.0 - facing) * self.outlook + facing * onward
+            return there
+        barred = self._barred
+        aside = (1.0 - facing) * distance_aside(offset, direction)
+        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
+        distance = max(distance, barred * cap)
+        if distance == cap:
+            return self._behind(sleeve, hand - cap * direction, to)
+        onward = (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
+        onward = p.overshoot * ((1.0 - facing) * direction + ahead * onward)
+        onward = onward - (1.0 - ahead) * facing * p.funnel_distance * sleeve.v_c
+        goal: FloatArray = hand - distance * direction + (1.0 - barred) * onward
+        return goal
+
+    @property
+    def _barred(self) -> float:
+        """How far the garment bars the hand's sight of the opening, 0 to 1."""
+        stages = self.parameters.stages
+        return _ramp(self.fact.sight, stages.least_sight, stages.lost_sight)
+
+    def _facing(self, beside: float) -> float:
+        """Returns how far, 0 to 1, the opening is one to be drawn straight at the hand.
+
+        Args:
+            beside: of the hand, from the opening's normal, m.
+        """
+        p = self.parameters
+        facing = (1.0 - self._barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
+        if self.outlook is not None:
+            facing = max(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
+        return facing
+
+    def _behind(self, sleeve: SleeveState, outside: FloatArray, to: Heading) -> FloatArray:
+        """Returns a place behind `outside`, the further behind the less it is in line with it."""
+        p = self.parameters
+        behind = p.tethered_behind_distance if self.tethered else p.behind_distance
+        error = sleeve.p_c - outside
+        error = error - to.front * (to.front @ error)
+        wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
+        place: FloatArray = outside - min(wait, behind) * to.front
+        return place
+
+
+def _ramp(value: float, zero: float, one: float) -> float:
+    """Returns 0 beyond `zero`, 1 beyond `one`, linear between."""
+    return min(1.0, max(0.0, (value - zero) / (one - zero)))
