@@ -55,7 +55,7 @@ class TaskParameters:
         flat, steep: level part of a forearm's direction from which on it is flat; up to which it
             is steep.
         led_inward: inward part of a forearm's direction, hand to elbow, below which the hand has
-            been led inward. led_approach: to such an arm.
+            been led inward. led_approach: to such an arm, from `led_after` misses on.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
@@ -110,6 +110,7 @@ class TaskParameters:
         Approach(0.5, 0.85, 3.0),
     )
     led_inward: float = -0.03
+    led_after: int = 3
     led_approach: Approach = Approach(0.9, 0.9, 3.0)
     flat: float = 0.65
     steep: float = 0.47

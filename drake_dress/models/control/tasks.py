@@ -391,7 +391,8 @@ class TaskPlanner:
         """
         p = self.parameters
         least = p.stages.waiting_progress
-        steps = np.linspace(max(p.stages.highest_waiting_progress, least), least, 41)
+        highest = max(p.stages.highest_waiting_progress, least)
+        steps = np.minimum(np.linspace(2.0, least, 41), highest)
         offset = axis.points(steps) - other
         reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
         return float(steps[np.argmax(reached)]) if reached.any() else least

@@ -116,7 +116,7 @@ class StageParameters:
     lost_sight: float = 0.25
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
-    highest_waiting_progress: float = 0.55
+    highest_waiting_progress: float = 0.8
     done_progress: float = 1.925
     kept_progress: float = 1.91
     reach: float = 0.45
@@ -309,7 +309,7 @@ def eases(state: StageState, side: int, parameters: StageParameters, time: float
     """Returns whether a sleeve that stalled on its arm shall give way before it is drawn again."""
     return (
         state.stage[side] == Stage.DRESS
-        and state.best[side] < parameters.done_progress - 0.1
+        and state.best[side] < parameters.done_progress
         and time - state.best_time[side] > parameters.stall_timeout
     )
 

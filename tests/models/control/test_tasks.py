@@ -159,7 +159,7 @@ def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
 def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
     planner: TaskPlanner, side: int, tethered: bool
 ) -> None:
-    """Every other time, and only once it was missed."""
+    """Every other time, and only once it was missed a few times."""
     p, off = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     other = replace(off, linked=tethered, s=0.5)
     for inward in (-0.2, 0.1):
@@ -174,7 +174,7 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
         axis, rows = arm_axes(q)[side], np.stack([q] * 2)
         assert float(axis.D(0.0) @ across) == pytest.approx(inward)
         sleeves = [SleeveState(a.G(0.0) - 0.4 * a.D(0.0), a.D(0.0)) for a in arm_axes(q)]
-        for missed in range(4):
+        for missed in range(7):
             given = Assignment(
                 (Task.PREPARE, Task.WAIT) if side == 0 else (Task.WAIT, Task.PREPARE),
                 (off, other) if side == 0 else (other, off),
@@ -182,7 +182,7 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
             )
             asked = planner.targets(given, sleeves, rows, STEP)[side].direction[0]
             along = p.led_approach.entry(axis, to, side)
-            assert np.allclose(asked, along) == (inward < p.led_inward and missed % 2 == 1)
+            assert np.allclose(asked, along) == (inward < p.led_inward and missed in (3, 5))
 
 
 @pytest.mark.parametrize("side", [0, 1])

@@ -244,6 +244,16 @@ def test_a_stalled_sleeve_gives_way_and_is_drawn_again() -> None:
     assert not eases(state, 0, P, over)
 
 
+def test_a_sleeve_that_stalls_just_before_the_shoulder_gives_way_too() -> None:
+    """Drawn at with all force a rim that has caught on the upper arm holds only the faster."""
+    late = P.stall_timeout + 0.5
+    for s, expected in ((1.88, True), (0.5 * (P.kept_progress + P.done_progress), False)):
+        state, pair = StageState(), (facts(linked=True, s=s), facts(linked=True, s=1.95))
+        for time in (0.0, P.stall_timeout, late):
+            state, _ = advance_stages(state, pair, P, FAR, time)
+        assert eases(state, 0, P, late) == expected
+
+
 def test_progress_is_no_stall() -> None:
     state = StageState()
     for k in range(20):
