@@ -337,14 +337,16 @@ def test_sleeves_that_are_done_stay_where_they_are_on_their_arms(planner: TaskPl
     assert left.position_weight > 0.0
 
 
-@pytest.mark.parametrize("highest", [2.0, 0.55])
+@pytest.mark.parametrize(("missed", "highest"), [(0, 2.0), (1, 2.0), (2, 0.55), (4, 2.0)])
 def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(
-    planner: TaskPlanner, highest: float
+    planner: TaskPlanner, missed: int, highest: float
 ) -> None:
-    stages = replace(planner.parameters.stages, highest_waiting_progress=highest)
+    """And lower, two times of four, when the other one has missed its hand."""
+    stages = replace(planner.parameters.stages, low_waiting_progress=0.55)
     p, facts = replace(planner.parameters, stages=stages), SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     planner = TaskPlanner(planner.mesh, p)
-    given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
+    on = replace(facts, linked=True, s=1.5)
+    given = Assignment((Task.WAIT, Task.PREPARE), (on, facts), attempts=(0, missed))
     reach = p.waiting_reach * armholes_apart(planner)
     held = []
     for across in np.linspace(0.0, 0.8, 17):  # the right hand comes over to the left arm
