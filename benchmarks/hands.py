@@ -25,6 +25,7 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.control.preparing import distance_aside
 from drake_dress.models.dressing.sight import distance_to_opening
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.human.heading import heading
@@ -178,21 +179,19 @@ def quantities(
     sleeve, other, hand = sleeves[i], sleeves[1 - i], joints[3 * i + 2]
     forearm = joints[3 * i + 1] - hand
     forearm = forearm / np.linalg.norm(forearm)
-    outward = heading(joints).leftward * (1.0 if i == 0 else -1.0)
+    inward = heading(joints).inward(i)
     offset = hand - sleeve.p_c
-    line = offset - (offset @ forearm) * forearm
-    plane = offset - (offset @ sleeve.v_c) * sleeve.v_c
     hands = float(np.linalg.norm(joints[2] - joints[5]))
     return {
         "hand to the armhole's centre, cm": 100 * float(np.linalg.norm(offset)),
-        "hand beside the armhole's normal, cm": 100 * float(np.linalg.norm(plane)),
-        "centre beside the forearm's line, cm": 100 * float(np.linalg.norm(line)),
+        "hand beside the armhole's normal, cm": 100 * distance_aside(offset, sleeve.v_c),
+        "centre beside the forearm's line, cm": 100 * distance_aside(offset, forearm),
         "normal off the forearm, °": _degrees(float(sleeve.v_c @ forearm)),
         "armholes apart, share of rest": float(np.linalg.norm(sleeve.p_c - other.p_c)) / reach,
         "gripper over the other one, cm": 100 * float((grippers[i] - grippers[1 - i])[2]),
         "hands apart, share of armholes at rest": hands / reach,
         "forearm below level, °": 90.0 - _degrees(float(forearm[2])),
-        "forearm inward from hand to elbow, °": _degrees(float(forearm @ outward)) - 90.0,
+        "forearm inward from hand to elbow, °": 90.0 - _degrees(float(forearm @ inward)),
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
-from drake_dress.models.control.task_parameters import Approach, TaskParameters, inward
+from drake_dress.models.control.task_parameters import Approach, TaskParameters
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts
@@ -39,7 +39,7 @@ def choose_approach(
 
 def opening(axis: ArmAxis, to: Heading, side: int) -> float:
     """Returns the inward part of a forearm's direction from hand to elbow."""
-    return float(axis.D(0.0) @ inward(to, side))
+    return float(axis.D(0.0) @ to.inward(side))
 
 
 def distance_aside(offset: FloatArray, direction: FloatArray) -> float:
@@ -95,7 +95,7 @@ class Preparation:
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = float(offset @ -sleeve.v_c)
-        beside = float(np.linalg.norm(offset + depth * sleeve.v_c))
+        beside = distance_aside(offset, sleeve.v_c)
         facing = self._facing(beside)
         inside = facing * _ramp(depth, -0.02, 0.02)
         # not over the hand before it is in line: what is beside goes first

@@ -31,13 +31,13 @@ class Approach:
 
     def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector along which an armhole is drawn over the hand."""
-        return _between(inward(to, side), axis.D(0.0), self.share)
+        return _between(to.inward(side), axis.D(0.0), self.share)
 
     def entry(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
         """Returns the unit vector from an armhole to the garment's entry, as it is asked for."""
         forearm = axis.D(0.0) * np.array([1.0, 1.0, self.tilt])
         forearm /= np.linalg.norm(forearm)
-        return _between(inward(to, side), forearm, self.orientation)
+        return _between(to.inward(side), forearm, self.orientation)
 
 
 @dataclass(frozen=True)
@@ -140,11 +140,6 @@ class TaskParameters:
     final_progress: float = 1.99
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
-
-
-def inward(to: Heading, side: int) -> FloatArray:
-    """Returns the unit vector from a side of the person to the other."""
-    return to.leftward * (-1.0 if side == 0 else 1.0)
 
 
 def _between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:

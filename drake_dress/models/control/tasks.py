@@ -16,7 +16,7 @@ from drake_dress.models.control.preparing import (
     distance_aside,
     opening,
 )
-from drake_dress.models.control.task_parameters import Approach, TaskParameters, inward
+from drake_dress.models.control.task_parameters import Approach, TaskParameters
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sight import (
@@ -381,7 +381,7 @@ class TaskPlanner:
         Behind the first one, where the coat hangs free of the hand that was missed.
         """
         p = self.parameters
-        way = -to.front - p.swing_outward * inward(to, side)
+        way = -to.front - p.swing_outward * to.inward(side)
         place: FloatArray = other.p_c + p.swing_reach * self._reach * way / np.linalg.norm(way)
         return place
 

@@ -33,6 +33,10 @@ class Heading:
         """Returns the unit vector (3,) from right to left."""
         return self.rotation[:, 1]
 
+    def inward(self, side: int) -> FloatArray:
+        """Returns the unit vector (3,) from a side, 0 the left, to the other."""
+        return self.leftward * (-1.0 if side == 0 else 1.0)
+
 
 def heading(joints: FloatArray) -> Heading:
     """Returns the heading of shoulder, elbow, hand of left, then right arm (6,3), m.

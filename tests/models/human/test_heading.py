@@ -20,6 +20,8 @@ def test_shoulders_tell_the_yaw(yaw: float) -> None:
     np.testing.assert_allclose(found.front, [np.cos(yaw), np.sin(yaw), 0.0], atol=1e-12)
     np.testing.assert_allclose(found.leftward, [-np.sin(yaw), np.cos(yaw), 0.0], atol=1e-12)
     np.testing.assert_allclose(found.rotation @ found.rotation.T, np.eye(3), atol=1e-12)
+    np.testing.assert_array_equal(found.inward(0), -found.leftward)
+    np.testing.assert_array_equal(found.inward(1), found.leftward)
 
 
 def test_rounding_is_no_turn() -> None:
