@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,9 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import controller_policy, described_person, station_parameters
-from drake_dress.diagrams.scenario import load_scenario
+from benchmarks.logged import logged_policy
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray
@@ -77,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for path in options.log:
             with RunLog.open(path) as log:
-                policy = _policy(log)
+                _, policy = logged_policy(log)
                 times = np.linspace(2.0, log.time[-1] - 1.5, options.moments)
                 for time in times if options.at is None else [options.at]:
                     moment = _moment(policy, log, time)
@@ -93,16 +90,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if of:
             print(_table(f"{title}: {len(of)} moments", of).text(), end="\n\n")
     return 0
-
-
-def _policy(log: RunLog) -> DressingPolicy:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "scenario.yaml"
-        file.write_text(log.scenario_text, encoding="utf-8")
-        scenario = load_scenario(file)
-        meshes, _ = garments(scenario, file)
-    person = described_person(station_parameters(scenario, meshes.belief))
-    return controller_policy(scenario, meshes.belief, person)
 
 
 def _moment(policy: DressingPolicy, log: RunLog, time: float) -> Moment:

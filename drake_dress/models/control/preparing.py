@@ -23,13 +23,13 @@ def choose_approach(
     flat forearm goes into an armhole that is turned toward it about the vertical, a steep one into
     one that comes from the side. From the side an armhole that misses also pushes an arm that
     follows further inward each time, where it is led behind the back in the end: such an arm is
-    gone about along its forearm every other time, once it was missed a few times.
+    gone about along its forearm every other time, once it was missed a few times as the first one.
     """
+    if tethered:
+        return p.tethered_approaches[attempts % len(p.tethered_approaches)]
     led = opening(axis, to, side) < p.led_inward
     if led and attempts >= p.led_after and (attempts - p.led_after) % 2 == 0:
         return p.led_approach
-    if tethered:
-        return p.tethered_approaches[attempts % len(p.tethered_approaches)]
     level = float(np.linalg.norm(axis.D(0.0)[:2]))
     best = 1 if level >= p.flat else 2 if level <= p.steep else 0
     turn = attempts % len(p.approaches)

@@ -55,7 +55,8 @@ class TaskParameters:
         flat, steep: level part of a forearm's direction from which on it is flat; up to which it
             is steep.
         led_inward: inward part of a forearm's direction, hand to elbow, below which the hand has
-            been led inward. led_approach: to such an arm, from `led_after` misses on.
+            been led inward. led_approach: to such an arm, if it is the first one, from `led_after`
+            misses on.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.

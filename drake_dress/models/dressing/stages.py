@@ -83,9 +83,10 @@ class StageParameters:
         missed_distance: an armhole that has gone this far past the hand without the arm in it
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
-        low_waiting_progress: largest one after every second and third of four misses of the other
-            hand. Where hands are close together the coat reaches from the upper arm: the second
-            hand goes in from there with some arms, with others its armhole lies across the forearm.
+        low_waiting_progress: largest one after `low_waiting_after` misses of the other hand and the
+            next one, then after every third and fourth further. Where hands are close together the
+            coat reaches from the upper arm: the second hand goes in from there with some arms, with
+            others its armhole lies across the forearm.
         done_progress: s from which a sleeve is done.
         kept_progress: s down to which it stays done, and from which one that does not come any
             further is done.
@@ -99,7 +100,8 @@ class StageParameters:
         insertion_timeout: time after which a dressing without insertion is taken back, s.
         barred_distance: an armhole this close to a hand that it is barred from is taken back, m.
         barred_timeout: not before a sleeve was prepared for this long, s.
-        stall_timeout: time without progress after which a sleeve gives way, s.
+        stall_timeout: time without progress after which a sleeve gives way, s; twice as long for
+            each time before that it has stalled there: what does not come free creeps on.
         stall_progress: advance of s that counts as progress.
         easing_time: for which it gives way, s.
         retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
@@ -118,6 +120,7 @@ class StageParameters:
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
     low_waiting_progress: float = 0.8
+    low_waiting_after: int = 6
     done_progress: float = 1.925
     kept_progress: float = 1.91
     reach: float = 0.45
@@ -134,7 +137,7 @@ class StageParameters:
     retreat_time: float = 2.5
     withdrawal_after: int = 2
     withdrawal_time: float = 4.0
-    swing_after: int = 5
+    swing_after: int = 6
     swing_time: float = 4.0
     alike: float = 0.03
 
@@ -148,6 +151,7 @@ class StageState:
         first: sleeve that goes first, -1 before it is known.
         attempts: how often each sleeve missed the hand.
         best: greatest s since the last stall; best_time: when it was reached, s.
+        stalls: how often each sleeve stalled without getting further since; stalled: how far, as s.
         met: where the hand was when the armhole met it, m, or nearer to it since; None while it
             does not meet it.
         close_since: since when the armhole is close to the hand, s; None while it is not.
@@ -159,6 +163,8 @@ class StageState:
     attempts: tuple[int, int] = (0, 0)
     best: tuple[float, float] = (0.0, 0.0)
     best_time: tuple[float, float] = (0.0, 0.0)
+    stalls: tuple[int, int] = (0, 0)
+    stalled: tuple[float, float] = (0.0, 0.0)
     met: tuple[Place | None, Place | None] = (None, None)
     close_since: tuple[float | None, float | None] = (None, None)
 
@@ -297,13 +303,30 @@ def _remember(
 ) -> StageState:
     """Returns the state with the progress of one sleeve; one that waits does not stall."""
     fact, other = facts[side], facts[1 - side]
-    waits = other.s < fact.s
-    over = time - state.best_time[side] > p.stall_timeout + p.easing_time
-    if fact.linked and fact.s <= state.best[side] + p.stall_progress and not (waits or over):
-        return state
+    further = fact.s > state.stalled[side] + p.stall_progress
+    if state.stalls[side] > 0 and (further or state.stage[side] != Stage.DRESS):
+        state = _with_stalls(state, side, 0, 0.0)
+    over = time - state.best_time[side] > _patience(state, side, p) + p.easing_time
+    if fact.linked and fact.s <= state.best[side] + p.stall_progress and other.s >= fact.s:
+        if not over:
+            return state
+        if eases(state, side, p, time):
+            stalled = max(state.stalled[side], state.best[side])
+            state = _with_stalls(state, side, state.stalls[side] + 1, stalled)
     best, best_time = list(state.best), list(state.best_time)
     best[side], best_time[side] = fact.s, time
     return replace(state, best=(best[0], best[1]), best_time=(best_time[0], best_time[1]))
+
+
+def _with_stalls(state: StageState, side: int, count: int, where: float) -> StageState:
+    stalls, stalled = list(state.stalls), list(state.stalled)
+    stalls[side], stalled[side] = count, where
+    return replace(state, stalls=(stalls[0], stalls[1]), stalled=(stalled[0], stalled[1]))
+
+
+def _patience(state: StageState, side: int, p: StageParameters) -> float:
+    """Returns the time without progress, s, after which a sleeve gives way."""
+    return p.stall_timeout * 2.0 ** min(state.stalls[side], 4)
 
 
 def eases(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
@@ -311,7 +334,7 @@ def eases(state: StageState, side: int, parameters: StageParameters, time: float
     return (
         state.stage[side] == Stage.DRESS
         and state.best[side] < parameters.done_progress
-        and time - state.best_time[side] > parameters.stall_timeout
+        and time - state.best_time[side] > _patience(state, side, parameters)
     )
 
 
@@ -393,7 +416,8 @@ def retreats(state: StageState, side: int, parameters: StageParameters, time: fl
 
 def waits_below(missed: int, parameters: StageParameters) -> float:
     """Returns the largest s at which a sleeve waits whose other hand was missed so often."""
-    return parameters.low_waiting_progress if missed % 4 >= 2 else 2.0
+    since = missed - parameters.low_waiting_after
+    return parameters.low_waiting_progress if since >= 0 and since % 4 < 2 else 2.0
 
 
 def _is_due(missed: int, every: int) -> bool:

@@ -159,7 +159,7 @@ def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
 def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
     planner: TaskPlanner, side: int, tethered: bool
 ) -> None:
-    """Every other time, and only once it was missed a few times."""
+    """Every other time, only the first one, and only once it was missed a few times."""
     p, off = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     other = replace(off, linked=tethered, s=0.5)
     for inward in (-0.2, 0.1):
@@ -182,7 +182,8 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
             )
             asked = planner.targets(given, sleeves, rows, STEP)[side].direction[0]
             along = p.led_approach.entry(axis, to, side)
-            assert np.allclose(asked, along) == (inward < p.led_inward and missed in (3, 5))
+            due = not tethered and inward < p.led_inward and missed in (3, 5)
+            assert np.allclose(asked, along) == due
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -337,11 +338,11 @@ def test_sleeves_that_are_done_stay_where_they_are_on_their_arms(planner: TaskPl
     assert left.position_weight > 0.0
 
 
-@pytest.mark.parametrize(("missed", "highest"), [(0, 2.0), (1, 2.0), (2, 0.55), (4, 2.0)])
+@pytest.mark.parametrize(("missed", "highest"), [(0, 2.0), (5, 2.0), (6, 0.55), (8, 2.0)])
 def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(
     planner: TaskPlanner, missed: int, highest: float
 ) -> None:
-    """And lower, two times of four, when the other one has missed its hand."""
+    """And lower, two times of four, when the other one has missed its hand again and again."""
     stages = replace(planner.parameters.stages, low_waiting_progress=0.55)
     p, facts = replace(planner.parameters, stages=stages), SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     planner = TaskPlanner(planner.mesh, p)

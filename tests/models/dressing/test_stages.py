@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -252,6 +253,33 @@ def test_a_sleeve_that_stalls_just_before_the_shoulder_gives_way_too() -> None:
         for time in (0.0, P.stall_timeout, late):
             state, _ = advance_stages(state, pair, P, FAR, time)
         assert eases(state, 0, P, late) == expected
+
+
+def eased_for(s_of: Callable[[int, bool], float], cycles: int) -> list[float]:
+    """Returns when a sleeve at `s_of` (cycle, whether it gives way) begins to give way, s."""
+    state, began, gives_way, cycle, time = StageState(), [], False, 0, 0.0
+    while len(began) < cycles:
+        pair = (facts(linked=True, s=s_of(cycle, gives_way)), facts(linked=True, s=1.95))
+        state, _ = advance_stages(state, pair, P, FAR, time)
+        before, gives_way = gives_way, eases(state, 0, P, time)
+        if gives_way and not before:
+            began.append(time)
+        cycle += before and not gives_way
+        time += 0.5
+    return began
+
+
+def test_a_sleeve_that_stalls_again_where_it_did_is_drawn_at_for_twice_as_long() -> None:
+    """Not all come free by giving way; some creep on under what is allowed."""
+    periods = np.diff(eased_for(lambda cycle, eased: 1.5 if eased else 1.84, 4))
+    np.testing.assert_allclose(np.diff(periods) / P.stall_timeout, [2.0, 4.0], atol=0.35)
+
+
+def test_a_sleeve_that_came_further_is_given_way_to_as_soon_as_at_first() -> None:
+    step = 2.0 * P.stall_progress
+    periods = np.diff(eased_for(lambda cycle, eased: 1.0 + step * (cycle - eased), 4))
+    np.testing.assert_allclose(periods, periods[0], atol=0.5)
+    assert periods[0] < P.stall_timeout + P.easing_time + 2.0
 
 
 def test_progress_is_no_stall() -> None:
