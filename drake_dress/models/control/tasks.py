@@ -127,7 +127,7 @@ class TaskPlanner:
             tasks,
             facts,
             (retreats(stages, 0, p.stages, time), retreats(stages, 1, p.stages, time)),
-            (eases(stages, 0, p.stages, time), eases(stages, 1, p.stages, time)),
+            (eases(stages, 0, facts, p.stages, time), eases(stages, 1, facts, p.stages, time)),
             stages.attempts,
             (
                 self._outlook(x, joints[2], to, sleeves, 0, linked, missed[0]),

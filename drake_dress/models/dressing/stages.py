@@ -104,6 +104,7 @@ class StageParameters:
             each time before that it has stalled there: what does not come free creeps on.
         stall_progress: advance of s that counts as progress.
         easing_time: for which it gives way, s.
+        creeping_progress: s from which on it does not: so near the shoulder all have crept on.
         retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
         withdrawal_after: misses of the first hand, each so many of which both sleeves are taken
             back behind the person: a coat that hangs over an arm misses it again and again.
@@ -134,6 +135,7 @@ class StageParameters:
     stall_timeout: float = 3.0
     stall_progress: float = 0.03
     easing_time: float = 1.5
+    creeping_progress: float = 1.89
     retreat_time: float = 2.5
     withdrawal_after: int = 2
     withdrawal_time: float = 4.0
@@ -310,7 +312,7 @@ def _remember(
     if fact.linked and fact.s <= state.best[side] + p.stall_progress and other.s >= fact.s:
         if not over:
             return state
-        if eases(state, side, p, time):
+        if eases(state, side, facts, p, time):
             stalled = max(state.stalled[side], state.best[side])
             state = _with_stalls(state, side, state.stalls[side] + 1, stalled)
     best, best_time = list(state.best), list(state.best_time)
@@ -329,11 +331,17 @@ def _patience(state: StageState, side: int, p: StageParameters) -> float:
     return p.stall_timeout * 2.0 ** min(state.stalls[side], 4)
 
 
-def eases(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
+def eases(
+    state: StageState,
+    side: int,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    parameters: StageParameters,
+    time: float,
+) -> bool:
     """Returns whether a sleeve that stalled on its arm shall give way before it is drawn again."""
     return (
         state.stage[side] == Stage.DRESS
-        and state.best[side] < parameters.done_progress
+        and facts[side].s < parameters.creeping_progress
         and time - state.best_time[side] > _patience(state, side, parameters)
     )
 
