@@ -34,7 +34,6 @@ from drake_dress.models.dressing.stages import (
     eases,
     retreats,
     swings,
-    waits_below,
     withdraws,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -336,9 +335,8 @@ class TaskPlanner:
                 other.place(pair[k], to, sleeves[k])
                 for pair, to in zip(axes[1:], headings[1:], strict=True)
             ]
-            highest = waits_below(given.attempts[k], p.stages)
             progress = [
-                self._waiting_progress(axis, place, highest)
+                self._waiting_progress(axis, place)
                 for axis, place in zip(mine[1:], places, strict=True)
             ]
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
@@ -385,15 +383,15 @@ class TaskPlanner:
         place: FloatArray = other.p_c + p.swing_reach * self._reach * way / np.linalg.norm(way)
         return place
 
-    def _waiting_progress(self, axis: ArmAxis, other: FloatArray, highest: float) -> float:
-        """Returns the largest s, `highest` at most, from which the garment reaches `other` (3,), m.
+    def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
+        """Returns the largest s from which the garment reaches `other` (3,), m.
 
         Higher up than that the garment holds the other sleeve back; lower down it could slip off
         (J_w).
         """
         p = self.parameters
         least = p.stages.waiting_progress
-        steps = np.minimum(np.linspace(2.0, least, 41), max(highest, least))
+        steps = np.linspace(2.0, least, 41)
         offset = axis.points(steps) - other
         reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
         return float(steps[np.argmax(reached)]) if reached.any() else least

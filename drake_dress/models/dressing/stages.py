@@ -83,10 +83,6 @@ class StageParameters:
         missed_distance: an armhole that has gone this far past the hand without the arm in it
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
-        low_waiting_progress: largest one after `low_waiting_after` misses of the other hand and the
-            next one, then after every third and fourth further. Where hands are close together the
-            coat reaches from the upper arm: the second hand goes in from there with some arms, with
-            others its armhole lies across the forearm.
         done_progress: s from which a sleeve is done.
         kept_progress: s down to which it stays done, and from which one that does not come any
             further is done.
@@ -120,8 +116,6 @@ class StageParameters:
     lost_sight: float = 0.25
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
-    low_waiting_progress: float = 0.8
-    low_waiting_after: int = 6
     done_progress: float = 1.925
     kept_progress: float = 1.91
     reach: float = 0.45
@@ -420,12 +414,6 @@ def retreats(state: StageState, side: int, parameters: StageParameters, time: fl
     """Returns whether a sleeve has missed the hand a moment ago and shall keep away from it."""
     missed = state.attempts[side] > 0
     return missed and _just_began(state, side, parameters.retreat_time, time)
-
-
-def waits_below(missed: int, parameters: StageParameters) -> float:
-    """Returns the largest s at which a sleeve waits whose other hand was missed so often."""
-    since = missed - parameters.low_waiting_after
-    return parameters.low_waiting_progress if since >= 0 and since % 4 < 2 else 2.0
 
 
 def _is_due(missed: int, every: int) -> bool:
