@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.logged import opened
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.preparing import distance_aside
@@ -72,10 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     found: list[Moment] = []
     try:
-        for k, path in enumerate(options.log):
-            with RunLog.open(path) as log:
-                found += moments(log, str(path))
-            print(f"{k + 1}/{len(options.log)} {path}", file=sys.stderr, flush=True)
+        for path, log in opened(options.log):
+            found += moments(log, str(path))
     except UserError as error:
         print(f"hands: {error}", file=sys.stderr)
         return 2

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.logged import logged_policy
+from benchmarks.logged import logged_policy, opened
 from drake_dress.errors import UserError
 from drake_dress.models.dressing.stages import StageState
 from drake_dress.report.log import RunLog
@@ -58,10 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     found: list[Hand] = []
     try:
-        for k, path in enumerate(options.log):
-            with RunLog.open(path) as log:
-                found += hands(looks(log))
-            print(f"{k + 1}/{len(options.log)} {path}", file=sys.stderr, flush=True)
+        for _, log in opened(options.log):
+            found += hands(looks(log))
     except UserError as error:
         print(f"misses: {error}", file=sys.stderr)
         return 2

@@ -15,7 +15,6 @@ import argparse
 import itertools
 import json
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -24,9 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.logged import logged_scenario
 from drake_dress.diagrams.build import material, measures, posture
 from drake_dress.diagrams.garment import build_garment
-from drake_dress.diagrams.scenario import Scenario, load_scenario
+from drake_dress.diagrams.scenario import Scenario
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
@@ -134,10 +134,8 @@ def _numbers(text: str) -> list[float]:
 
 
 def _read(path: Path, count: int) -> Run:
-    with RunLog.open(path) as log, tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "scenario.yaml"
-        file.write_text(log.scenario_text, encoding="utf-8")
-        scenario = load_scenario(file)
+    with RunLog.open(path) as log:
+        scenario = logged_scenario(log)
         mesh = build_garment(scenario.garment, scenario.plant.spacing, path.parent)
         if len(mesh.rest_position) != len(log.rest_position):
             raise UserError(str(path), "garment", "is another than this version makes of it")

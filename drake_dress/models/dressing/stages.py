@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Any
 
 
 class Stage(IntEnum):
@@ -249,13 +250,17 @@ def _advance(
         or time - state.since[side] > p.insertion_timeout
         or stage == Stage.DONE
     ):
-        new = Stage.PREPARE
-    if new == stage:
-        return state
-    stages, since = list(state.stage), list(state.since)
-    stages[side], since[side] = new, time
-    state = replace(state, stage=(stages[0], stages[1]), since=(since[0], since[1]))
-    return _again(state, side, time) if new == Stage.PREPARE else state
+        return _again(state, side, time)
+    return state if new == stage else _with(state, side, stage=new, since=time)
+
+
+def _with(state: StageState, side: int, **values: Any) -> StageState:
+    """Returns the state with these of its fields changed for one sleeve."""
+    changed: dict[str, Any] = {}
+    for name, value in values.items():
+        left, right = getattr(state, name)
+        changed[name] = (value, right) if side == 0 else (left, value)
+    return replace(state, **changed)
 
 
 def _lingers(state: StageState, side: int, p: StageParameters, time: float) -> bool:
@@ -270,16 +275,16 @@ def _meet(
 
     One that comes nearer by itself is met there.
     """
-    met, close = list(state.met), list(state.close_since)
+    met, close = state.met[side], state.close_since[side]
     if fact.linked or fact.hand_distance > p.lingering_distance:
-        close[side] = None
-    elif close[side] is None:
-        close[side] = time
+        close = None
+    elif close is None:
+        close = time
     if fact.linked or fact.hand_distance > p.meeting_distance:
-        met[side] = None
-    elif met[side] is None or _pushed(state, side, fact) < 0.0:
-        met[side] = fact.hand
-    return replace(state, met=(met[0], met[1]), close_since=(close[0], close[1]))
+        met = None
+    elif met is None or _pushed(state, side, fact) < 0.0:
+        met = fact.hand
+    return _with(state, side, met=met, close_since=close)
 
 
 def _pushed(state: StageState, side: int, fact: SleeveFacts) -> float:
@@ -301,23 +306,15 @@ def _remember(
     fact, other = facts[side], facts[1 - side]
     further = fact.s > state.stalled[side] + p.stall_progress
     if state.stalls[side] > 0 and (further or state.stage[side] != Stage.DRESS):
-        state = _with_stalls(state, side, 0, 0.0)
+        state = _with(state, side, stalls=0, stalled=0.0)
     over = time - state.best_time[side] > _patience(state, side, p) + p.easing_time
     if fact.linked and fact.s <= state.best[side] + p.stall_progress and other.s >= fact.s:
         if not over:
             return state
         if eases(state, side, facts, p, time):
             stalled = max(state.stalled[side], state.best[side])
-            state = _with_stalls(state, side, state.stalls[side] + 1, stalled)
-    best, best_time = list(state.best), list(state.best_time)
-    best[side], best_time[side] = fact.s, time
-    return replace(state, best=(best[0], best[1]), best_time=(best_time[0], best_time[1]))
-
-
-def _with_stalls(state: StageState, side: int, count: int, where: float) -> StageState:
-    stalls, stalled = list(state.stalls), list(state.stalled)
-    stalls[side], stalled[side] = count, where
-    return replace(state, stalls=(stalls[0], stalls[1]), stalled=(stalled[0], stalled[1]))
+            state = _with(state, side, stalls=state.stalls[side] + 1, stalled=stalled)
+    return _with(state, side, best=fact.s, best_time=time)
 
 
 def _patience(state: StageState, side: int, p: StageParameters) -> float:
@@ -350,17 +347,14 @@ def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
 
 def _again(state: StageState, side: int, time: float) -> StageState:
     """Returns the state in which a sleeve that missed the hand begins anew."""
-    stage, since, attempts = list(state.stage), list(state.since), list(state.attempts)
-    met, close = list(state.met), list(state.close_since)
-    stage[side], since[side], met[side], close[side] = Stage.PREPARE, time, None, None
-    attempts[side] += 1
-    return replace(
+    return _with(
         state,
-        stage=(stage[0], stage[1]),
-        since=(since[0], since[1]),
-        attempts=(attempts[0], attempts[1]),
-        met=(met[0], met[1]),
-        close_since=(close[0], close[1]),
+        side,
+        stage=Stage.PREPARE,
+        since=time,
+        attempts=state.attempts[side] + 1,
+        met=None,
+        close_since=None,
     )
 
 
