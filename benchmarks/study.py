@@ -39,9 +39,11 @@ def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> No
         )
 
 
-def add_study_options(parser: argparse.ArgumentParser, benchmark: str) -> None:
-    """Adds the options that `carry_out` reads."""
-    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side")
+def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int = 2) -> None:
+    """Adds the options that `carry_out` reads; `jobs` run side by side by default."""
+    parser.add_argument(
+        "--jobs", type=int, default=jobs, metavar="N", help=f"runs side by side; default {jobs}"
+    )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
     parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
@@ -61,6 +63,7 @@ def carry_out(
     cases: Sequence[C],
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
     tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
+    tell: Callable[[dict[str, Any]], str] | None = None,
 ) -> tuple[list[dict[str, Any]], bool]:
     """Runs what is missing, prints the tables; returns the results and whether Ctrl-C ended it.
 
@@ -71,6 +74,7 @@ def carry_out(
         cases: of the study.
         run: a case, with the folder to keep it in and further settings.
         tables: of results.
+        tell: how a case ended, from its summary, in a few words; None for a dressing.
     """
     if options.into:
         around(options.into, benchmark)
@@ -82,7 +86,12 @@ def carry_out(
     stopped = False
     if not options.kept:
         stopped = _run_all(
-            missing, kept, lambda c: run(c, options.keep, options.set), options.jobs, options.json
+            missing,
+            kept,
+            lambda c: run(c, options.keep, options.set),
+            options.jobs,
+            options.json,
+            tell or _dressed,
         )
     results = [kept[case.name] for case in cases if case.name in kept]
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
@@ -130,6 +139,7 @@ def _run_all(
     run: Callable[[C], dict[str, Any]],
     jobs: int,
     path: Path | None,
+    tell: Callable[[dict[str, Any]], str],
 ) -> bool:
     with caught_interrupt() as stop, ThreadPoolExecutor(jobs) as pool:
         pending = {pool.submit(run, case): case for case in new}
@@ -139,17 +149,14 @@ def _run_all(
             if path is not None:
                 # what failed to run is run again
                 write_results(path, {name: r for name, r in kept.items() if "summary" in r})
-            print(
-                f"{number}/{len(new)} {pending[future].name}: {_how_it_ended(result)}", flush=True
-            )
+            ended = result.get("problem") or tell(result["summary"])
+            print(f"{number}/{len(new)} {pending[future].name}: {ended}", flush=True)
             if stop.is_set():
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
     return stop.is_set()
 
 
-def _how_it_ended(result: dict[str, Any]) -> str:
-    """Returns how a run ended, in a few words."""
-    if "problem" in result:
-        return str(result["problem"])
-    return result["summary"]["reason"] or f"on in {result['summary']['dressing_time_s']:.0f} s"
+def _dressed(summary: dict[str, Any]) -> str:
+    """Returns how a dressing ended, in a few words."""
+    return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -73,39 +74,35 @@ REACTIONS = {
 }
 
 
-@dataclass(frozen=True)
-class FaultCase:
-    """One fault: its kind and what seeds the moment and the source."""
-
-    kind: str
-    seed: int
-
-
-def name_of(case: dict[str, Any]) -> str:
-    """Returns a case's name from its fields."""
-    return f"{case['kind']}-{case['seed']:04d}"
-
-
-def run_case(case: FaultCase, scenario: str, out: Path, rate: float = 1.0) -> dict[str, Any]:
+def inject(
+    kind: str,
+    seed: int,
+    scenario: str,
+    out: Path,
+    rate: float = 1.0,
+    overrides: Sequence[str] = (),
+) -> dict[str, Any]:
     """Returns what a fault did, and under "wrong" what was not as stated.
 
     Args:
-        case: the fault.
+        kind: of REACTIONS.
+        seed: of the moment and the source.
         scenario: file of both processes.
         out: directory of both.
         rate: simulated seconds per second. A machine that does other work too is late by
             milliseconds of its own; at a slower rate they are fewer of those that are judged.
+        overrides: further KEY=VALUE for both processes.
     """
-    rng = np.random.default_rng([case.seed, *case.kind.encode()])
-    stated = REACTIONS[case.kind]
+    rng = np.random.default_rng([seed, *kind.encode()])
+    stated = REACTIONS[kind]
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
-    kind = case.kind.split("_")[0] if case.kind.startswith("stale") else case.kind
-    lasting = 1.5 if case.kind == "stale_camera" else LASTING
+    played = kind.split("_")[0] if kind.startswith("stale") else kind
+    lasting = 1.5 if kind == "stale_camera" else LASTING
     lab = []
     if kind not in ("killed", "disk_full"):
         lab = [
-            f"lab.faults=[{{kind: {kind}, source: {source or 'left_arm'}, start: {start}, "
+            f"lab.faults=[{{kind: {played}, source: {source or 'left_arm'}, start: {start}, "
             f"duration: {lasting}}}]"
         ]
     plan = Plan(
@@ -113,8 +110,9 @@ def run_case(case: FaultCase, scenario: str, out: Path, rate: float = 1.0) -> di
         str(out),
         [
             *COARSE,
-            *([CAMERA] if case.kind == "stale_camera" else []),
+            *([CAMERA] if kind == "stale_camera" else []),
             f"duration={start + lasting + AFTER + 1.0}",
+            *overrides,
         ],
         lab,
         rate=rate,
@@ -123,14 +121,14 @@ def run_case(case: FaultCase, scenario: str, out: Path, rate: float = 1.0) -> di
         timeout=120.0 / rate,
     )
     outcome = play(plan)
-    found = _judged(case.kind, stated, start, lasting, out)
+    found = _judged(kind, stated, start, lasting, out)
     wrong: list[str] = found["wrong"]
     expected = -9 if kind == "killed" else 1
     if outcome.run_status != expected:
         wrong.append(f"run ended with {outcome.run_status}, expected {expected}")
     if outcome.lab_status != 1:
         wrong.append(f"lab ended with {outcome.lab_status}, expected 1")
-    return {"case": asdict(case), "source": source, "start": start, **found}
+    return {"source": source, "start": start, **found}
 
 
 def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path) -> dict[str, Any]:

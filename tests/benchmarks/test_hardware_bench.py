@@ -2,15 +2,18 @@
 
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from benchmarks.hardware import __main__ as bench
 from benchmarks.hardware.__main__ import main
-from benchmarks.hardware.faults import REACTIONS, FaultCase, run_case
+from benchmarks.hardware.faults import REACTIONS, inject
+from benchmarks.hardware.parts import Case, Conditions, growth
 from benchmarks.hardware.two_processes import Plan, available, memory_of, play
-from drake_dress.errors import UserError
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
 
@@ -53,7 +56,7 @@ def test_a_fault_is_answered_as_stated(kind: str, tmp_path: Path) -> None:
     if kind == "random":
         kind = str(np.random.default_rng(seed).choice(list(REACTIONS)))
     print(f"kind {kind}, seed {seed}")
-    result = run_case(FaultCase(kind, seed), SCENARIO, tmp_path, rate=0.5)
+    result = inject(kind, seed, SCENARIO, tmp_path, rate=0.5)
     assert result["wrong"] == []
 
 
@@ -91,6 +94,51 @@ def test_a_run_without_a_lab_tells_who_is_silent(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [["--only", "nonsense"], ["--kinds", "nonsense"]])
-def test_a_part_that_there_is_not_is_told(words: list[str]) -> None:
-    with pytest.raises(UserError, match="nonsense"):
+def test_a_part_that_there_is_not_is_told(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
         main(words)
+    assert ended.value.code == 2
+    assert "'nonsense' is none of" in capsys.readouterr().err
+
+
+def test_what_was_measured_is_kept_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def run(case: Case, conditions: Conditions, out: Path, overrides: list[str]) -> dict[str, Any]:
+        asked.append(case.name)
+        wrong = ["held after 0.30 s"] if case.name == "nan-0001" else []
+        facts = {"source": "left_arm", "start": 1.0, "held_after": 0.2, "speed": 0.5, "torque": 0.1}
+        return {"case": asdict(case), "summary": {**facts, "wrong": wrong}}
+
+    monkeypatch.setattr(bench, "run", run)
+    monkeypatch.setattr(bench, "available", lambda: True)
+    file = tmp_path / "results.json"
+    words = ["--only", "faults", "--kinds", "nan,push", "--json", str(file)]
+    assert main([*words, "--seeds", "0"]) == 0
+    assert main([*words, "--seeds", "0-1"]) == 1
+    assert asked == ["nan-0000", "push-0000", "nan-0001", "push-0001"]
+    capsys.readouterr()
+    monkeypatch.setattr(bench, "available", lambda: False)
+    assert main([*words, "--seeds", "0-1", "--kept"]) == 1
+    told = capsys.readouterr().out
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in told.splitlines()]
+    assert ["nan", "1 of 2", "0.250", "0.200", "0.500", "0.100"] in rows
+    assert ["push", "2 of 2", "–", "–", "0.500", "0.100"] in rows
+    assert ["nan-0001", "held after 0.30 s"] in rows
+
+
+def test_memory_that_grows_is_found_in_noise() -> None:
+    seconds = np.arange(1200)
+    noise = np.random.default_rng(3).normal(0.0, 0.5, len(seconds))
+    for rate in (0.0, 20.0):
+        # loading comes first, closing last
+        memory = 200.0 + rate * seconds / 3600.0 + noise - 100.0 * (seconds < 60)
+        memory[-3:] = [np.nan, 20.0, 0.0]
+        found = growth(list(memory))
+        assert abs(found["per_hour"] - rate) < 0.6
+        assert 168.0 * found["per_hour"] < found["week_at_most"]
+        assert 168.0 * rate < found["week_at_most"] < 168.0 * (rate + 1.2)

@@ -1,0 +1,157 @@
+"""Which measurements there are of the hardware path, and what each comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hardware.faults import inject
+from benchmarks.hardware.two_processes import Plan, play
+from drake_dress.errors import UserError
+from drake_dress.report.log import RunLog
+from drake_dress.report.summary import summarize
+
+PARTS = ("commands", "dressing", "soak", "faults")
+# On two cores a lab keeps up with time if its garment is coarse.
+_COARSE = ["plant.spacing=0.035", "plant.time_step=0.005", "controller.command_rate=200"]
+_COARSER = ["plant.spacing=0.05", "controller.spacing=0.06"]
+# What is loaded and compiled comes before memory is settled: a share of the samples. At the end
+# processes close down.
+_LOADING, _CLOSING = 0.25, 5
+_HOURS_A_WEEK = 168.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One measurement: `part` of PARTS; of a fault, its `kind` and what seeds it."""
+
+    part: str
+    kind: str = ""
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """For files and tables."""
+        return f"{self.kind}-{self.seed:04d}" if self.part == "faults" else self.part
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which it is measured.
+
+    Attributes:
+        scenario: file of lab and run.
+        rate: of the dressing, simulated seconds per second.
+        minutes: of the soak.
+    """
+
+    scenario: str
+    rate: float
+    minutes: float
+
+
+def run(
+    case: Case, conditions: Conditions, out: Path, overrides: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Returns what one measurement came to: "summary", or the "problem" that there was none.
+
+    Args:
+        case: which.
+        conditions: under which.
+        out: directory of lab and run.
+        overrides: further KEY=VALUE for both.
+    """
+    try:
+        summary = _measured(case, conditions, out, overrides)
+    except (UserError, RuntimeError) as error:
+        return {"case": asdict(case), "problem": str(error)}
+    return {"case": asdict(case), "summary": summary}
+
+
+def _measured(
+    case: Case, conditions: Conditions, out: Path, overrides: Sequence[str]
+) -> dict[str, Any]:
+    if case.part == "commands":
+        return _commands(conditions, out, overrides)
+    if case.part == "dressing":
+        return _dressing(conditions, out, overrides)
+    if case.part == "soak":
+        return _soak(conditions, out, overrides)
+    return inject(case.kind, case.seed, conditions.scenario, out, overrides=overrides)
+
+
+def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
+    play(Plan(conditions.scenario, str(out), [*_COARSE, "duration=30", *overrides]))
+    summary = _summary(out / "run")
+    return {key: summary[key] for key in ("command_rate_hz", "command_latency_ms", "start_up_s")}
+
+
+def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
+    rate = conditions.rate
+    done = play(Plan(conditions.scenario, str(out), [*overrides], rate=rate, timeout=1200.0))
+    sides = {"run": done.run_status, "lab": done.lab_status}
+    keys = ("reason", "dressing_time_s", "max_gripper_force_N")
+    summaries = {name: _summary(out / name) for name in sides}
+    of_run = ("command_rate_hz", "command_latency_ms", "start_up_s")
+    return {
+        "rate": rate,
+        **{
+            name: {"status": status, **{key: summaries[name][key] for key in keys}}
+            for name, status in sides.items()
+        },
+        **{key: summaries["run"][key] for key in of_run},
+    }
+
+
+def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
+    # so coarse that nothing succeeds, or the run would end
+    duration = 60.0 * conditions.minutes
+    done = play(
+        Plan(
+            conditions.scenario,
+            str(out),
+            [*_COARSE, *_COARSER, f"duration={duration}", *overrides],
+            timeout=duration + 120.0,
+            sampled=True,
+        )
+    )
+    memory = {"run": done.run_memory, "lab": done.lab_memory}
+    return {
+        "minutes": conditions.minutes,
+        **{name: growth(values) for name, values in memory.items()},
+    }
+
+
+def growth(memory: Sequence[float]) -> dict[str, float]:
+    """Returns how memory grew: first and last MB, MB/h, and at most how many MB in a week.
+
+    The week is the slope and twice its standard error, for what is sampled each second.
+
+    Args:
+        memory: MB, each second; NaN where there was none.
+
+    Raises:
+        RuntimeError: too few samples.
+    """
+    values = np.array([m for m in memory if np.isfinite(m) and m > 0.0])
+    settled = values[int(_LOADING * len(values)) : -_CLOSING]
+    if len(settled) < 3:
+        raise RuntimeError(f"{len(settled)} samples of memory once it is settled, expected 3")
+    hours = np.arange(len(settled)) / 3600.0
+    fit = np.polyfit(hours, settled, 1)
+    error = (settled - np.polyval(fit, hours)).std() / np.sqrt(len(settled)) / hours.std()
+    return {
+        "first": float(settled[0]),
+        "last": float(settled[-1]),
+        "per_hour": float(fit[0]),
+        "week_at_most": float(_HOURS_A_WEEK * (fit[0] + 2.0 * error)),
+    }
+
+
+def _summary(out: Path) -> dict[str, Any]:
+    with RunLog.open(out / "run.h5") as log:
+        return summarize(log, wall_time=0.0)

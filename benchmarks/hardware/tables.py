@@ -1,0 +1,110 @@
+"""What was measured of the hardware path beside what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from benchmarks.cloth.table import Table
+from benchmarks.hardware.faults import REACTIONS
+from benchmarks.hardware.parts import Case
+
+
+def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
+    """Returns tables of what there is."""
+    done = [(Case(**r["case"]), r["summary"]) for r in results if "summary" in r]
+    of_part = {case.part: summary for case, summary in done}
+    faults = [(case, summary) for case, summary in done if case.part == "faults"]
+    return [
+        Table(
+            "Commands, coarse lab at full rate",
+            ["", "asked", "reached"],
+            _commands(of_part["commands"]) if "commands" in of_part else [],
+        ),
+        Table(
+            "Dressing in two processes",
+            ["", "run", "lab"],
+            _dressing(of_part["dressing"]) if "dressing" in of_part else [],
+        ),
+        Table(
+            "Memory of its own",
+            ["", "minutes", "first, MB", "last, MB", "growth, MB/h", "a week at most, MB"],
+            _memory(of_part["soak"]) if "soak" in of_part else [],
+        ),
+        Table(
+            "Faults",
+            ["", "as stated", "held within, s", "longest, s", "speed", "torque"],
+            _faults(faults),
+        ),
+        Table(
+            "Not as stated",
+            ["", "what"],
+            [[case.name, "; ".join(s["wrong"])] for case, s in faults if s["wrong"]],
+        ),
+    ]
+
+
+def tell(summary: dict[str, Any]) -> str:
+    """Returns what one measurement came to, in a few words."""
+    if "wrong" in summary:
+        how = "; ".join(summary["wrong"]) or "as stated"
+        return f"{summary['source'] or 'run'} at {summary['start']:.2f} s: {how}"
+    return "measured"
+
+
+def _commands(summary: dict[str, Any]) -> list[list[Any]]:
+    latency = summary["command_latency_ms"]
+    return [
+        ["rate, Hz", "200 ± 2 %", f"{summary['command_rate_hz']:.1f}"],
+        ["status to command, median, ms", "≤ 10", latency["median"]],
+        ["status to command, 99 %, ms", "≤ 25", latency["p99"]],
+        ["start of the process to first command, s", "≤ 10", summary["start_up_s"]],
+    ]
+
+
+def _dressing(summary: dict[str, Any]) -> list[list[Any]]:
+    run, lab = summary["run"], summary["lab"]
+    latency = summary["command_latency_ms"]
+    return [
+        ["simulated seconds a second", summary["rate"], ""],
+        ["exit status", run["status"], lab["status"]],
+        ["reason", run["reason"] or "on", lab["reason"] or "on"],
+        ["dressed in, s", run["dressing_time_s"], lab["dressing_time_s"]],
+        ["largest gripper force, N", run["max_gripper_force_N"], lab["max_gripper_force_N"]],
+        ["commands a second of this machine's clock", summary["command_rate_hz"], ""],
+        ["commands a simulated second", summary["command_rate_hz"] / summary["rate"], ""],
+        ["status to command, median, ms", latency["median"], ""],
+        ["status to command, 99 %, ms", latency["p99"], ""],
+        ["start of the process to first command, s", summary["start_up_s"], ""],
+    ]
+
+
+def _memory(summary: dict[str, Any]) -> list[list[Any]]:
+    return [
+        [
+            name,
+            summary["minutes"],
+            *(summary[name][key] for key in ("first", "last", "per_hour", "week_at_most")),
+        ]
+        for name in ("run", "lab")
+    ]
+
+
+def _faults(done: Sequence[tuple[Case, dict[str, Any]]]) -> list[list[Any]]:
+    rows = []
+    for kind, stated in REACTIONS.items():
+        mine = [summary for case, summary in done if case.kind == kind]
+        if not mine:
+            continue
+        held = [s["held_after"] for s in mine if s["held_after"] is not None]
+        rows.append(
+            [
+                kind,
+                f"{sum(not s['wrong'] for s in mine)} of {len(mine)}",
+                stated.within,
+                None if stated.within is None or not held else max(held),
+                max(s["speed"] for s in mine),
+                max(s["torque"] for s in mine),
+            ]
+        )
+    return rows
