@@ -18,6 +18,8 @@ from typing import Any
 from kept import seed_range
 from scenario_run import run_scenario
 
+from drake_dress.report.summary import read_summary
+
 _COLUMNS = (
     ("success", "{}"),
     ("s_left", "{:.2f}"),
@@ -62,7 +64,7 @@ def _dress(options: argparse.Namespace, seed: int) -> dict[str, Any]:
     _, problem = run_scenario(options.scenario, out, options.set, seed)
     if problem:
         return {"reason": problem}
-    summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    summary = read_summary(out / "summary.json")
     return summary
 
 

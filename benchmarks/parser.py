@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
+
+from drake_dress.errors import UserError
 
 UNUSABLE, INTERRUPTED = 2, 130
 
@@ -15,6 +18,15 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Ends with the message in one line."""
         self.exit(UNUSABLE, f"{self.prog.replace(' ', ': ', 1)}: {message}\n")
+
+
+def exit_with(main: Callable[[], int]) -> NoReturn:
+    """Ends with the status of a benchmark's `main`, and with one line where input is unusable."""
+    try:
+        sys.exit(main())
+    except UserError as error:
+        print(f"drake-dress: {error}", file=sys.stderr)
+        sys.exit(UNUSABLE)
 
 
 def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -17,6 +17,7 @@ from benchmarks.parser import INTERRUPTED, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.report.summary import read_summary
 
 
 class _Named(Protocol):
@@ -56,6 +57,11 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
     )
 
 
+def dressed(summary: dict[str, Any]) -> str:
+    """Returns how a dressing ended, in a few words."""
+    return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"
+
+
 def carry_out(
     options: argparse.Namespace,
     benchmark: str,
@@ -63,7 +69,7 @@ def carry_out(
     cases: Sequence[C],
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
     tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
-    tell: Callable[[dict[str, Any]], str] | None = None,
+    tell: Callable[[dict[str, Any]], str] = dressed,
 ) -> tuple[list[dict[str, Any]], bool]:
     """Runs what is missing, prints the tables; returns the results and whether Ctrl-C ended it.
 
@@ -74,7 +80,7 @@ def carry_out(
         cases: of the study.
         run: a case, with the folder to keep it in and further settings.
         tables: of results.
-        tell: how a case ended, from its summary, in a few words; None for a dressing.
+        tell: how a case ended, from its summary, in a few words.
     """
     if options.into:
         around(options.into, benchmark)
@@ -91,7 +97,7 @@ def carry_out(
             lambda c: run(c, options.keep, options.set),
             options.jobs,
             options.json,
-            tell or _dressed,
+            tell,
         )
     results = [kept[case.name] for case in cases if case.name in kept]
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
@@ -104,6 +110,16 @@ def carry_out(
 def exit_status(results: Sequence[dict[str, Any]], stopped: bool) -> int:
     """Returns 130 after Ctrl-C, 1 if a run could not be used."""
     return INTERRUPTED if stopped else int(any("problem" in result for result in results))
+
+
+@contextmanager
+def place_of(case: _Named, folder: Path | None) -> Iterator[Path]:
+    """Provides the folder of a case: of its name in `folder`, or one that is kept no longer."""
+    if folder is not None:
+        yield folder / case.name
+        return
+    with tempfile.TemporaryDirectory() as place:
+        yield Path(place)
 
 
 def run_case(
@@ -124,12 +140,11 @@ def run_case(
         seed: of the run; None for the scenario's own.
         look: what to take from the folder that it wrote.
     """
-    with tempfile.TemporaryDirectory() as place:
-        out = Path(place) if folder is None else folder / case.name
+    with place_of(case, folder) as out:
         status, problem = run_scenario(scenario, out, settings, seed)
         if problem:
             return {"case": asdict(case), "problem": problem}
-        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        summary = read_summary(out / "summary.json")
         return {"case": asdict(case), "status": status, "summary": summary, **look(out)}
 
 
@@ -155,8 +170,3 @@ def _run_all(
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
     return stop.is_set()
-
-
-def _dressed(summary: dict[str, Any]) -> str:
-    """Returns how a dressing ended, in a few words."""
-    return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"

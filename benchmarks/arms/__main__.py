@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.cloth.table import Table
-from benchmarks.parser import UNUSABLE, OneLineParser
+from benchmarks.parser import OneLineParser, exit_with
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, run_case
-from drake_dress.errors import UserError
 
 _NAME = "arms"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -148,8 +146,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except UserError as error:
-        print(f"drake-dress: {error}", file=sys.stderr)
-        sys.exit(UNUSABLE)
+    exit_with(main)

@@ -7,17 +7,15 @@ the start drawn by the seed. What was run stays in the file of `--json` and is n
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import seed_range
-from benchmarks.parser import UNUSABLE, OneLineParser
+from benchmarks.parser import OneLineParser, exit_with
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
 from drake_dress.discrepancy.results import write_text
-from drake_dress.errors import UserError
 
 _NAME = "dressing"
 
@@ -42,8 +40,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except UserError as error:
-        print(f"drake-dress: {error}", file=sys.stderr)
-        sys.exit(UNUSABLE)
+    exit_with(main)

@@ -11,7 +11,6 @@ import argparse
 import dataclasses
 import json
 import os
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -22,13 +21,12 @@ from typing import Any
 from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, UNUSABLE, OneLineParser, some_of
+from benchmarks.parser import INTERRUPTED, OneLineParser, exit_with, some_of
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.results import write_json, write_text
-from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.effects.effect import Effect
 
@@ -198,8 +196,4 @@ def _numbers(text: str) -> list[float]:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except UserError as error:
-        print(f"drake-dress: {error}", file=sys.stderr)
-        sys.exit(UNUSABLE)
+    exit_with(main)

@@ -12,8 +12,6 @@ What was measured stays in the file of `--json` and is not measured again.
 from __future__ import annotations
 
 import argparse
-import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,8 +21,8 @@ from benchmarks.hardware.parts import PARTS, Case, Conditions, run
 from benchmarks.hardware.tables import tables, tell
 from benchmarks.hardware.two_processes import available
 from benchmarks.kept import seed_range
-from benchmarks.parser import UNUSABLE, OneLineParser, some_of
-from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
+from benchmarks.parser import OneLineParser, exit_with, some_of
+from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
 
 _NAME = "hardware"
@@ -43,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     conditions = Conditions(options.scenario, options.rate, options.minutes)
 
     def measured(case: Case, keep: Path | None, overrides: Sequence[str]) -> dict[str, Any]:
-        with tempfile.TemporaryDirectory() as place:
-            return run(case, conditions, (keep or Path(place)) / case.name, overrides)
+        with place_of(case, keep) as out:
+            return run(case, conditions, out, overrides)
 
     chosen = _cases(options.only, options.kinds, options.seeds)
     results, stopped = carry_out(options, _NAME, Case, chosen, measured, tables, tell)
@@ -85,8 +83,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except UserError as error:
-        print(f"drake-dress: {error}", file=sys.stderr)
-        sys.exit(UNUSABLE)
+    exit_with(main)

@@ -12,8 +12,7 @@ import numpy as np
 from benchmarks.hardware.faults import inject
 from benchmarks.hardware.two_processes import Plan, play
 from drake_dress.errors import UserError
-from drake_dress.report.log import RunLog
-from drake_dress.report.summary import summarize
+from drake_dress.report.summary import read_summary
 
 PARTS = ("commands", "dressing", "soak", "faults")
 # On two cores a lab keeps up with time if its garment is coarse.
@@ -86,7 +85,7 @@ def _measured(
 
 def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     play(Plan(conditions.scenario, str(out), [*_COARSE, "duration=30", *overrides]))
-    summary = _summary(out / "run")
+    summary = read_summary(out / "run" / "summary.json")
     return {key: summary[key] for key in ("command_rate_hz", "command_latency_ms", "start_up_s")}
 
 
@@ -95,7 +94,7 @@ def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> di
     done = play(Plan(conditions.scenario, str(out), [*overrides], rate=rate, timeout=1200.0))
     sides = {"run": done.run_status, "lab": done.lab_status}
     keys = ("reason", "dressing_time_s", "max_gripper_force_N")
-    summaries = {name: _summary(out / name) for name in sides}
+    summaries = {name: read_summary(out / name / "summary.json") for name in sides}
     of_run = ("command_rate_hz", "command_latency_ms", "start_up_s")
     return {
         "rate": rate,
@@ -150,8 +149,3 @@ def growth(memory: Sequence[float]) -> dict[str, float]:
         "per_hour": float(fit[0]),
         "week_at_most": float(_HOURS_A_WEEK * (fit[0] + 2.0 * error)),
     }
-
-
-def _summary(out: Path) -> dict[str, Any]:
-    with RunLog.open(out / "run.h5") as log:
-        return summarize(log, wall_time=0.0)

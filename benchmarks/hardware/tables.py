@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from benchmarks.cloth.table import Table
@@ -15,21 +15,25 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     done = [(Case(**r["case"]), r["summary"]) for r in results if "summary" in r]
     of_part = {case.part: summary for case, summary in done}
     faults = [(case, summary) for case, summary in done if case.part == "faults"]
+
+    def rows(part: str, make: Callable[[dict[str, Any]], list[list[Any]]]) -> list[list[Any]]:
+        return make(of_part[part]) if part in of_part else []
+
     return [
         Table(
             "Commands, coarse lab at full rate",
             ["", "asked", "reached"],
-            _commands(of_part["commands"]) if "commands" in of_part else [],
+            rows("commands", _commands),
         ),
         Table(
             "Dressing in two processes",
             ["", "run", "lab"],
-            _dressing(of_part["dressing"]) if "dressing" in of_part else [],
+            rows("dressing", _dressing),
         ),
         Table(
             "Memory of its own",
             ["", "minutes", "first, MB", "last, MB", "growth, MB/h", "a week at most, MB"],
-            _memory(of_part["soak"]) if "soak" in of_part else [],
+            rows("soak", _memory),
         ),
         Table(
             "Faults",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import html
 import io
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ import numpy.typing as npt
 from matplotlib import image as matplotlib_image
 from matplotlib.axes import Axes
 
-from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
@@ -23,7 +21,7 @@ from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import chart, embedded, html_page
 from drake_dress.report.stills import CameraPose, render_still
-from drake_dress.report.summary import SuccessRules
+from drake_dress.report.summary import SuccessRules, read_summary
 
 _COLOR = {"left": "#0b7a5e", "right": "#b8453b"}
 _STAGE_SHADE = ("#eef1f4", "#dbe8f5", "#dff1e4")
@@ -45,25 +43,13 @@ def write_report(
         UserError: one of the two is missing or cannot be used.
     """
     run_dir = Path(run_dir)
-    summary = _read_summary(run_dir / "summary.json")
+    summary = read_summary(run_dir / "summary.json")
     with RunLog.open(run_dir / "run.h5") as log:
         m = measures if measures is not None else measure(log)
         page = _page(log, summary, m, rules or SuccessRules())
     path = run_dir / "report.html"
     path.write_text(page, encoding="utf-8")
     return path
-
-
-def _read_summary(path: Path) -> dict[str, Any]:
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(str(path), "", "cannot be read; expected a run's summary.json") from error
-    except ValueError as error:
-        raise UserError(str(path), "", f"is not JSON: {error}") from error
-    if not isinstance(summary, dict):
-        raise UserError(str(path), "", f"holds a {type(summary).__name__}; expected an object")
-    return summary
 
 
 def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.errors import UserError
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import ArmMeasures, measure_arms
@@ -119,6 +120,23 @@ def summarize(
 def write_summary(summary: dict[str, Any], path: str | Path) -> None:
     """Writes a summary as strict JSON (no NaN in it)."""
     Path(path).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_summary(path: str | Path) -> dict[str, Any]:
+    """Returns the summary that a run wrote.
+
+    Raises:
+        UserError: the file is missing or cannot be used.
+    """
+    try:
+        summary = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(str(path), "", "cannot be read; expected a run's summary.json") from error
+    except ValueError as error:
+        raise UserError(str(path), "", f"is not JSON: {error}") from error
+    if not isinstance(summary, dict):
+        raise UserError(str(path), "", f"holds a {type(summary).__name__}; expected an object")
+    return summary
 
 
 def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
