@@ -134,7 +134,7 @@ def moments(log: RunLog, run: str) -> list[Moment]:
             if is_in[i][k]:
                 continue
             near = distance_to_opening(x[loops[i]], q[3 * i + 2]) < _TOUCH
-            begins = near and time[k] - touched[i] > _SOON
+            begins = bool(near and time[k] - touched[i] > _SOON)
             touched[i] = time[k] if near else touched[i]
             after = np.flatnonzero(is_in[i][k:])
             wait = float(time[k + after[0]] - time[k]) if len(after) else None

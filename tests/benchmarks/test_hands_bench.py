@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks import hands  # noqa: E402
 from benchmarks.hands import Moment, quantities, tables  # noqa: E402
 from drake_dress.models.dressing.sleeve import SleeveState  # noqa: E402
+from tests.report import synthetic  # noqa: E402
 
 
 def moment(value: float, wait: float | None, second: bool, touches: bool = False) -> Moment:
@@ -89,3 +92,25 @@ def test_a_hand_is_in_where_it_stays_in() -> None:
 def test_a_log_that_is_none_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert hands.main([str(tmp_path / "run.h5")]) == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_moments_of_a_run_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The left hand is in after 3 s, the right one after 40 s; a sample a second.
+
+    The left hand is at its armhole meanwhile, so it begins to touch the opening once.
+    """
+    garment = synthetic.coat()
+    armhole = garment.loops["left_armhole"]
+    samples = []
+    for sample in synthetic.dressing(garment, count=301, duration=300.0):
+        joints = sample.joint_position.copy()
+        joints[2] = sample.garment_position[armhole].mean(axis=0)
+        samples.append(replace(sample, joint_position=joints))
+    log = synthetic.write(tmp_path / "run.h5", garment, samples)
+    kept = tmp_path / "moments.json"
+    assert hands.main([str(log), "--json", str(kept)]) == 0
+    assert "First hand: goes in within 3 s" in capsys.readouterr().out
+    found = json.loads(kept.read_text())
+    assert {(m["side"], m["second"]) for m in found} == {("left", False), ("right", True)}
+    assert all(m["wait"] == pytest.approx((40 if m["second"] else 3) - m["time"]) for m in found)
+    assert [m["side"] for m in found if m["touches"]] == ["left"]
