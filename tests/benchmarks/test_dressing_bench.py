@@ -124,6 +124,13 @@ def test_a_file_of_something_else_is_refused(tmp_path):
 @pytest.mark.parametrize(("right", "count"), [(0, 5), (5, 5), (3, 10), (90, 100)])
 def test_the_interval_holds_the_share_and_stays_within_all(right, count):
     low, high = wilson(right, count)
-    assert -1e-12 <= low <= right / count <= high <= 1.0 + 1e-12
+    assert 0.0 <= low <= right / count <= high + 1e-12 and high <= 1.0
     wider = wilson(right, count)[1] - wilson(right, count)[0]
     assert wider > wilson(10 * right, 10 * count)[1] - wilson(10 * right, 10 * count)[0]
+
+
+def test_the_interval_of_none_and_of_all_ends_there():
+    """And not a rounding beyond it, which was told as -0 %."""
+    for count in range(1, 60):
+        assert f"{wilson(0, count)[0]:.0f}" == "0"
+        assert 1.0 - 1e-12 < wilson(count, count)[1] <= 1.0
