@@ -64,8 +64,7 @@ def _dress(options: argparse.Namespace, seed: int) -> dict[str, Any]:
     _, problem = run_scenario(options.scenario, out, options.set, seed)
     if problem:
         return {"reason": problem}
-    summary = read_summary(out / "summary.json")
-    return summary
+    return read_summary(out / "summary.json")
 
 
 def _print_table(results: dict[int, dict[str, Any]]) -> None:

@@ -24,6 +24,7 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import opened
+from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.preparing import distance_aside
@@ -81,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for table in tables(found, options.within):
         print(table.text(), end="\n\n")
     if options.json:
-        options.json.write_text(json.dumps([asdict(m) for m in found], indent=1) + "\n")
+        write_text(options.json, json.dumps([asdict(m) for m in found], indent=1) + "\n")
     return 0
 
 
