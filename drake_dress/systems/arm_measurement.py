@@ -9,7 +9,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, ValueProducer
 
 from drake_dress.models.arm.chain import SerialArm
-from drake_dress.models.arm.external_load import tool_force
+from drake_dress.models.arm.external_load import gripper_motion
 from drake_dress.models.sides import SIDES
 
 _QUANTITIES = ("position", "velocity", "force")
@@ -74,10 +74,7 @@ class ArmMeasurement(LeafSystem):
                 self.GetInputPort(f"{side}_{name}").Eval(context)
                 for name in ("position", "velocity", "torque_external")
             )
-            arm = self._arms[i]
-            links = arm.links(q)
-            moves = arm.tool_jacobian(links)[:3]
-            output.set_value(np.stack([links[-1, :3, 3], moves @ v, tool_force(moves, torque)]))
+            output.set_value(gripper_motion(self._arms[i], q, v, torque))
 
         return calc
 

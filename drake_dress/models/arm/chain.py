@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -59,17 +60,7 @@ class SerialArm:
 
     def links(self, q: FloatArray) -> FloatArray:
         """Returns (J+2,4,4) X_WL of the base, each link, and the tool, at joints `q` (J,), rad."""
-        turned = np.zeros((self.count, 4, 4))
-        c, s = np.cos(q), np.sin(q)
-        turned[:, 0, 0], turned[:, 0, 1] = c, -s
-        turned[:, 1, 0], turned[:, 1, 1] = s, c
-        turned[:, 2, 2] = turned[:, 3, 3] = 1.0
-        steps = self.joints @ turned
-        poses = np.empty((self.count + 2, 4, 4))
-        poses[0] = self.base
-        for i in range(self.count):
-            poses[i + 1] = poses[i] @ steps[i]
-        poses[-1] = poses[-2] @ self.tool
+        poses: FloatArray = place_links(self.base, self.joints, self.tool, q)
         return poses
 
     def tool_position(self, q: FloatArray) -> FloatArray:
@@ -83,29 +74,8 @@ class SerialArm:
         Args:
             links: of `SerialArm.links`.
         """
-        axis = links[1:-1, :3, 2]
-        moved = moved_by(links, links[-1:, :3, 3], np.array([self.count]))[0]
-        jacobian: FloatArray = np.vstack([moved, axis.T])
+        jacobian: FloatArray = find_tool_jacobian(links)
         return jacobian
-
-
-def moved_by(links: FloatArray, points: FloatArray, owner: npt.NDArray[np.int64]) -> FloatArray:
-    """Returns (K,3,J) ∂(velocity of points)/∂(joint rates).
-
-    Args:
-        links: (J+2,4,4) of `SerialArm.links`.
-        points: (K,3) p_W, m.
-        owner: (K,) link that each is fixed to: 0 the base, J the last one.
-    """
-    axis, origin = links[1:-1, :3, 2], links[1:-1, :3, 3]
-    arm = points[:, None, :] - origin[None]
-    # a × r by hand: np.cross costs three times as much on so little
-    x = axis[:, 1] * arm[..., 2] - axis[:, 2] * arm[..., 1]
-    y = axis[:, 2] * arm[..., 0] - axis[:, 0] * arm[..., 2]
-    z = axis[:, 0] * arm[..., 1] - axis[:, 1] * arm[..., 0]
-    moves = np.arange(1, len(axis) + 1) <= owner[:, None]
-    jacobian: FloatArray = np.stack([x, y, z], axis=1) * moves[:, None, :]
-    return jacobian
 
 
 def rotation_error(now: FloatArray, asked: FloatArray) -> FloatArray:
@@ -113,18 +83,94 @@ def rotation_error(now: FloatArray, asked: FloatArray) -> FloatArray:
 
     At half a turn its axis is one of two; half a turn less rounding is as exact as any.
     """
-    r = asked @ now.T
-    sine = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    cosine = 0.5 * (np.trace(r) - 1.0)
-    length = float(np.linalg.norm(sine))
-    angle = float(np.arctan2(length, cosine))
+    vector: FloatArray = find_rotation_error(now, asked)
+    return vector
+
+
+# What follows is called from compiled code, too: a cycle of 5 ms has no time for small arrays.
+
+
+@nb.njit(cache=True, nogil=True)
+def place_links(base, joints, tool, q):  # type: ignore[no-untyped-def]
+    """Returns (J+2,4,4) X_WL; arguments as of `SerialArm`, q (J,) rad."""
+    count = len(q)
+    poses = np.zeros((count + 2, 4, 4))
+    poses[0] = base
+    for i in range(count):
+        _compose(poses[i], joints[i], poses[i + 1])
+        c, s = np.cos(q[i]), np.sin(q[i])
+        for a in range(3):
+            x, y = poses[i + 1, a, 0], poses[i + 1, a, 1]
+            poses[i + 1, a, 0], poses[i + 1, a, 1] = c * x + s * y, c * y - s * x
+    _compose(poses[count], tool, poses[count + 1])
+    return poses
+
+
+@nb.njit(cache=True, nogil=True)
+def _compose(first, second, out):  # type: ignore[no-untyped-def]
+    for a in range(3):
+        for b in range(4):
+            out[a, b] = (
+                first[a, 0] * second[0, b] + first[a, 1] * second[1, b] + first[a, 2] * second[2, b]
+            )
+        out[a, 3] += first[a, 3]
+    out[3, 3] = 1.0
+
+
+@nb.njit(cache=True, nogil=True)
+def find_tool_jacobian(links):  # type: ignore[no-untyped-def]
+    """Returns (6,J), as `SerialArm.tool_jacobian`."""
+    count = len(links) - 2
+    jacobian = np.zeros((6, count))
+    moved_by(links, links[-1, :3, 3], count, jacobian)
+    for j in range(count):
+        for a in range(3):
+            jacobian[3 + a, j] = links[j + 1, a, 2]
+    return jacobian
+
+
+@nb.njit(cache=True, nogil=True)
+def moved_by(links, point, owner, out):  # type: ignore[no-untyped-def]
+    """Writes ∂(velocity of a point)/∂(joint rates) to the first three rows of `out`.
+
+    Args:
+        links: (J+2,4,4) of `SerialArm.links`.
+        point: (3,) p_W, m.
+        owner: link that it is fixed to: 0 the base, J the last one.
+        out: (3+,J) of zeros.
+    """
+    for j in range(min(owner, len(links) - 2)):
+        x = point[0] - links[j + 1, 0, 3]
+        y = point[1] - links[j + 1, 1, 3]
+        z = point[2] - links[j + 1, 2, 3]
+        u, v, w = links[j + 1, 0, 2], links[j + 1, 1, 2], links[j + 1, 2, 2]
+        out[0, j] = v * z - w * y
+        out[1, j] = w * x - u * z
+        out[2, j] = u * y - v * x
+
+
+@nb.njit(cache=True, nogil=True)
+def find_rotation_error(now, asked):  # type: ignore[no-untyped-def]
+    """Returns (3,), as `rotation_error`."""
+    r = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            for c in range(3):
+                r[a, b] += asked[a, c] * now[b, c]
+    vector = np.array(
+        [0.5 * (r[2, 1] - r[1, 2]), 0.5 * (r[0, 2] - r[2, 0]), 0.5 * (r[1, 0] - r[0, 1])]
+    )
+    cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
+    length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if length > 1e-6:
-        vector: FloatArray = sine * (angle / length)
-        return vector
+        return vector * (np.arctan2(length, cosine) / length)
     if cosine > 0.0:
-        return sine
+        return vector
     # half a turn: r = 2 a aᵀ − 1
-    k = int(np.argmax(np.diag(r)))
-    axis = r[:, k] + np.eye(3)[k]
-    half: FloatArray = np.pi * axis / np.linalg.norm(axis)
-    return half
+    k = 0
+    for a in range(1, 3):
+        if r[a, a] > r[k, k]:
+            k = a
+    axis = r[:, k].copy()
+    axis[k] += 1.0
+    return axis * (np.pi / np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))

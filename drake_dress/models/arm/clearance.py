@@ -8,8 +8,6 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.arm.chain import SerialArm
-
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
@@ -42,14 +40,10 @@ class ArmShape:
 
     def placed(self, links: FloatArray) -> Capsules:
         """Returns the capsules in W, at `links` (J+2,4,4) of `SerialArm.links`."""
-        x = links[self.link]
-        r, p = x[:, :3, :3], x[:, :3, 3]
         c = self.capsules
-        return Capsules(
-            np.einsum("kab,kb->ka", r, c.first) + p,
-            np.einsum("kab,kb->ka", r, c.second) + p,
-            c.radius,
-        )
+        placed = np.empty((2, len(self.link), 3))
+        place_capsules(links, self.link, c.first, c.second, placed)
+        return Capsules(placed[0], placed[1], c.radius)
 
 
 @dataclass(frozen=True)
@@ -86,28 +80,43 @@ def _find_clearance(  # type: ignore[no-untyped-def]
 ):
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
-        s, t = nearest(a[i], b[i], c[j], d[j])
-        length2 = 0.0
-        for k in range(3):
-            here[m, k] = a[i, k] + s * (b[i, k] - a[i, k])
-            there[m, k] = c[j, k] + t * (d[j, k] - c[j, k])
-            away[m, k] = here[m, k] - there[m, k]
-            length2 += away[m, k] * away[m, k]
-        length = np.sqrt(length2)
-        distance[m] = length - radius[i] - other_radius[j]
-        if length > 1e-9:
-            away[m] /= length
-            continue
+        distance[m] = find_gap(a[i], b[i], c[j], d[j], here[m], there[m], away[m])
+        distance[m] -= radius[i] + other_radius[j]
+
+
+@nb.njit(cache=True, nogil=True)
+def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
+    """Returns the distance of segments a–b and c–d, m, and writes where it is.
+
+    Args:
+        a: (3,) one end, m.
+        b: (3,) the other.
+        c: (3,) one end of the other segment, m.
+        d: (3,) the other.
+        here: (3,) written: the nearest point of the first, m.
+        there: (3,) written: of the other.
+        away: (3,) written: unit vector from there to here.
+    """
+    s, t = nearest(a, b, c, d)
+    length2 = 0.0
+    for k in range(3):
+        here[k] = a[k] + s * (b[k] - a[k])
+        there[k] = c[k] + t * (d[k] - c[k])
+        away[k] = here[k] - there[k]
+        length2 += away[k] * away[k]
+    length = np.sqrt(length2)
+    size = length
+    if length <= 1e-9:
         # axes that cross have no direction apart; any across both will do
-        u, w = b[i] - a[i], d[j] - c[j]
-        away[m, 0] = u[1] * w[2] - u[2] * w[1]
-        away[m, 1] = u[2] * w[0] - u[0] * w[2]
-        away[m, 2] = u[0] * w[1] - u[1] * w[0]
-        size = np.sqrt(away[m, 0] ** 2 + away[m, 1] ** 2 + away[m, 2] ** 2)
-        if size > 1e-12:
-            away[m] /= size
-        else:
-            away[m, 0], away[m, 1], away[m, 2] = 0.0, 0.0, 1.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            away[k] = (b[i] - a[i]) * (d[j] - c[j]) - (b[j] - a[j]) * (d[i] - c[i])
+        size = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+        if size <= 1e-12:
+            away[0], away[1], away[2], size = 0.0, 0.0, 1.0, 1.0
+    for k in range(3):
+        away[k] /= size
+    return length
 
 
 @nb.njit(cache=True, nogil=True)
@@ -136,40 +145,39 @@ def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
     return s, t
 
 
-def clearance_rates(
-    near: Clearance, arm: SerialArm, shape: ArmShape, links: FloatArray, side: int
-) -> FloatArray:
-    """Returns (M,J) ∂(rate of distance)/∂(joint rates) of the arm at one side of the pairs.
+@nb.njit(cache=True, nogil=True)
+def find_gap_rates(links, point, owner, away, sign, rates):  # type: ignore[no-untyped-def]
+    """Writes ∂(rate of a distance)/∂(joint rates), of the arm that is at one end of it.
 
     Args:
-        near: pairs of its capsules with others.
-        arm: whose.
-        shape: its capsules.
-        links: (J+2,4,4) where they are.
-        side: 0 if it is the first of each pair, 1 if the second.
+        links: (J+2,4,4) where the arm is.
+        point: (3,) of the arm, nearest to the other, m.
+        owner: link that it is fixed to.
+        away: (3,) unit vector along which the distance grows, if the point moves by `sign`.
+        sign: 1.0 or -1.0.
+        rates: (J,) written.
     """
-    points = near.here if side == 0 else near.there
-    sign = 1.0 if side == 0 else -1.0
-    rates = np.empty((len(points), arm.count))
-    _find_rates(links, points, shape.link[near.pair[:, side]], sign * near.away, rates)
-    return rates
+    for j in range(len(rates)):
+        rates[j] = 0.0
+        if j + 1 > owner:
+            continue
+        link = links[j + 1]
+        x, y, z = point[0] - link[0, 3], point[1] - link[1, 3], point[2] - link[2, 3]
+        rates[j] = sign * (
+            away[0] * (link[1, 2] * z - link[2, 2] * y)
+            + away[1] * (link[2, 2] * x - link[0, 2] * z)
+            + away[2] * (link[0, 2] * y - link[1, 2] * x)
+        )
 
 
 @nb.njit(cache=True, nogil=True)
-def _find_rates(links, points, owner, away, rates):  # type: ignore[no-untyped-def]
-    for m in range(points.shape[0]):
-        for j in range(rates.shape[1]):
-            rates[m, j] = 0.0
-            if j + 1 > owner[m]:
-                continue
-            link = links[j + 1]
-            x, y, z = (
-                points[m, 0] - link[0, 3],
-                points[m, 1] - link[1, 3],
-                points[m, 2] - link[2, 3],
-            )
-            rates[m, j] = (
-                away[m, 0] * (link[1, 2] * z - link[2, 2] * y)
-                + away[m, 1] * (link[2, 2] * x - link[0, 2] * z)
-                + away[m, 2] * (link[0, 2] * y - link[1, 2] * x)
-            )
+def place_capsules(links, owner, first, second, placed):  # type: ignore[no-untyped-def]
+    """Writes the ends in W of capsules given in the frames of their links to `placed` (2,K,3)."""
+    for k in range(len(owner)):
+        x = links[owner[k]]
+        for a in range(3):
+            placed[0, k, a] = x[a, 3]
+            placed[1, k, a] = x[a, 3]
+            for b in range(3):
+                placed[0, k, a] += x[a, b] * first[k, b]
+                placed[1, k, a] += x[a, b] * second[k, b]

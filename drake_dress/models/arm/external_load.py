@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
+
+from drake_dress.models.arm.chain import SerialArm, find_tool_jacobian, place_links
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -22,5 +25,44 @@ def tool_force(jacobian: FloatArray, torque: FloatArray) -> FloatArray:
         jacobian: (3,J) ∂(tool's velocity)/∂(joint rates), m.
         torque: (J,) of the surroundings on the joints, N·m.
     """
-    normal = jacobian @ jacobian.T + _DAMPING**2 * np.eye(3)
-    return np.asarray(np.linalg.solve(normal, jacobian @ torque), dtype=np.float64)
+    force: FloatArray = _find_force(np.ascontiguousarray(jacobian, dtype=np.float64), torque)
+    return force
+
+
+def gripper_motion(
+    arm: SerialArm, q: FloatArray, rate: FloatArray, torque: FloatArray
+) -> FloatArray:
+    """Returns (3,3) rows p_WT, m, v_WT, m/s, and the force on the tool, N, in W (`tool_force`).
+
+    Args:
+        arm: whose.
+        q: (J,) rad.
+        rate: (J,) rad/s.
+        torque: (J,) of the surroundings on the joints, N·m.
+    """
+    rows: FloatArray = _find_motion(arm.base, arm.joints, arm.tool, q, rate, torque)
+    return rows
+
+
+@nb.njit(cache=True, nogil=True)
+def _find_motion(base, joints, tool, q, rate, torque):  # type: ignore[no-untyped-def]
+    links = place_links(base, joints, tool, q)
+    jacobian = find_tool_jacobian(links)[:3]
+    rows = np.zeros((3, 3))
+    for a in range(3):
+        rows[0, a] = links[-1, a, 3]
+        for j in range(len(q)):
+            rows[1, a] += jacobian[a, j] * rate[j]
+    rows[2] = _find_force(jacobian, torque)
+    return rows
+
+
+@nb.njit(cache=True, nogil=True)
+def _find_force(jacobian, torque):  # type: ignore[no-untyped-def]
+    normal, felt = _DAMPING**2 * np.eye(3), np.zeros(3)
+    for a in range(3):
+        for j in range(len(torque)):
+            felt[a] += jacobian[a, j] * torque[j]
+            for b in range(3):
+                normal[a, b] += jacobian[a, j] * jacobian[b, j]
+    return np.linalg.solve(normal, felt)

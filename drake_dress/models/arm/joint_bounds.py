@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -25,25 +26,35 @@ def rate_bounds(
         step: s.
         limits: of the joints.
     """
-    a = limits.acceleration
-    up = _stoppable(limits.upper - q, a, step)
-    down = _stoppable(q - limits.lower, a, step)
-    high = np.minimum(limits.speed, np.minimum(up, rate + a * step))
-    low = np.maximum(-limits.speed, np.maximum(-down, rate - a * step))
-    # never reached from within; from without the way back comes first
-    braking = low > high
-    toward = np.clip(0.0, rate - a * step, rate + a * step)
-    return np.where(braking, toward, low), np.where(braking, toward, high)
+    low, high = np.empty(len(q)), np.empty(len(q))
+    find_rate_bounds(
+        q, rate, step, limits.lower, limits.upper, limits.speed, limits.acceleration, low, high
+    )
+    return low, high
 
 
-def _stoppable(room: FloatArray, a: FloatArray, step: float) -> FloatArray:
-    """Returns the greatest speeds, rad/s, from which joints stop within `room` (J,), rad.
+@nb.njit(cache=True, nogil=True)
+def find_rate_bounds(q, rate, step, lower, upper, speed, acceleration, low, high):  # type: ignore[no-untyped-def]
+    """Writes what `rate_bounds` returns to `low` and `high` (J,)."""
+    for j in range(len(q)):
+        a = acceleration[j]
+        up = _stoppable(upper[j] - q[j], a, step)
+        down = _stoppable(q[j] - lower[j], a, step)
+        low[j] = max(-speed[j], -down, rate[j] - a * step)
+        high[j] = min(speed[j], up, rate[j] + a * step)
+        if low[j] > high[j]:
+            # never reached from within; from without the way back comes first
+            low[j] = high[j] = min(max(0.0, rate[j] - a * step), rate[j] + a * step)
+
+
+@nb.njit(cache=True, nogil=True)
+def _stoppable(room, a, step):  # type: ignore[no-untyped-def]
+    """Returns the greatest speed, rad/s, from which a joint stops within `room`, rad.
 
     A joint that moves at v = k a h for a step h, and a h slower in each step after it, goes
     a h² (m + 1) (k − m/2), m the whole part of k. For a whole k that is a h² k (k + 1) / 2, which
     tells m of a way.
     """
-    steps = np.maximum(room, 0.0) / (a * step**2)
+    steps = max(room, 0.0) / (a * step**2)
     m = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0))
-    v: FloatArray = a * step * (steps / (m + 1.0) + 0.5 * m)
-    return v
+    return a * step * (steps / (m + 1.0) + 0.5 * m)

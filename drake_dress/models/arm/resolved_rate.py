@@ -11,26 +11,34 @@ of joints faster.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from typing import NamedTuple
 
 import daqp
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.arm.chain import SerialArm, moved_by, rotation_error
+from drake_dress.models.arm.chain import (
+    SerialArm,
+    find_rotation_error,
+    find_tool_jacobian,
+    moved_by,
+    place_links,
+)
 from drake_dress.models.arm.clearance import (
     ArmShape,
     Capsules,
-    Clearance,
-    clearance,
-    clearance_rates,
+    find_gap,
+    find_gap_rates,
+    place_capsules,
 )
-from drake_dress.models.arm.joint_bounds import rate_bounds
+from drake_dress.models.arm.joint_bounds import find_rate_bounds
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 # DAQP's kinds of rows.
 _BOUND, _EQUAL, _SOFT = 0, 5, 8
+_NOBODY = Capsules(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -112,11 +120,13 @@ class ArmPair:
     home: FloatArray
     free_links: int = 2
     parameters: RateParameters = field(default_factory=RateParameters)
-    _pairs: IntArray = field(init=False)
+    _compiled: tuple[_Arm, _Arm] = field(init=False, repr=False, compare=False)
+    _gains: _Gains = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        left, right = (np.arange(len(shape.link)) for shape in self.shapes)
-        object.__setattr__(self, "_pairs", _pairs(left, right))
+        compiled = tuple(_compiled(a, s) for a, s in zip(self.arms, self.shapes, strict=True))
+        object.__setattr__(self, "_compiled", compiled)
+        object.__setattr__(self, "_gains", _Gains(*map(float, astuple(self.parameters))))
 
     def rates(
         self,
@@ -135,117 +145,210 @@ class ArmPair:
             step: s.
             person: where it is.
         """
-        p = self.parameters
-        n = self.arms[0].count
-        links = [arm.links(q[i]) for i, arm in enumerate(self.arms)]
-        jacobians = [arm.tool_jacobian(links[i]) for i, arm in enumerate(self.arms)]
-        # joints of left, of right, and by how much each gripper is slower than asked
-        size = 2 * n + 2
-        cost, slope = np.zeros((size, size)), np.zeros(size)
-        moves, asked = np.zeros((6, size)), np.zeros(6)
-        low, high = np.empty(size), np.empty(size)
-        third = [x[3, :3, 3] for x in links]
-        for i, (arm, goal, jacobian) in enumerate(zip(self.arms, goals, jacobians, strict=True)):
-            own = slice(i * n, i * n + n)
-            tool = links[i][-1]
-            velocity = goal.velocity + p.position_gain * (goal.position - tool[:3, 3])
-            turning = p.rotation_gain * rotation_error(tool[:3, :3], goal.rotation)
-            turning *= min(1.0, p.max_turning / max(float(np.linalg.norm(turning)), 1e-12))
-            liked = p.home_gain * (self.home[i] - q[i])
-            liked += self._outward(links[i], third[i] - third[1 - i])
-            turn = jacobian[3:]
-            cost[own, own] = np.eye(n) + p.rotation_weight * turn.T @ turn
-            slope[own] = -liked - p.rotation_weight * turn.T @ turning
-            slower = 2 * n + i
-            cost[slower, slower] = p.slowdown_weight
-            moves[3 * i : 3 * i + 3, own] = jacobian[:3]
-            moves[3 * i : 3 * i + 3, slower] = velocity
-            asked[3 * i : 3 * i + 3] = velocity
-            low[own], high[own] = rate_bounds(q[i], rate[i], step, arm.limits)
-            low[slower], high[slower] = 0.0, 1.0
-        near, closing, between, beside = self._distances(links, person)
-        rows = np.vstack([moves, near])
-        room = self._approach(closing, step)
-        solution, _, flag, _ = daqp.solve(
-            cost,
-            slope,
-            np.ascontiguousarray(rows),
-            np.concatenate([high, asked, np.full(len(near), 1e30)]),
-            np.concatenate([low, asked, room]),
-            np.concatenate(
-                [
-                    np.full(size, _BOUND, dtype=np.int32),
-                    np.full(6, _EQUAL, dtype=np.int32),
-                    np.full(len(near), _SOFT, dtype=np.int32),
-                ]
-            ),
+        seen = _NOBODY if person is None else person
+        cost, slope, rows, upper, lower, kinds, between, to_person = _programme(
+            self._compiled,
+            np.ascontiguousarray(self.home, dtype=np.float64),
+            self._gains,
+            q,
+            rate,
+            np.stack([goal.position for goal in goals]),
+            np.stack([goal.velocity for goal in goals]),
+            np.stack([goal.rotation for goal in goals]),
+            step,
+            (seen.first, seen.second, seen.radius),
+            self.free_links,
         )
+        solution, _, flag, _ = daqp.solve(cost, slope, rows, upper, lower, kinds)
+        joints = q.size
+        low, high = lower[:joints], upper[:joints]
         if flag < 1 or not np.isfinite(solution).all():
             # straight on, slower: always within the bounds
-            still = np.clip(0.0, low[: 2 * n], high[: 2 * n]).reshape(2, n)
-            return Rates(still, np.zeros(2), between, beside, False)
-        found = np.clip(solution[: 2 * n], low[: 2 * n], high[: 2 * n]).reshape(2, n)
-        return Rates(found, 1.0 - solution[2 * n :], between, beside, True)
-
-    def _outward(self, links: FloatArray, from_other: FloatArray) -> FloatArray:
-        """Returns (J,) rates of the joints that move link 3 away from that of the other arm."""
-        p = self.parameters
-        apart = float(np.linalg.norm(from_other))
-        if apart >= p.outward_distance:
-            return np.zeros(len(links) - 2)
-        jacobian = moved_by(links, links[3:4, :3, 3], np.array([3]))[0, :, :3]
-        way = p.outward_gain * (p.outward_distance - apart) * from_other / max(apart, 1e-9)
-        # damped: a stretched arm has directions in which its link 3 does not go
-        inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 0.01 * np.eye(3))
-        rates: FloatArray = np.concatenate([inverse @ way, np.zeros(len(links) - 5)])
-        return rates
-
-    def _distances(
-        self, links: list[FloatArray], person: Capsules | None
-    ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-        """Returns rows of distances' rates, distances (R,), the least of arms and of person."""
-        n = self.arms[0].count
-        placed = [shape.placed(x) for shape, x in zip(self.shapes, links, strict=True)]
-        rows, distances = [], []
-
-        def take(near: Clearance, sides: dict[int, int]) -> None:
-            close = near.distance < self.parameters.seen_distance
-            near = Clearance(
-                near.pair[close],
-                near.distance[close],
-                near.here[close],
-                near.there[close],
-                near.away[close],
-            )
-            row = np.zeros((len(near.distance), 2 * n + 2))
-            for i, side in sides.items():
-                row[:, i * n : i * n + n] = clearance_rates(
-                    near, self.arms[i], self.shapes[i], links[i], side
-                )
-            rows.append(row)
-            distances.append(near.distance)
-
-        both = clearance(placed[0], placed[1], self._pairs)
-        take(both, {0: 0, 1: 1})
-        beside = np.full(2, np.inf)
-        if person is not None and len(person.radius):
-            for i, shape in enumerate(self.shapes):
-                kept = np.flatnonzero(shape.link <= n - self.free_links)
-                near = clearance(placed[i], person, _pairs(kept, np.arange(len(person.radius))))
-                take(near, {i: 0})
-                beside[i] = near.distance.min()
-        return np.vstack(rows), np.concatenate(distances), float(both.distance.min()), beside
-
-    def _approach(self, distance: FloatArray, step: float) -> FloatArray:
-        """Returns (R,) the least rates of distances, m/s: from them an approach still stops."""
-        p = self.parameters
-        room = distance - p.least_distance
-        stops = np.sqrt(2.0 * p.approach_acceleration * np.maximum(room, 0.0))
-        inside = np.minimum(room, 0.0) / (10.0 * step)
-        least: FloatArray = -np.minimum(stops, np.maximum(room, 0.0) / step) - inside
-        return least
+            still = np.clip(0.0, low, high).reshape(q.shape)
+            return Rates(still, np.zeros(2), between, to_person, False)
+        found = np.clip(solution[:joints], low, high).reshape(q.shape)
+        return Rates(found, 1.0 - solution[joints:], between, to_person, True)
 
 
-def _pairs(first: IntArray, second: IntArray) -> IntArray:
-    """Returns (M,2) each of the one with each of the other."""
-    return np.stack([np.repeat(first, len(second)), np.tile(second, len(first))], axis=1)
+class _Arm(NamedTuple):
+    """An arm as kernels take it: of `SerialArm`, its limits, and `ArmShape`."""
+
+    base: FloatArray
+    joints: FloatArray
+    tool: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    first: FloatArray
+    second: FloatArray
+    radius: FloatArray
+    owner: npt.NDArray[np.int64]
+
+
+class _Gains(NamedTuple):
+    """`RateParameters` as kernels take them, in the same order."""
+
+    position_gain: float
+    rotation_gain: float
+    outward_gain: float
+    outward_distance: float
+    home_gain: float
+    max_turning: float
+    rotation_weight: float
+    slowdown_weight: float
+    least_distance: float
+    seen_distance: float
+    approach_acceleration: float
+
+
+def _compiled(arm: SerialArm, shape: ArmShape) -> _Arm:
+    limits, capsules = arm.limits, shape.capsules
+    of_arm = (arm.base, arm.joints, arm.tool)
+    of_limits = (limits.lower, limits.upper, limits.speed, limits.acceleration)
+    of_shape = (capsules.first, capsules.second, capsules.radius)
+    # one layout in memory, for which kernels are compiled once
+    plain = [np.ascontiguousarray(v, dtype=np.float64) for v in (*of_arm, *of_limits, *of_shape)]
+    owner = np.ascontiguousarray(shape.link, dtype=np.int64)
+    return _Arm._make([*plain, owner])
+
+
+@nb.njit(cache=True, nogil=True)
+def _programme(arms, home, p, q, rate, position, velocity, rotation, step, person, free_links):  # type: ignore[no-untyped-def]
+    """Returns the quadratic programme as DAQP takes it, and the least distances.
+
+    Its unknowns are the joints of left and right, and by how much each gripper is slower than
+    asked, as a share. Rows: the grippers' velocities (6), then the rates of distances.
+
+    position, velocity (2,3) and rotation (2,3,3) are of the goals; person is first (K,3), second
+    (K,3), radius (K,) of its capsules; the rest is of `ArmPair` and of `ArmPair.rates`.
+    """
+    n = q.shape[1]
+    size = 2 * n + 2
+    links = np.empty((2, n + 2, 4, 4))
+    for i in range(2):
+        links[i] = place_links(arms[i].base, arms[i].joints, arms[i].tool, q[i])
+    most = len(arms[0].radius) * len(arms[1].radius)
+    most += (len(arms[0].radius) + len(arms[1].radius)) * len(person[2])
+    cost, slope = np.zeros((size, size)), np.zeros(size)
+    rows = np.zeros((6 + most, size))
+    lower, upper = np.zeros(size + 6 + most), np.full(size + 6 + most, 1e30)
+    kinds = np.full(size + 6 + most, _SOFT, dtype=np.int32)
+    kinds[:size], kinds[size : size + 6] = _BOUND, _EQUAL
+    for i in range(2):
+        arm, own, slower = arms[i], slice(i * n, i * n + n), 2 * n + i
+        tool = links[i, n + 1]
+        jacobian = find_tool_jacobian(links[i])
+        turning = p.rotation_gain * find_rotation_error(tool[:3, :3], rotation[i])
+        turning *= min(1.0, p.max_turning / max(_length(turning), 1e-12))
+        turn = jacobian[3:]
+        cost[own, own] = np.eye(n) + p.rotation_weight * (turn.T @ turn)
+        slope[own] = p.home_gain * (q[i] - home[i]) - p.rotation_weight * (turn.T @ turning)
+        _add_outward(links[i], links[1 - i], p, slope[own])
+        cost[slower, slower] = p.slowdown_weight
+        for k in range(3):
+            asked = velocity[i, k] + p.position_gain * (position[i, k] - tool[k, 3])
+            rows[3 * i + k, own] = jacobian[k]
+            rows[3 * i + k, slower] = asked
+            lower[size + 3 * i + k] = upper[size + 3 * i + k] = asked
+        find_rate_bounds(
+            q[i],
+            rate[i],
+            step,
+            arm.lower,
+            arm.upper,
+            arm.speed,
+            arm.acceleration,
+            lower[own],
+            upper[own],
+        )
+        upper[slower] = 1.0
+    near, between, to_person = _keep_apart(
+        arms, links, person, free_links, p, step, rows[6:], lower[size + 6 :]
+    )
+    count = 6 + near
+    return (
+        cost,
+        slope,
+        rows[:count],
+        upper[: size + count],
+        lower[: size + count],
+        kinds[: size + count],
+        between,
+        to_person,
+    )
+
+
+@nb.njit(cache=True, nogil=True)
+def _add_outward(links, other, p, slope):  # type: ignore[no-untyped-def]
+    """Takes from `slope` (J,) the rates that move link 3 away from that of the other arm."""
+    way = links[3, :3, 3] - other[3, :3, 3]
+    apart = _length(way)
+    if apart >= p.outward_distance:
+        return
+    way *= p.outward_gain * (p.outward_distance - apart) / max(apart, 1e-9)
+    jacobian = np.zeros((3, len(slope)))
+    moved_by(links, links[3, :3, 3], 3, jacobian)
+    # damped: a stretched arm has directions in which its link 3 does not go
+    force = np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(3), way)
+    for j in range(len(slope)):
+        for k in range(3):
+            slope[j] -= jacobian[k, j] * force[k]
+
+
+@nb.njit(cache=True, nogil=True)
+def _keep_apart(arms, links, person, free_links, p, step, rows, least):  # type: ignore[no-untyped-def]
+    """Writes rows of distances that are seen; returns how many, and the least distances.
+
+    To rows (M,2J+2) go the rates of distances, to least (M,) the least rates, m/s, from which an
+    approach still stops; links (2,J+2,4,4); the rest is of `_programme`.
+    """
+    n = links.shape[1] - 2
+    count, between = 0, np.inf
+    to_person = np.full(2, np.inf)
+    here, there, away = np.empty(3), np.empty(3), np.empty(3)
+    left = np.empty((2, len(arms[0].radius), 3))
+    right = np.empty((2, len(arms[1].radius), 3))
+    place_capsules(links[0], arms[0].owner, arms[0].first, arms[0].second, left)
+    place_capsules(links[1], arms[1].owner, arms[1].first, arms[1].second, right)
+    for k in range(left.shape[1]):
+        for m in range(right.shape[1]):
+            apart = find_gap(left[0, k], left[1, k], right[0, m], right[1, m], here, there, away)
+            apart -= arms[0].radius[k] + arms[1].radius[m]
+            between = min(between, apart)
+            if apart < p.seen_distance:
+                find_gap_rates(links[0], here, arms[0].owner[k], away, 1.0, rows[count, :n])
+                owner = arms[1].owner[m]
+                find_gap_rates(links[1], there, owner, away, -1.0, rows[count, n : 2 * n])
+                least[count] = _approach(apart, p, step)
+                count += 1
+    first, second, radius = person
+    for i in range(2):
+        own, placed = slice(i * n, i * n + n), left if i == 0 else right
+        for k in range(placed.shape[1]):
+            if arms[i].owner[k] > n - free_links:
+                continue
+            for m in range(len(radius)):
+                apart = find_gap(placed[0, k], placed[1, k], first[m], second[m], here, there, away)
+                apart -= arms[i].radius[k] + radius[m]
+                to_person[i] = min(to_person[i], apart)
+                if apart < p.seen_distance:
+                    owner = arms[i].owner[k]
+                    find_gap_rates(links[i], here, owner, away, 1.0, rows[count, own])
+                    least[count] = _approach(apart, p, step)
+                    count += 1
+    return count, between, to_person
+
+
+@nb.njit(cache=True, nogil=True)
+def _approach(distance, p, step):  # type: ignore[no-untyped-def]
+    """Returns the least rate of a distance, m/s: from it an approach still stops."""
+    room = distance - p.least_distance
+    stops = np.sqrt(2.0 * p.approach_acceleration * max(room, 0.0))
+    inside = min(room, 0.0) / (10.0 * step)
+    return -min(stops, max(room, 0.0) / step) - inside
+
+
+@nb.njit(cache=True, nogil=True)
+def _length(v):  # type: ignore[no-untyped-def]
+    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)

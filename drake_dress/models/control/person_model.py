@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -25,6 +27,27 @@ class PersonModel:
     capsules: tuple[Capsule, ...]
     shoulders: FloatArray
     radius: tuple[float, float, float]
+
+    @cached_property
+    def torso(self) -> FloatArray:
+        """Ends (2,T,3), m, of the torso's capsules in its frame."""
+        ends = [(c.a_B, c.b_B) for c in self._of_torso]
+        return np.ascontiguousarray(np.array(ends).reshape(-1, 2, 3).swapaxes(0, 1))
+
+    @cached_property
+    def radii(self) -> FloatArray:
+        """Radii (K,), m, of all capsules, the torso's first."""
+        return np.array([c.radius for c in self._of_torso] + [*self.radius] * 2)
+
+    @cached_property
+    def neck(self) -> FloatArray:
+        """Middle of the shoulders (3,) in the torso's frame, m."""
+        middle: FloatArray = self.shoulders.mean(axis=0)
+        return middle
+
+    @property
+    def _of_torso(self) -> list[Capsule]:
+        return [c for c in self.capsules if c.body == "torso"]
 
 
 def person_obstacles(person: PersonModel, joints: FloatArray, time_step: float) -> list[Obstacles]:
@@ -58,14 +81,23 @@ def person_capsules(
         person: its shape.
         joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
     """
-    torso = [c for c in person.capsules if c.body == "torso"]
-    upper, fore, hand = person.radius
-    radius = np.array([c.radius for c in torso] + [upper, fore, hand] * 2)
-    turned = heading(joints).rotation
-    shift = 0.5 * (joints[0] + joints[3]) - turned @ person.shoulders.mean(axis=0)
-    a = [turned @ c.a_B + shift for c in torso]
-    b = [turned @ c.b_B + shift for c in torso]
-    for i in (0, 3):
-        a += [joints[i], joints[i + 1], joints[i + 2]]
-        b += [joints[i + 1], joints[i + 2], joints[i + 2]]
-    return np.array(a), np.array(b), radius
+    ends = np.empty((2, len(person.radii), 3))
+    _find_ends(heading(joints).rotation, person.torso, person.neck, joints, ends)
+    return ends[0], ends[1], person.radii
+
+
+@nb.njit(cache=True, nogil=True)
+def _find_ends(turned, torso, neck, joints, ends):  # type: ignore[no-untyped-def]
+    count = torso.shape[1]
+    for a in range(3):
+        shift = 0.5 * (joints[0, a] + joints[3, a])
+        for b in range(3):
+            shift -= turned[a, b] * neck[b]
+        for e in range(2):
+            for k in range(count):
+                ends[e, k, a] = shift
+                for b in range(3):
+                    ends[e, k, a] += turned[a, b] * torso[e, k, b]
+            for k in range(6):
+                # of an arm: upper arm, forearm, and the hand, which is a ball
+                ends[e, count + k, a] = joints[k + e if k % 3 < 2 else k, a]

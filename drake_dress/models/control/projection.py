@@ -12,6 +12,7 @@ a tenth of a millisecond.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numba as nb
@@ -20,6 +21,8 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
+# Kinds of sets in rows.
+HALF_SPACE, BALL = 0.0, 1.0
 # A point counts as inside a set up to this distance, in the unit of the points.
 TOLERANCE = 1e-11
 # Planes whose normals enclose a smaller angle count as parallel, rad.
@@ -37,9 +40,10 @@ class Ball:
         """Returns how far `point` (3,) lies outside; negative inside."""
         return float(np.linalg.norm(point - self.center)) - self.radius
 
-    def holds(self, other: Ball) -> bool:
-        """Returns whether all of another ball lies inside."""
-        return self.excess(other.center) + other.radius <= 0.0
+    @property
+    def row(self) -> FloatArray:
+        """As `find_nearest` takes it (5,)."""
+        return np.array([BALL, *self.center, self.radius])
 
 
 @dataclass(frozen=True)
@@ -53,13 +57,14 @@ class HalfSpace:
         """Returns how far `point` (3,) lies outside; negative inside."""
         return float(self.normal @ point) - self.offset
 
-    def holds(self, other: Ball) -> bool:
-        """Returns whether all of a ball lies inside."""
-        return self.excess(other.center) + other.radius <= 0.0
+    @property
+    def row(self) -> FloatArray:
+        """As `find_nearest` takes it (5,)."""
+        return np.array([HALF_SPACE, *self.normal, self.offset])
 
 
 def nearest(
-    point: FloatArray, balls: list[Ball], half_spaces: list[HalfSpace]
+    point: FloatArray, balls: Sequence[Ball], half_spaces: Sequence[HalfSpace]
 ) -> FloatArray | None:
     """Returns the point (3,) of all sets that is nearest to `point` (3,); None where none is.
 
@@ -71,58 +76,83 @@ def nearest(
         half_spaces: may be empty.
     """
     sets: list[Ball | HalfSpace] = [*balls, *half_spaces]
-    if all(s.excess(point) <= TOLERANCE for s in sets):
-        return point
-    smallest = min(balls, key=lambda ball: ball.radius)
-    balls = [smallest, *(ball for ball in balls if not ball.holds(smallest))]
-    half_spaces = [space for space in half_spaces if not space.holds(smallest)]
-    found, best = _search(
-        np.asarray(point, dtype=np.float64),
-        np.array([ball.center for ball in balls]),
-        np.array([ball.radius for ball in balls]),
-        np.array([space.normal for space in half_spaces]).reshape(-1, 3),
-        np.array([space.offset for space in half_spaces]),
-    )
-    return best if found else None
+    rows = np.array([s.row for s in sets])
+    out = np.empty(3)
+    found = find_nearest(np.asarray(point, dtype=np.float64), rows, out)
+    return out if found else None
 
 
 @nb.njit(cache=True, nogil=True)
-def _search(point, centers, radii, normals, offsets):  # type: ignore[no-untyped-def]
+def excess(row, point):  # type: ignore[no-untyped-def]
+    """Returns how far `point` (3,) lies outside of a set (5,); negative inside."""
+    if row[0] == BALL:
+        return (
+            np.sqrt((point[0] - row[1]) ** 2 + (point[1] - row[2]) ** 2 + (point[2] - row[3]) ** 2)
+            - row[4]
+        )
+    return row[1] * point[0] + row[2] * point[1] + row[3] * point[2] - row[4]
+
+
+@nb.njit(cache=True, nogil=True)
+def find_nearest(point, sets, out):  # type: ignore[no-untyped-def]
+    """Writes the point of all sets that is nearest to `point`; returns whether there is one.
+
+    Args:
+        point: (3,) finite.
+        sets: (S,5) a row each: BALL, its center, its radius, or HALF_SPACE, its normal, its
+            offset. There is one ball at least.
+        out: (3,) written; may be `point`.
+    """
+    inside = True
+    smallest = -1
+    for k in range(len(sets)):
+        inside = inside and excess(sets[k], point) <= TOLERANCE
+        if sets[k, 0] == BALL and (smallest < 0 or sets[k, 4] < sets[smallest, 4]):
+            smallest = k
+    if inside:
+        out[:] = point
+        return True
+    # a set that holds all of the smallest ball cuts nothing
+    kept, count = np.empty_like(sets), 1
+    kept[0] = sets[smallest]
+    for k in range(len(sets)):
+        if k != smallest and excess(sets[k], kept[0, 1:4]) + kept[0, 4] > 0.0:
+            kept[count] = sets[k]
+            count += 1
+    return _search(point.copy(), kept[:count], out)
+
+
+@nb.njit(cache=True, nogil=True)
+def _search(point, sets, out):  # type: ignore[no-untyped-def]
     """Tries every choice of boundaries; i, i, i is one, i, j, j are two."""
-    count = len(radii) + len(offsets)
-    best, least, found = np.zeros(3), np.inf, False
+    least, found = np.inf, False
     active = np.empty(3, dtype=np.int64)
     candidates = np.empty((2, 3))
-    for i in range(count):
-        for j in range(i, count):
-            for k in range(j, count):
+    for i in range(len(sets)):
+        for j in range(i, len(sets)):
+            for k in range(j, len(sets)):
                 if i == j and j != k:
                     continue
                 active[0], active[1], active[2] = i, j, k
                 size = 1 if i == k else (2 if j == k else 3)
-                for c in range(
-                    _stationary(point, active[:size], centers, radii, normals, offsets, candidates)
-                ):
+                for c in range(_stationary(point, active[:size], sets, candidates)):
                     x = candidates[c]
                     away = np.sqrt(np.sum((x - point) ** 2))
-                    if away < least and _inside(x, centers, radii, normals, offsets):
-                        best[:], least, found = x, away, True
-    return found, best
+                    if away < least and _inside(x, sets):
+                        out[:], least, found = x, away, True
+    return found
 
 
 @nb.njit(cache=True, nogil=True)
-def _inside(x, centers, radii, normals, offsets):  # type: ignore[no-untyped-def]
-    for i in range(len(radii)):
-        if np.sqrt(np.sum((x - centers[i]) ** 2)) > radii[i] + TOLERANCE:
-            return False
-    for i in range(len(offsets)):
-        if np.sum(normals[i] * x) > offsets[i] + TOLERANCE:
+def _inside(x, sets):  # type: ignore[no-untyped-def]
+    for k in range(len(sets)):
+        if excess(sets[k], x) > TOLERANCE:
             return False
     return True
 
 
 @nb.njit(cache=True, nogil=True)
-def _stationary(point, active, centers, radii, normals, offsets, out):  # type: ignore[no-untyped-def]
+def _stationary(point, active, sets, out):  # type: ignore[no-untyped-def]
     """Writes the points nearest to `point` where boundaries meet to `out` (2,3); returns how many.
 
     The planes are made orthonormal one by one: q · x = e.
@@ -130,19 +160,19 @@ def _stationary(point, active, centers, radii, normals, offsets, out):  # type: 
     q, e, planes = np.empty((3, 3)), np.empty(3), 0
     sphere = -1
     for s in active:
-        if s >= len(radii):
-            normal, offset = normals[s - len(radii)].copy(), offsets[s - len(radii)]
+        if sets[s, 0] == HALF_SPACE:
+            normal, offset = sets[s, 1:4].copy(), sets[s, 4]
         elif sphere < 0:
             sphere = s
             continue
         else:
-            between = centers[s] - centers[sphere]
+            between = sets[s, 1:4] - sets[sphere, 1:4]
             apart = np.sqrt(np.sum(between**2))
             if apart < TOLERANCE:
                 return 0
             normal = between / apart
-            along = 0.5 * (apart + (radii[sphere] ** 2 - radii[s] ** 2) / apart)
-            offset = np.sum(normal * centers[sphere]) + along
+            along = 0.5 * (apart + (sets[sphere, 4] ** 2 - sets[s, 4] ** 2) / apart)
+            offset = np.sum(normal * sets[sphere, 1:4]) + along
         for p in range(planes):
             share = np.sum(normal * q[p])
             normal -= share * q[p]
@@ -159,11 +189,11 @@ def _stationary(point, active, centers, radii, normals, offsets, out):  # type: 
     if sphere < 0:
         out[0] = foot
         return 1
-    middle = centers[sphere].copy()
+    middle = sets[sphere, 1:4].copy()
     for p in range(planes):
         middle -= (np.sum(q[p] * middle) - e[p]) * q[p]
-    radius = radii[sphere]
-    squared = radius**2 - np.sum((middle - centers[sphere]) ** 2)
+    radius = sets[sphere, 4]
+    squared = radius**2 - np.sum((middle - sets[sphere, 1:4]) ** 2)
     if squared < -TOLERANCE * radius:
         return 0
     reach = np.sqrt(max(0.0, squared))

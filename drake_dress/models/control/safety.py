@@ -55,13 +55,16 @@ moves is not known here: who comes nearer is let come, and the gripper gives way
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntFlag
+from functools import cached_property
+from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.models.control.projection import Ball, HalfSpace, nearest
+from drake_dress.models.control.projection import BALL, HALF_SPACE, excess, find_nearest
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -72,6 +75,10 @@ _ABSURD = 10.0
 _RETURN_TIME = 0.1
 # Stamps may be off by this, s: rounding of clocks that count periods.
 _CLOCK_ROUNDING = 1e-6
+# Numbers beyond this are over any limit, and their squares must not overflow.
+_LARGEST = 1e6
+# Of the force, the person, both distances, six walls, the lead.
+_MOST_SPACES = 11
 
 
 class Verdict(IntFlag):
@@ -160,6 +167,15 @@ class SafetyLimits:
         if self.workspace is not None and not np.all(self.workspace[0] < self.workspace[1]):
             raise ValueError("workspace's low corner is not below its high corner")
 
+    @cached_property
+    def compiled(self) -> Limits:
+        """As kernels take them."""
+        workspace = self.workspace
+        if workspace is None:
+            workspace = np.array([[-np.inf] * 3, [np.inf] * 3])
+        scalars = [float(getattr(self, f.name)) for f in fields(self) if f.name != "workspace"]
+        return Limits._make([*scalars, np.ascontiguousarray(workspace, dtype=np.float64)])
+
     def broken_at(self, position: FloatArray) -> str | None:
         """Returns what is wrong with grippers at `position` (2,3), m; None if nothing is."""
         apart = float(np.linalg.norm(position[0] - position[1]))
@@ -172,6 +188,27 @@ class SafetyLimits:
                 if not np.all((low_corner <= p) & (p <= high_corner)):
                     return f"gripper at {np.round(p, 3).tolist()} m is outside the workspace"
         return None
+
+
+class Limits(NamedTuple):
+    """`SafetyLimits` as kernels take them; a workspace without borders is infinite."""
+
+    max_speed: float
+    max_acceleration: float
+    max_braking: float
+    soft_force: float
+    hard_force: float
+    filter_time: float
+    yield_rate: float
+    yield_speed: float
+    relax_speed: float
+    stop_time: float
+    max_lead: float
+    stale_time: float
+    person_distance: float
+    least_distance: float
+    largest_distance: float
+    workspace: FloatArray
 
 
 @dataclass(frozen=True)
@@ -271,261 +308,342 @@ def step(
         permitted: whether the station lets grippers move; they yield to force in any case.
         skin: where the person is seen; finite. None: not seen.
     """
-    entries = np.hstack([measured.position, measured.force])
-    seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(entries).all(axis=1))
-    force = _low_passed(state.force, measured.force, seen, limits, dt)
-    size = np.linalg.norm(force, axis=1)
-    # counted down as it is counted up: a force that chatters about the limit counts, too
-    change = np.where(size > limits.hard_force, dt, -dt)
-    over = np.where(seen, np.maximum(0.0, state.over + change), state.over)
-    stopped = bool(state.stopped or np.any(over >= limits.stop_time))
-    if stopped and np.all(seen) and np.all(size < limits.soft_force):
+    distance = np.full(2, np.nan) if skin is None else skin.distance
+    away = np.zeros((2, 3)) if skin is None else skin.away
+    after = np.empty(GovernorState.SIZE)
+    verdicts = np.empty(2, dtype=np.int64)
+    _govern(
+        state.packed(),
+        np.ascontiguousarray(request.velocity, dtype=np.float64),
+        float(request.stamp),
+        np.ascontiguousarray(measured.position, dtype=np.float64),
+        np.ascontiguousarray(measured.force, dtype=np.float64),
+        limits.compiled,
+        float(now),
+        float(dt),
+        bool(permitted),
+        np.ascontiguousarray(distance, dtype=np.float64),
+        np.ascontiguousarray(away, dtype=np.float64),
+        after,
+        verdicts,
+    )
+    return GovernorState.unpacked(after), (Verdict(int(verdicts[0])), Verdict(int(verdicts[1])))
+
+
+# Compiled code knows flags as numbers.
+_SPEED, _ACCELERATION, _FORCE, _LEAD, _WORKSPACE, _DISTANCE = (
+    int(v)
+    for v in (
+        Verdict.SPEED,
+        Verdict.ACCELERATION,
+        Verdict.FORCE,
+        Verdict.LEAD,
+        Verdict.WORKSPACE,
+        Verdict.DISTANCE,
+    )
+)
+_STALE, _INVALID, _UNMEASURED, _STOPPED, _BRAKING, _HELD, _PERSON = (
+    int(v)
+    for v in (
+        Verdict.STALE,
+        Verdict.INVALID,
+        Verdict.UNMEASURED,
+        Verdict.STOPPED,
+        Verdict.BRAKING,
+        Verdict.HELD,
+        Verdict.PERSON,
+    )
+)
+
+
+@nb.njit(cache=True, nogil=True)
+def _govern(  # type: ignore[no-untyped-def]
+    state,
+    asked,
+    stamp,
+    measured_position,
+    measured_force,
+    limits,
+    now,
+    dt,
+    permitted,
+    skin_distance,
+    skin_away,
+    after,
+    verdicts,
+):
+    """Writes the packed state `after` (22,) and verdicts (2,); the rest as of `step`.
+
+    A skin_distance (2,) that is NaN tells nothing.
+    """
+    position, last = state[:6].reshape(2, 3), state[6:12].reshape(2, 3)
+    force = state[12:18].reshape(2, 3).copy()
+    over, stopped = state[18:20].copy(), state[20] > 0.5
+    seen, size = np.empty(2, dtype=np.bool_), np.empty(2)
+    relaxed = True
+    for i in range(2):
+        seen[i] = np.isfinite(measured_position[i]).all() and np.isfinite(measured_force[i]).all()
+        if seen[i]:
+            _low_pass(force[i], measured_force[i], limits, dt)
+        size[i] = _length(force[i])
+        relaxed = relaxed and size[i] < limits.soft_force
+        if seen[i]:
+            # counted down as it is counted up: a force that chatters about the limit counts, too
+            over[i] = max(0.0, over[i] + (dt if size[i] > limits.hard_force else -dt))
+        stopped = stopped or over[i] >= limits.stop_time
+    both_seen = seen[0] and seen[1]
+    if both_seen and relaxed:
         stopped = False
 
-    fault = _request_fault(state, request, limits, now)
+    fault = _request_fault(state[21], asked, stamp, limits, now)
     if not permitted:
-        fault |= Verdict.HELD
-    both = fault | (Verdict.STOPPED if stopped else Verdict.NONE)
-    velocity = np.empty((2, 3))
-    verdicts = []
-    for i in (0, 1):
-        verdict = both | (Verdict.NONE if seen[i] else Verdict.UNMEASURED)
-        must_stop = stopped or not np.all(seen)
-        wanted = np.zeros(3) if fault or must_stop else request.velocity[i]
-        reach = _time_to_rest(state.velocity[i], limits, dt)
-        spaces: list[tuple[Verdict, Ball | HalfSpace | None]] = []
-        pull = _force_limit(force[i], wanted, limits, stopped) if seen[i] else None
+        fault |= _HELD
+    must_stop = stopped or not both_seen
+    sets, kinds = np.empty((_MOST_SPACES + 2, 5)), np.empty(_MOST_SPACES, dtype=np.int64)
+    for i in range(2):
+        verdict = fault | (_STOPPED if stopped else 0) | (0 if seen[i] else _UNMEASURED)
+        wanted = np.zeros(3)
+        if fault == 0 and not must_stop:
+            wanted[:] = asked[i]
+        reach = _time_to_rest(last[i], limits, dt)
+        # two balls stand before what follows (`_governed`)
+        spaces, count = sets[2:], 0
+        pulled = seen[i] and size[i] > limits.soft_force
         relaxing = stopped and size[i] < limits.hard_force
-        if not relaxing:
-            spaces.append((Verdict.FORCE, pull))
-        if skin is not None:
-            spaces.append((Verdict.PERSON, _person_limit(skin, i, limits, dt)))
-        spaces += _distance_limits(state.position, i, reach, limits, dt)
-        spaces += _workspace_limits(state.position[i], limits, dt)
+        if pulled and not relaxing:
+            _limit_force(force[i], size[i], wanted, limits, stopped, spaces[count])
+            kinds[count] = _FORCE
+            count += 1
+        if limits.person_distance > 0.0 and not np.isnan(skin_distance[i]):
+            room = skin_distance[i] - limits.person_distance
+            spaces[count, 0], spaces[count, 1:4] = HALF_SPACE, -skin_away[i]
+            spaces[count, 4] = (
+                _returning(room, limits.yield_speed) if room < 0.0 else _stoppable(room, limits, dt)
+            )
+            kinds[count] = _PERSON
+            count += 1
+        before = count
+        count = _limit_distance(position[i], position[1 - i], reach, limits, dt, spaces, count)
+        kinds[before:count] = _DISTANCE
+        before = count
+        count = _limit_place(position[i], limits, dt, spaces, count)
+        kinds[before:count] = _WORKSPACE
         if seen[i]:
-            lead = state.position[i] - np.clip(measured.position[i], -1e6, 1e6)
-            spaces.append((Verdict.LEAD, _kept_within(limits.max_lead, lead, reach, limits)))
-        if relaxing:
-            spaces.append((Verdict.FORCE, pull))
-        velocity[i], cut = _governed(
-            wanted,
-            state.velocity[i],
-            [(kind, space) for kind, space in spaces if space is not None],
-            limits,
-            dt,
-            must_stop,
+            lead = position[i] - np.minimum(np.maximum(measured_position[i], -_LARGEST), _LARGEST)
+            _keep_within(limits.max_lead, lead, reach, limits, spaces[count])
+            kinds[count] = _LEAD
+            count += 1
+        if pulled and relaxing:
+            _limit_force(force[i], size[i], wanted, limits, stopped, spaces[count])
+            kinds[count] = _FORCE
+            count += 1
+        velocity = after[6 + 3 * i : 9 + 3 * i]
+        verdicts[i] = verdict | _governed(
+            wanted, last[i], sets[: 2 + count], kinds, limits, dt, must_stop, velocity
         )
-        verdicts.append(verdict | cut)
-    after = GovernorState(
-        state.position + dt * velocity,
-        velocity,
-        force,
-        over,
-        stopped,
-        state.stamp if fault else max(state.stamp, request.stamp),
-    )
-    return after, (verdicts[0], verdicts[1])
+        after[3 * i : 3 * i + 3] = position[i] + dt * velocity
+        after[12 + 3 * i : 15 + 3 * i] = force[i]
+        after[18 + i] = over[i]
+    after[20] = 1.0 if stopped else 0.0
+    after[21] = state[21] if fault != 0 else max(state[21], stamp)
 
 
-def _request_fault(
-    state: GovernorState, request: Request, limits: SafetyLimits, now: float
-) -> Verdict:
-    fault = Verdict.NONE
+@nb.njit(cache=True, nogil=True)
+def _request_fault(obeyed, velocity, stamp, limits, now):  # type: ignore[no-untyped-def]
+    fault = 0
     largest = _ABSURD * limits.max_speed
-    # compared entry by entry: squares of large numbers overflow
-    if not np.all(np.isfinite(request.velocity)) or np.abs(request.velocity).max() > largest:
-        fault |= Verdict.INVALID
-    age = now - request.stamp
-    in_order = request.stamp >= state.stamp - _CLOCK_ROUNDING
-    if not (-_CLOCK_ROUNDING <= age <= limits.stale_time + _CLOCK_ROUNDING and in_order):
-        fault |= Verdict.STALE
+    for v in velocity.flat:
+        # compared entry by entry: squares of large numbers overflow; NaN is no number
+        if not abs(v) <= largest:
+            fault |= _INVALID
+    age = now - stamp
+    in_time = age >= -_CLOCK_ROUNDING and age <= limits.stale_time + _CLOCK_ROUNDING
+    if not (in_time and stamp >= obeyed - _CLOCK_ROUNDING):
+        fault |= _STALE
     return fault
 
 
-def _low_passed(
-    last: FloatArray,
-    measured: FloatArray,
-    seen: npt.NDArray[np.bool_],
-    limits: SafetyLimits,
-    dt: float,
-) -> FloatArray:
-    """Returns the force (2,3) that is answered to, N: as measured where it is over the limit."""
-    force = last.copy()
+@nb.njit(cache=True, nogil=True)
+def _low_pass(force, measured, limits, dt):  # type: ignore[no-untyped-def]
+    """Updates the force (3,) that is answered to, N: as measured where it is over the limit."""
     share = min(1.0, dt / limits.filter_time) if limits.filter_time > 0.0 else 1.0
-    # numbers beyond this are over any limit, and their squares must not overflow
-    bounded = np.clip(measured, -1e6, 1e6)
-    for i in (0, 1):
-        if not seen[i]:
-            continue
-        if np.linalg.norm(bounded[i]) >= limits.hard_force:
-            force[i] = bounded[i]
-        else:
-            force[i] += share * (bounded[i] - force[i])
-    return force
+    bounded = np.minimum(np.maximum(measured, -_LARGEST), _LARGEST)
+    if _length(bounded) >= limits.hard_force:
+        share = 1.0
+    for a in range(3):
+        force[a] = bounded[a] if share == 1.0 else force[a] + share * (bounded[a] - force[a])
 
 
-def _force_limit(
-    force: FloatArray, wanted: FloatArray, limits: SafetyLimits, stopped: bool
-) -> HalfSpace | None:
-    size = float(np.linalg.norm(force))
-    if size <= limits.soft_force:
-        return None
+@nb.njit(cache=True, nogil=True)
+def _limit_force(force, size, wanted, limits, stopped, space):  # type: ignore[no-untyped-def]
+    """Writes the half-space (5,) of a force (3,) over the soft limit."""
     pull = -force / size
     giving_way = min(limits.yield_speed, limits.yield_rate * max(0.0, size - limits.hard_force))
+    space[0], space[1:4] = HALF_SPACE, pull
     if stopped:
-        return HalfSpace(pull, -max(limits.relax_speed, giving_way))
+        space[4] = -max(limits.relax_speed, giving_way)
+        return
     left = max(0.0, (limits.hard_force - size) / (limits.hard_force - limits.soft_force))
-    return HalfSpace(pull, left * max(0.0, float(pull @ wanted)) - giving_way)
+    space[4] = left * max(0.0, _dot(pull, wanted)) - giving_way
 
 
-def _person_limit(skin: Skin, i: int, limits: SafetyLimits, dt: float) -> HalfSpace | None:
-    if limits.person_distance <= 0.0:
-        return None
-    room = float(skin.distance[i]) - limits.person_distance
-    if room < 0.0:
-        return HalfSpace(-skin.away[i], _returning(room, limits.yield_speed))
-    return HalfSpace(-skin.away[i], _stoppable(room, limits, dt))
+@nb.njit(cache=True, nogil=True)
+def _limit_distance(position, other, reach, limits, dt, spaces, count):  # type: ignore[no-untyped-def]
+    """Writes the limits of one gripper against the other: each has half of what is left.
 
-
-def _distance_limits(
-    position: FloatArray, i: int, reach: float, limits: SafetyLimits, dt: float
-) -> list[tuple[Verdict, Ball | HalfSpace | None]]:
-    """Returns the limits of one gripper against the other: each has half of what is left."""
-    away = position[i] - position[1 - i]
-    apart = float(np.linalg.norm(away))
-    spaces: list[tuple[Verdict, Ball | HalfSpace | None]] = []
+    Returns how many spaces there are then.
+    """
+    away = position - other
+    apart = _length(away)
     if limits.least_distance > 0.0 and apart > 1e-9:
         closing = _stoppable(apart - limits.least_distance, limits, dt)
-        spaces.append((Verdict.DISTANCE, HalfSpace(-away / apart, 0.5 * closing)))
+        spaces[count, 0], spaces[count, 1:4] = HALF_SPACE, -away / apart
+        spaces[count, 4] = 0.5 * closing
+        count += 1
     if np.isfinite(limits.largest_distance):
         # both within half of it from their middle
-        half = 0.5 * limits.largest_distance
-        spaces.append((Verdict.DISTANCE, _kept_within(half, 0.5 * away, reach, limits)))
-    return spaces
+        _keep_within(0.5 * limits.largest_distance, 0.5 * away, reach, limits, spaces[count])
+        count += 1
+    return count
 
 
-def _workspace_limits(
-    position: FloatArray, limits: SafetyLimits, dt: float
-) -> list[tuple[Verdict, Ball | HalfSpace | None]]:
-    if limits.workspace is None:
-        return []
-    low, high = limits.workspace
-    spaces: list[tuple[Verdict, Ball | HalfSpace | None]] = []
-    for axis, unit in enumerate(np.eye(3)):
-        for normal, room in (
-            (unit, high[axis] - position[axis]),
-            (-unit, position[axis] - low[axis]),
-        ):
-            speed = _stoppable(float(room), limits, dt)
-            spaces.append((Verdict.WORKSPACE, HalfSpace(normal, speed)))
-    return spaces
+@nb.njit(cache=True, nogil=True)
+def _limit_place(position, limits, dt, spaces, count):  # type: ignore[no-untyped-def]
+    """Writes the half-spaces of the workspace; returns how many spaces there are then."""
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            border = limits.workspace[1 if sign > 0.0 else 0, axis]
+            if not np.isfinite(border):
+                continue
+            spaces[count, 0], spaces[count, 1:4] = HALF_SPACE, 0.0
+            spaces[count, 1 + axis] = sign
+            spaces[count, 4] = _stoppable(sign * (border - position[axis]), limits, dt)
+            count += 1
+    return count
 
 
-def _kept_within(
-    radius: float, offset: FloatArray, reach: float, limits: SafetyLimits
-) -> Ball | HalfSpace:
-    """Returns the limit by which an offset (3,), m, stays in a ball until it has come to rest.
+@nb.njit(cache=True, nogil=True)
+def _keep_within(radius, offset, reach, limits, space):  # type: ignore[no-untyped-def]
+    """Writes the limit by which an offset (3,), m, stays in a ball until it has come to rest.
 
     Outside, back into it, slowly.
     """
-    distance = float(np.linalg.norm(offset))
+    distance = _length(offset)
     if distance <= radius:
-        return Ball(-offset / reach, radius / reach)
-    return HalfSpace(offset / distance, _returning(radius - distance, limits.relax_speed))
+        space[0], space[1:4], space[4] = BALL, -offset / reach, radius / reach
+    else:
+        space[0], space[1:4] = HALF_SPACE, offset / distance
+        space[4] = _returning(radius - distance, limits.relax_speed)
 
 
-def _time_to_rest(velocity: FloatArray, limits: SafetyLimits, dt: float) -> float:
+@nb.njit(cache=True, nogil=True)
+def _time_to_rest(velocity, limits, dt):  # type: ignore[no-untyped-def]
     """Returns τ, s: a command that brakes after this step moves on by τ v at most."""
     slowed = limits.max_acceleration * dt
-    fastest = min(limits.max_speed, float(np.linalg.norm(velocity)) + slowed)
+    fastest = min(limits.max_speed, _length(velocity) + slowed)
     return dt + fastest / (2.0 * limits.max_acceleration)
 
 
-def _stoppable(room: float, limits: SafetyLimits, dt: float) -> float:
+@nb.njit(cache=True, nogil=True)
+def _stoppable(room, limits, dt):  # type: ignore[no-untyped-def]
     """Returns the speed from which one stops within `room`, m/s; negative to go back into it."""
     if room < 0.0:
         return _returning(room, limits.relax_speed)
     slowed = limits.max_acceleration * dt
-    return float(np.sqrt(slowed**2 + 2.0 * limits.max_acceleration * room) - slowed)
+    return np.sqrt(slowed**2 + 2.0 * limits.max_acceleration * room) - slowed
 
 
-def _returning(room: float, speed: float) -> float:
+@nb.njit(cache=True, nogil=True)
+def _returning(room, speed):  # type: ignore[no-untyped-def]
     return max(room / _RETURN_TIME, -speed)
 
 
-def _governed(
-    wanted: FloatArray,
-    last: FloatArray,
-    spaces: list[tuple[Verdict, Ball | HalfSpace]],
-    limits: SafetyLimits,
-    dt: float,
-    must_stop: bool,
-) -> tuple[FloatArray, Verdict]:
-    """Returns the velocity (3,) nearest to `wanted` within all limits, and what they cut."""
-    cut = Verdict.NONE
-    if np.linalg.norm(wanted) > limits.max_speed * (1.0 + 1e-9):
-        cut |= Verdict.SPEED
-    if np.linalg.norm(wanted - last) > limits.max_acceleration * dt * (1.0 + 1e-9):
-        cut |= Verdict.ACCELERATION
-    for kind, space in spaces:
-        if space.excess(wanted) > 1e-9:
-            cut |= kind
+@nb.njit(cache=True, nogil=True)
+def _governed(wanted, last, sets, kinds, limits, dt, must_stop, out):  # type: ignore[no-untyped-def]
+    """Writes the velocity (3,) nearest to `wanted` within all limits to `out`; returns the cuts.
 
-    balls = [s for _, s in spaces if isinstance(s, Ball)]
-    half_spaces = [s for _, s in spaces if isinstance(s, HalfSpace)]
-    speed = Ball(np.zeros(3), limits.max_speed)
-    ordinary = Ball(last, limits.max_acceleration * dt)
-    braking = Ball(last, limits.max_braking * dt)
-    found = None if must_stop else nearest(wanted, [speed, ordinary, *balls], half_spaces)
-    if found is None:
-        found = nearest(wanted, [speed, braking, *balls], half_spaces)
-        if found is None:
-            found = _as_far_as_it_goes(wanted, last, [speed, braking], [s for _, s in spaces])
-        if np.linalg.norm(found - last) > ordinary.radius * (1.0 + 1e-9):
-            cut |= Verdict.BRAKING
-    return _within(found, last, limits.max_speed, braking.radius), cut
+    last (3,) is of the step before; sets (2+S,5) are rows of `projection.find_nearest`, of which
+    the first two are written here; kinds (S,) flags of the others.
+    """
+    cut = 0
+    slowed, braked = limits.max_acceleration * dt, limits.max_braking * dt
+    if _length(wanted) > limits.max_speed * (1.0 + 1e-9):
+        cut |= _SPEED
+    if _length(wanted - last) > slowed * (1.0 + 1e-9):
+        cut |= _ACCELERATION
+    for k in range(2, len(sets)):
+        if excess(sets[k], wanted) > 1e-9:
+            cut |= kinds[k - 2]
+
+    sets[:2, 0] = BALL
+    sets[0, 1:4], sets[0, 4] = 0.0, limits.max_speed
+    sets[1, 1:4], sets[1, 4] = last, slowed
+    if must_stop or not find_nearest(wanted, sets, out):
+        sets[1, 4] = braked
+        if not find_nearest(wanted, sets, out):
+            _go_as_far_as_it_goes(wanted, last, sets, out)
+        if _length(out - last) > slowed * (1.0 + 1e-9):
+            cut |= _BRAKING
+    _draw_within(out, last, limits.max_speed, braked)
+    return cut
 
 
-def _as_far_as_it_goes(
-    wanted: FloatArray, last: FloatArray, hard: list[Ball], limits: list[Ball | HalfSpace]
-) -> FloatArray:
-    """Returns the best velocity where not all limits can be kept; the first counts most.
+@nb.njit(cache=True, nogil=True)
+def _go_as_far_as_it_goes(wanted, last, sets, out):  # type: ignore[no-untyped-def]
+    """Writes the best velocity (3,) where not all limits can be kept; the first counts most.
 
     Each is moved just so far that it meets the sets before it; a ball is replaced by the half-space
-    that faces `last`. `last` is in all `hard` ones.
+    that faces `last`. `last` is in the first two.
     """
-    kept: list[HalfSpace] = []
-    witness = last
-    for limit in limits:
-        space = limit if isinstance(limit, HalfSpace) else _facing(limit, last)
+    kept, witness, lowest = sets.copy(), last.copy(), np.empty(3)
+    for k in range(2, len(sets)):
+        if sets[k, 0] == BALL:
+            _face(sets[k], last, kept[k])
+        normal = kept[k, 1:4]
         # the nearest point to one far down the normal is the lowest along it
-        far = witness - space.normal * (100.0 * hard[-1].radius)
-        lowest = nearest(far, hard, kept)
-        if lowest is None:
-            lowest = witness
-        kept.append(HalfSpace(space.normal, max(space.offset, float(space.normal @ lowest))))
-        met = nearest(witness, hard, kept)
-        witness = lowest if met is None else met
-    found = nearest(wanted, hard, kept)
-    return witness if found is None else found
+        far = witness - normal * (100.0 * sets[1, 4])
+        if not find_nearest(far, kept[:k], lowest):
+            lowest[:] = witness
+        kept[k, 4] = max(kept[k, 4], _dot(normal, lowest))
+        if not find_nearest(witness, kept[: k + 1], witness):
+            witness[:] = lowest
+    if not find_nearest(wanted, kept, out):
+        out[:] = witness
 
 
-def _facing(ball: Ball, point: FloatArray) -> HalfSpace:
-    """Returns the half-space that holds the ball and touches it on the side of `point` (3,)."""
-    toward = point - ball.center
-    size = float(np.linalg.norm(toward))
-    normal = toward / size if size > 1e-12 else np.array([0.0, 0.0, 1.0])
-    return HalfSpace(normal, float(normal @ ball.center) + ball.radius)
+@nb.njit(cache=True, nogil=True)
+def _face(ball, point, half_space):  # type: ignore[no-untyped-def]
+    """Writes the half-space that holds the ball and touches it on the side of `point` (3,)."""
+    toward = point - ball[1:4]
+    size = _length(toward)
+    half_space[0] = HALF_SPACE
+    if size > 1e-12:
+        half_space[1:4] = toward / size
+    else:
+        half_space[1:3], half_space[3] = 0.0, 1.0
+    half_space[4] = _dot(half_space[1:4], ball[1:4]) + ball[4]
 
 
-def _within(velocity: FloatArray, last: FloatArray, speed: float, change: float) -> FloatArray:
-    """Returns the velocity with both hard limits kept in spite of rounding; `last` keeps them.
+@nb.njit(cache=True, nogil=True)
+def _draw_within(velocity, last, speed, change):  # type: ignore[no-untyped-def]
+    """Keeps both hard limits of the velocity (3,) in spite of rounding; `last` keeps them.
 
     Drawing back toward the origin does not lead away from `last`: both are in the ball of speed.
     """
     moved = velocity - last
-    size = float(np.linalg.norm(moved))
+    size = _length(moved)
     if size > change:
-        velocity = last + moved * (change / size)
-    size = float(np.linalg.norm(velocity))
-    return velocity * (speed / size) if size > speed else velocity
+        velocity[:] = last + moved * (change / size)
+    size = _length(velocity)
+    if size > speed:
+        velocity *= speed / size
+
+
+@nb.njit(cache=True, nogil=True)
+def _length(v):  # type: ignore[no-untyped-def]
+    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+
+
+@nb.njit(cache=True, nogil=True)
+def _dot(u, v):  # type: ignore[no-untyped-def]
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
