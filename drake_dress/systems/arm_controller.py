@@ -92,6 +92,13 @@ class ArmController(LeafSystem):
                 name, rows.stop - rows.start, self._show(self._shown, rows), ticket
             )
         self.DeclarePeriodicDiscreteUpdateEvent(period, offset, self._update)
+        # compiled now and not in the first cycle, which must not wait for seconds
+        left, right = (
+            GripperGoal(arm.tool_position(q), np.zeros(3), r)
+            for arm, q, r in zip(arms.arms, start, self._rotation, strict=True)
+        )
+        nobody = Capsules(*person_capsules(person, np.zeros((6, 3))))
+        arms.rates(start, np.zeros((2, 7)), (left, right), period, nobody)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         state = context.get_discrete_state(self._joints).value()

@@ -49,6 +49,8 @@ class ArmMeasurement(LeafSystem):
     def __init__(self, arms: Sequence[SerialArm]) -> None:
         super().__init__()
         self._arms = list(arms)
+        # compiled now and not in the first cycle, which must not wait for seconds
+        gripper_motion(self._arms[0], *np.zeros((3, 7)))
         for side in SIDES:
             for name in ("position", "velocity", "torque_external"):
                 self.DeclareVectorInputPort(f"{side}_{name}", 7)

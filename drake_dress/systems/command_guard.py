@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from drake_dress.models.arm.chain import JointLimits
-from drake_dress.models.arm.command_guard import DriveState, Stop, follow
+from drake_dress.models.arm.command_guard import DriveState, follow
 
 
 class CommandGuard(LeafSystem):
@@ -54,8 +54,7 @@ class CommandGuard(LeafSystem):
         for name in self._given:
             self.DeclareVectorInputPort(name, 7)
         self.DeclareVectorInputPort("fresh", 1)
-        # position, velocity, stop, last command, its age
-        self._state = self.DeclareDiscreteState(np.concatenate([start, np.zeros(8), start, [0.0]]))
+        self._state = self.DeclareDiscreteState(DriveState.at_rest(start).packed())
         ticket = {self.discrete_state_ticket(self._state)}
         for name, rows in (
             ("desired_state", slice(0, 14)),
@@ -65,27 +64,22 @@ class CommandGuard(LeafSystem):
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), ticket)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        # compiled now and not in the first cycle, which must not wait for seconds
+        follow(DriveState.at_rest(start), start, np.zeros(7), True, limits, period)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         values = context.get_discrete_state(self._state).value()
         given = {name: self.GetInputPort(name).Eval(context) for name in self._given}
         fresh = self.GetInputPort("fresh")
         after = follow(
-            DriveState(
-                values[:7], values[7:14], Stop(int(values[14])), values[15:22], float(values[22])
-            ),
+            DriveState.unpacked(values),
             given.get("position"),
             given.get("velocity"),
             not fresh.HasValue(context) or bool(fresh.Eval(context)[0] > 0.5),
             self._limits,
             self._period,
         )
-        discrete.set_value(
-            self._state,
-            np.concatenate(
-                [after.position, after.velocity, [float(after.stop)], after.command, [after.age]]
-            ),
-        )
+        discrete.set_value(self._state, after.packed())
 
     def _show(self, rows: slice):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:

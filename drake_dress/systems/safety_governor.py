@@ -98,6 +98,8 @@ class SafetyGovernor(LeafSystem):
         # compiled now and not when something is first cut, which must not wait half a second
         too_fast = Request(np.full((2, 3), limits.max_speed), 0.0)
         step(GovernorState(start), too_fast, Measurement(start, 0.0 * start), limits, 0.0, period)
+        if person is not None:
+            _beside(person, np.zeros((6, 3)), start)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         def of_both(name: str) -> np.ndarray:
@@ -128,10 +130,7 @@ class SafetyGovernor(LeafSystem):
         seen = joints.Eval(context).reshape(6, 3)
         if not np.isfinite(seen).all():
             return None
-        near = find_proximity(
-            position, Obstacles.resting(*person_capsules(self._person, seen)), 0.0
-        )
-        return Skin(near.gap, near.normal)
+        return _beside(self._person, seen, position)
 
     def _show(self, rows: slice):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
@@ -141,3 +140,9 @@ class SafetyGovernor(LeafSystem):
 
     def _calc_verdict(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state(self._verdict).value())
+
+
+def _beside(person: PersonModel, joints: np.ndarray, position: np.ndarray) -> Skin:
+    """Returns the person whose joints (6,3) are seen next to `position` (2,3), m."""
+    near = find_proximity(position, Obstacles.resting(*person_capsules(person, joints)), 0.0)
+    return Skin(near.gap, near.normal)

@@ -16,9 +16,11 @@ most of it: with more, what has been caught up could not be braked in time, and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 import numpy.typing as npt
 
@@ -77,6 +79,20 @@ class DriveState:
     command: FloatArray
     age: float = 0.0
 
+    def packed(self) -> FloatArray:
+        """Returns the state as (3J+2,) numbers: position, velocity, stop, command, age."""
+        return np.concatenate(
+            [self.position, self.velocity, [float(self.stop)], self.command, [self.age]]
+        )
+
+    @staticmethod
+    def unpacked(values: FloatArray) -> DriveState:
+        """Returns the state of (3J+2,) numbers."""
+        n = (len(values) - 2) // 3
+        position, velocity = values[:n].copy(), values[n : 2 * n].copy()
+        command = values[2 * n + 1 : 3 * n + 1].copy()
+        return DriveState(position, velocity, Stop(int(values[2 * n])), command, float(values[-1]))
+
     @staticmethod
     def at_rest(position: FloatArray) -> DriveState:
         """Returns drives that are at (J,) `position`, rad, and have not been commanded yet."""
@@ -103,70 +119,102 @@ def follow(
         dt: s.
         settings: what commands may do.
     """
-    s = settings or GuardSettings()
-    found = _fault(state, position, velocity, fresh, limits, s)
-    if found is not Stop.NONE:
-        # why it stopped stays told, and not what was wrong later
-        stop = found if state.stop is Stop.NONE else state.stop
-        return _moved(state, np.zeros_like(state.velocity), limits, dt, stop, share=s.braking)
-    rate = np.zeros_like(state.velocity) if velocity is None else velocity
-    if position is None:
-        return _moved(state, rate, limits, dt, Stop.NONE, speed=s.speed)
-    age = 0.0 if np.any(position != state.command) else state.age + dt
-    ahead = position + min(age, s.pause) * rate
-    error = ahead - state.position
-    catching_up = np.minimum(
-        np.abs(error) / s.follow_time, np.sqrt(2.0 * s.spare * limits.acceleration * np.abs(error))
+    after = np.empty(3 * len(state.position) + 2)
+    s = settings or _USUAL
+    _follow(
+        state.packed(),
+        position is not None,
+        state.position.copy() if position is None else np.array(position, dtype=np.float64),
+        velocity is not None,
+        np.zeros(len(state.position)) if velocity is None else np.array(velocity, dtype=np.float64),
+        bool(fresh),
+        (limits.lower, limits.upper, limits.speed, limits.acceleration),
+        float(dt),
+        _Settings._make(map(float, astuple(s))),
+        after,
     )
-    wanted = (rate if age <= s.pause else 0.0 * rate) + np.sign(error) * catching_up
-    after = _moved(state, wanted, limits, dt, Stop.NONE, speed=s.speed)
-    return replace(after, command=position.copy(), age=age)
+    return DriveState.unpacked(after)
 
 
-def _moved(
-    state: DriveState,
-    wanted: FloatArray,
-    limits: JointLimits,
-    dt: float,
-    stop: Stop,
-    share: float = 1.0,
-    speed: float = 1.0,
-) -> DriveState:
-    """Returns drives that have gone for `dt` as near to the `wanted` velocity as they may."""
-    change = share * limits.acceleration * dt
-    velocity = np.clip(wanted, state.velocity - change, state.velocity + change)
-    velocity = np.clip(velocity, -speed * limits.speed, speed * limits.speed)
-    position = np.clip(state.position + dt * velocity, limits.lower, limits.upper)
-    return DriveState(position, velocity, stop, position, 0.0)
+class _Settings(NamedTuple):
+    """`GuardSettings` as kernels take them, in the same order."""
+
+    follow_time: float
+    spare: float
+    jump: float
+    pause: float
+    resume: float
+    braking: float
+    speed: float
 
 
-def _fault(
-    state: DriveState,
-    position: FloatArray | None,
-    velocity: FloatArray | None,
-    fresh: bool,
-    limits: JointLimits,
-    s: GuardSettings,
-) -> Stop:
+_USUAL = GuardSettings()
+_NONE, _ENDED, _NOT_FINITE, _OUTSIDE_LIMITS, _JUMP = (int(v) for v in Stop)
+
+
+@nb.njit(cache=True, nogil=True)
+def _follow(state, placed, position, moving, velocity, fresh, limits, dt, s, after):  # type: ignore[no-untyped-def]
+    """Writes the packed state `after`; the rest as of `follow`.
+
+    `placed` and `moving` tell whether position and velocity are commanded; without, position is
+    that of the drives, and velocity 0. limits: lower, upper, speed, acceleration.
+    """
+    n = len(position)
+    lower, upper, top, acceleration = limits
+    at, rate, stop, command, age = (
+        state[:n],
+        state[n : 2 * n],
+        state[2 * n],
+        state[-1 - n : -1],
+        0.0,
+    )
+    found = _fault(state, placed, position, moving, velocity, fresh, limits, s)
+    follows = found == _NONE
+    # why it stopped stays told, and not what was wrong later
+    after[2 * n] = found if follows or stop == _NONE else stop
+    if follows and placed and (position == command).all():
+        age = state[-1] + dt
+    share, speed = (1.0, s.speed) if follows else (s.braking, 1.0)
+    for j in range(n):
+        wanted = 0.0
+        if follows and placed:
+            error = position[j] + min(age, s.pause) * velocity[j] - at[j]
+            spare = 2.0 * s.spare * acceleration[j]
+            catching_up = min(abs(error) / s.follow_time, np.sqrt(spare * abs(error)))
+            wanted = (velocity[j] if age <= s.pause else 0.0) + np.sign(error) * catching_up
+        elif follows:
+            wanted = velocity[j]
+        change = share * acceleration[j] * dt
+        now = min(max(wanted, rate[j] - change), rate[j] + change)
+        now = min(max(now, -speed * top[j]), speed * top[j])
+        after[n + j] = now
+        after[j] = min(max(at[j] + dt * now, lower[j]), upper[j])
+        after[2 * n + 1 + j] = position[j] if follows and placed else after[j]
+    after[-1] = age
+
+
+@nb.njit(cache=True, nogil=True)
+def _fault(state, placed, position, moving, velocity, fresh, limits, s):  # type: ignore[no-untyped-def]
+    n = len(position)
+    lower, upper, top, _ = limits
+    at, rate, stop = state[:n], state[n : 2 * n], state[2 * n]
     if not fresh:
-        return Stop.ENDED
-    given = [x for x in (position, velocity) if x is not None]
-    if not all(np.isfinite(x).all() for x in given):
-        return Stop.NOT_FINITE
-    outside = velocity is not None and np.any(np.abs(velocity) > limits.speed)
-    if position is not None:
-        outside = outside or np.any((position < limits.lower) | (position > limits.upper))
-    if outside:
-        return Stop.OUTSIDE_LIMITS
-    if state.stop is not Stop.NONE:
-        # at rest, and commanded to go on from there
-        resting = np.abs(state.velocity).max() < 1e-9
-        near = position is None or np.abs(position - state.position).max() <= s.resume
-        begins = velocity is None or np.abs(velocity).max() <= s.resume / s.pause
-        return Stop.NONE if resting and near and begins else state.stop
-    if position is not None:
+        return _ENDED
+    if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+        return _NOT_FINITE
+    resting = near = begins = reached = True
+    for j in range(n):
+        if moving and abs(velocity[j]) > top[j]:
+            return _OUTSIDE_LIMITS
+        if placed and (position[j] < lower[j] or position[j] > upper[j]):
+            return _OUTSIDE_LIMITS
+        off = abs(position[j] - at[j])
+        resting = resting and abs(rate[j]) < 1e-9
+        near = near and off <= s.resume
+        begins = begins and abs(velocity[j]) <= s.resume / s.pause
         # what it lags behind at full speed, and what may have been missed
-        reach = limits.speed * (s.follow_time + s.pause) + s.jump
-        if np.any(np.abs(position - state.position) > reach):
-            return Stop.JUMP
-    return Stop.NONE
+        reached = reached and off <= top[j] * (s.follow_time + s.pause) + s.jump
+    if stop != _NONE:
+        # at rest, and commanded to go on from there
+        return _NONE if resting and (near or not placed) and begins else int(stop)
+    return _NONE if reached or not placed else _JUMP

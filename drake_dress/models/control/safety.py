@@ -314,20 +314,25 @@ def step(
     verdicts = np.empty(2, dtype=np.int64)
     _govern(
         state.packed(),
-        np.ascontiguousarray(request.velocity, dtype=np.float64),
+        _plain(request.velocity),
         float(request.stamp),
-        np.ascontiguousarray(measured.position, dtype=np.float64),
-        np.ascontiguousarray(measured.force, dtype=np.float64),
+        _plain(measured.position),
+        _plain(measured.force),
         limits.compiled,
         float(now),
         float(dt),
         bool(permitted),
-        np.ascontiguousarray(distance, dtype=np.float64),
-        np.ascontiguousarray(away, dtype=np.float64),
+        _plain(distance),
+        _plain(away),
         after,
         verdicts,
     )
     return GovernorState.unpacked(after), (Verdict(int(verdicts[0])), Verdict(int(verdicts[1])))
+
+
+def _plain(values: FloatArray) -> FloatArray:
+    """Returns a copy with the one layout in memory for which kernels are compiled."""
+    return np.array(values, dtype=np.float64, order="C")
 
 
 # Compiled code knows flags as numbers.
