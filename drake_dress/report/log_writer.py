@@ -6,6 +6,9 @@ space to close the file is kept back for that. A process that is killed leaves w
 last: samples are written together about once a second, rows of bulky datasets are never rewritten,
 and HDF5 is told to keep its own bookkeeping in memory between flushes, so that the file on disk is
 consistent at all times but during a flush.
+
+Writing and flushing a second of samples takes tens of milliseconds, for which no command may wait:
+a thread does it. Who appends hears of a failure with a later sample.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import os
 import tempfile
 import time as clock
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +46,7 @@ _FLUSH_PERIOD = 1.0  # s of wall time
 # Kept back on the disk for the end, and what must be free beside it, bytes.
 _RESERVE, _LEAST_FREE = 16 << 20, 4 << 20
 _MOST_WAITING = 64  # samples that are kept in memory between flushes
+_MOST_BEHIND = 512  # samples that are kept while those before them are still being written
 _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
 
 
@@ -179,6 +184,8 @@ class RunLogWriter:
         self._series: dict[str, h5py.Dataset] = {}
         self._shapes: dict[str, tuple[int, ...]] = {}
         self._waiting: list[dict[str, npt.NDArray[Any]]] = []
+        self._worker = ThreadPoolExecutor(1, "log")
+        self._writing: Future[None] | None = None
 
         attributes = self._file.attrs
         attributes["schema"] = SCHEMA
@@ -231,10 +238,11 @@ class RunLogWriter:
             for end in "ab":
                 shape = (len(capsules), 3)
                 self._add(f"/human/capsule_{end}", shape, "m", "world", dtype="f8")
-        self._flush()
+        self._file.flush()
+        self._flushed_at = clock.monotonic()
 
     def append(self, sample: Sample) -> None:
-        """Appends one sample, and flushes if the last flush was a while ago.
+        """Appends one sample, and has all written and flushed if the last flush was a while ago.
 
         Raises:
             OSError: the disk is full; what was appended before is in the file.
@@ -250,10 +258,9 @@ class RunLogWriter:
         # its own copy: what is waiting must not change
         self._waiting.append({name: value.copy() for name, value in row.items()})
         self._last_time = sample.time
-        if clock.monotonic() - self._flushed_at >= self._flush_period:
-            self._flush()
-        elif len(self._waiting) >= _MOST_WAITING:
-            self._write_waiting()
+        due = clock.monotonic() - self._flushed_at >= self._flush_period
+        if due or len(self._waiting) >= _MOST_WAITING:
+            self._hand_over(due)
 
     def note(self, name: str, value: str | float) -> None:
         """Writes something about the run as an attribute of the file, which may be closed."""
@@ -267,6 +274,7 @@ class RunLogWriter:
 
     @contextmanager
     def _opened(self) -> Iterator[h5py.File]:
+        self._drain()
         if self._file:
             yield self._file
         else:
@@ -277,13 +285,18 @@ class RunLogWriter:
         """Closes the file with as many whole samples as were appended; may be called twice."""
         if not self._file:
             return
-        self._release()
-        self._write_waiting()
-        # An interrupt may have come in the middle of a sample.
-        for dataset in self._series.values():
-            if dataset.shape[0] != self._count:
-                dataset.resize(self._count, axis=0)
-        self._file.close()
+        try:
+            self._drain()
+        finally:
+            self._worker.shutdown()
+            self._release()
+            self._write(self._waiting, flush=False)
+            self._waiting = []
+            # An interrupt may have come in the middle of a sample.
+            for dataset in self._series.values():
+                if dataset.shape[0] != self._count:
+                    dataset.resize(self._count, axis=0)
+            self._file.close()
 
     def __enter__(self) -> RunLogWriter:
         return self
@@ -330,8 +343,8 @@ class RunLogWriter:
         }
         for name, array in optional.items():
             if name in self._series:
-                shape = self._series[name].shape[1:]
-                rows[name] = np.full(shape, np.nan) if array is None else array
+                # not the dataset's, which would wait for what is being written
+                rows[name] = np.full(self._shapes[name], np.nan) if array is None else array
         return rows
 
     def _write_garment(self, group: str, garment: GarmentMesh) -> None:
@@ -371,26 +384,46 @@ class RunLogWriter:
         _label(dataset, unit, frame)
         self._series[name], self._shapes[name] = dataset, shape
 
-    def _write_waiting(self) -> None:
-        """Writes the samples since the last flush, all of a dataset at once."""
-        waiting, self._waiting = self._waiting, []
-        if not waiting:
+    def _hand_over(self, flush: bool) -> None:
+        """Has the samples since the last time written by the thread, unless it is still busy."""
+        busy = self._writing is not None and not self._writing.done()
+        if busy and len(self._waiting) < _MOST_BEHIND:
             return
-        self._check_space(waiting)
-        count = self._count + len(waiting)
-        for name in waiting[0]:
-            dataset = self._series[name]
-            dataset.resize(count, axis=0)
-            dataset[self._count :] = np.stack([row[name] for row in waiting])
-        self._count = count
+        self._drain()
+        self._check_space()
+        batch, self._waiting = self._waiting, []
+        self._writing = self._worker.submit(self._write, batch, flush)
+        if flush:
+            self._flushed_at = clock.monotonic()
 
-    def _check_space(self, waiting: list[dict[str, npt.NDArray[Any]]]) -> None:
+    def _drain(self) -> None:
+        """Waits until the thread has written what it has.
+
+        Raises:
+            OSError: it could not.
+        """
+        writing, self._writing = self._writing, None
+        if writing is not None:
+            writing.result()
+
+    def _write(self, batch: list[dict[str, npt.NDArray[Any]]], flush: bool) -> None:
+        """Writes samples, all of a dataset at once."""
+        if batch:
+            count = self._count + len(batch)
+            for name in batch[0]:
+                dataset = self._series[name]
+                dataset.resize(count, axis=0)
+                dataset[self._count :] = np.stack([row[name] for row in batch])
+            self._count = count
+        if flush:
+            self._file.flush()
+
+    def _check_space(self) -> None:
         if self._reserve is None:
             return
-        needed = sum(value.nbytes for row in waiting for value in row.values())
+        needed = sum(value.nbytes for row in self._waiting for value in row.values())
         disk = os.statvfs(self.path.parent)
         if disk.f_bavail * disk.f_frsize < needed + _LEAST_FREE:
-            self._waiting = waiting
             self.close()
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
 
@@ -399,11 +432,6 @@ class RunLogWriter:
         if self._reserve is not None:
             os.close(self._reserve)
             self._reserve = None
-
-    def _flush(self) -> None:
-        self._write_waiting()
-        self._file.flush()
-        self._flushed_at = clock.monotonic()
 
 
 def _reserved(directory: Path, size: int) -> int | None:

@@ -159,9 +159,10 @@ writer = RunLogWriter({str(path)!r}, garment=garment, scenario_text="", version=
                       radius=np.ones(6), capsule_radius=np.ones(6), flush_period=0.05)
 for i in range(10**6):
     writer.append(replace(sample, time=0.01 * i))
-    if i == 600:
-        time.sleep(0.1)
-    elif i == 601:
+    if i in (600, 601):
+        # it is written beside
+        time.sleep(1.0)
+    if i == 601:
         print("written", flush=True)
     elif i > 601:
         time.sleep(1.0)
@@ -288,6 +289,8 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
     )  # fmt: skip
     for sample in samples[:3]:
         writer.append(sample)
+    # waits for what is being written
+    writer.note("note", "")
     full = os.statvfs(tmp_path)
     monkeypatch.setattr(
         os, "statvfs", lambda _: SimpleNamespace(f_bavail=0, f_frsize=full.f_frsize)
