@@ -12,7 +12,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from typing import Any
 
 _PR_SET_PDEATHSIG = 1
-_NICENESS = 5
+_NICENESS = 10
 _worker: Callable[..., Any] | None = None
 
 
