@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if not (options.kept or available()):
         raise UserError("bench", _NAME, "no network namespace, expected the right to unshare")
-    conditions = Conditions(options.scenario, options.rate, options.minutes)
+    conditions = Conditions(options.scenario, options.rate, options.fault_rate, options.minutes)
 
     def measured(case: Case, keep: Path | None, overrides: Sequence[str]) -> dict[str, Any]:
         with place_of(case, keep) as out:
@@ -76,6 +76,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_choices(parser, kinds=REACTIONS)
     parser.add_argument("--rate", type=float, default=0.35, help="of the dressing; default 0.35")
+    parser.add_argument(
+        "--fault-rate",
+        type=float,
+        default=1.0,
+        metavar="RATE",
+        help="of the faults; default 1. A lab that does not keep up with it is not judged: "
+        "slow machines take 0.5",
+    )
     parser.add_argument("--minutes", type=float, default=20.0, help="of the soak; default 20")
     # what is measured here are two processes on two cores
     add_study_options(parser, _NAME, jobs=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,12 @@ from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_extremes
 from drake_dress.report.log import RunLog
+from drake_dress.report.summary import read_summary
 
 # Coarse: what is asked is how arms react, not how a coat is put on.
 COARSE = [
     "plant.spacing=0.05",
+    "plant.time_step=0.005",
     "controller.spacing=0.06",
     "log.rate=100",
     "lab.rest=1.0",
@@ -29,6 +31,8 @@ CAMERA = (
 )
 # A fault that passes lasts this long, s; then what is left of the run.
 LASTING, AFTER = 0.8, 1.0
+# A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
+KEPT_UP = 0.9
 # A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
 # that slips tugs at an arm that holds for one or two samples of the log, by half a millimetre.
 STILL, STILL_OVER = 0.015, 0.06
@@ -42,11 +46,22 @@ class Reaction:
         source: which may have it; one is drawn.
         within: from its start until both grippers hold, s; None where they do not.
         ends: what the run ends with; None where it goes on.
+        waits: of it, what the run waits by this machine's clock before there is a fault, s.
     """
 
     source: tuple[str, ...]
     within: float | None
     ends: str | None
+    waits: float = 0.0
+
+    def at(self, rate: float) -> Reaction:
+        """Returns what is stated by a clock that is slower than this machine's, by `rate`.
+
+        What waits by this machine's clock takes less of it; everything else goes by that clock.
+        """
+        if self.within is None:
+            return self
+        return replace(self, within=self.within - (1.0 - rate) * self.waits)
 
 
 _ARMS = ("left_arm", "right_arm")
@@ -55,12 +70,12 @@ _ALL = (*_ARMS, "garment", "person")
 # until the arms have, 60 ms of braking, 100 ms of the drives' own.
 _HOLD, _HOLD_ESTIMATE = 0.25, 0.45
 REACTIONS = {
-    "stale": Reaction(_ARMS, _HOLD, None),
-    "stale_estimate": Reaction(("garment", "person"), _HOLD_ESTIMATE, None),
+    "stale": Reaction(_ARMS, _HOLD, None, 0.05),
+    "stale_estimate": Reaction(("garment", "person"), _HOLD_ESTIMATE, None, 0.2),
     # an image at 0.5 s; they come five times a second, and one may still be on its way
-    "stale_camera": Reaction(("camera_front",), 1.2, None),
-    "bus_lost": Reaction(("left_arm",), _HOLD, None),
-    "arm_lost": Reaction(_ARMS, _HOLD, None),
+    "stale_camera": Reaction(("camera_front",), 1.2, None, 0.5),
+    "bus_lost": Reaction(("left_arm",), _HOLD, None, 0.05),
+    "arm_lost": Reaction(_ARMS, _HOLD, None, 0.05),
     "malformed": Reaction(_ALL, _HOLD, None),
     "nan": Reaction(_ALL, _HOLD, None),
     "time_back": Reaction(_ALL, _HOLD, "time back"),
@@ -70,7 +85,7 @@ REACTIONS = {
     # from the run's last command: 100 ms until it is missed, and the joints' own braking
     "killed": Reaction(("",), 0.45, None),
     # a log is written each second; then as if it were killed
-    "disk_full": Reaction(("",), 1.6, "log: cannot be written"),
+    "disk_full": Reaction(("",), 1.6, "log: cannot be written", 1.0),
 }
 
 
@@ -92,9 +107,12 @@ def inject(
         rate: simulated seconds per second. A machine that does other work too is late by
             milliseconds of its own; at a slower rate they are fewer of those that are judged.
         overrides: further KEY=VALUE for both processes.
+
+    Raises:
+        RuntimeError: the lab did not keep up with the rate, so that nothing can be judged.
     """
     rng = np.random.default_rng([seed, *kind.encode()])
-    stated = REACTIONS[kind]
+    stated = REACTIONS[kind].at(rate)
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
     played = kind.split("_")[0] if kind.startswith("stale") else kind
@@ -121,6 +139,11 @@ def inject(
         timeout=120.0 / rate,
     )
     outcome = play(plan)
+    played = read_summary(out / "lab" / "summary.json")["realtime_factor"]
+    if played < KEPT_UP * rate:
+        raise RuntimeError(
+            f"the lab played {played:.2f} of time, expected {rate:g}; a slower rate may be kept"
+        )
     found = _judged(kind, stated, start, lasting, out)
     wrong: list[str] = found["wrong"]
     expected = -9 if kind == "killed" else 1
@@ -128,7 +151,7 @@ def inject(
         wrong.append(f"run ended with {outcome.run_status}, expected {expected}")
     if outcome.lab_status != 1:
         wrong.append(f"lab ended with {outcome.lab_status}, expected 1")
-    return {"source": source, "start": start, **found}
+    return {"source": source, "start": start, "rate": rate, "within": stated.within, **found}
 
 
 def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path) -> dict[str, Any]:

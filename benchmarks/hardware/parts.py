@@ -44,12 +44,13 @@ class Conditions:
 
     Attributes:
         scenario: file of lab and run.
-        rate: of the dressing, simulated seconds per second.
+        rate: of the dressing, simulated seconds per second. fault_rate: of the faults.
         minutes: of the soak.
     """
 
     scenario: str
     rate: float
+    fault_rate: float
     minutes: float
 
 
@@ -80,7 +81,7 @@ def _measured(
         return _dressing(conditions, out, overrides)
     if case.part == "soak":
         return _soak(conditions, out, overrides)
-    return inject(case.kind, case.seed, conditions.scenario, out, overrides=overrides)
+    return inject(case.kind, case.seed, conditions.scenario, out, conditions.fault_rate, overrides)
 
 
 def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -37,7 +38,7 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         ),
         Table(
             "Faults",
-            ["", "as stated", "held within, s", "longest, s", "speed", "torque"],
+            ["", "rate", "as stated", "held within, s", "longest, s", "speed", "torque"],
             _faults(faults),
         ),
         Table(
@@ -77,8 +78,10 @@ def _dressing(summary: dict[str, Any]) -> list[list[Any]]:
         ["largest gripper force, N", run["max_gripper_force_N"], lab["max_gripper_force_N"]],
         ["commands a second of this machine's clock", summary["command_rate_hz"], ""],
         ["commands a simulated second", summary["command_rate_hz"] / summary["rate"], ""],
-        ["status to command, median, ms", latency["median"], ""],
-        ["status to command, 99 %, ms", latency["p99"], ""],
+        ["status to command, median, ms of this machine's clock", latency["median"], ""],
+        ["status to command, 99 %, ms of this machine's clock", latency["p99"], ""],
+        ["status to command, median, simulated ms", summary["rate"] * latency["median"], ""],
+        ["status to command, 99 %, simulated ms", summary["rate"] * latency["p99"], ""],
         ["start of the process to first command, s", summary["start_up_s"], ""],
     ]
 
@@ -96,17 +99,19 @@ def _memory(summary: dict[str, Any]) -> list[list[Any]]:
 
 def _faults(done: Sequence[tuple[Case, dict[str, Any]]]) -> list[list[Any]]:
     rows = []
-    for kind, stated in REACTIONS.items():
-        mine = [summary for case, summary in done if case.kind == kind]
+    for kind, rate in itertools.product(REACTIONS, sorted({s["rate"] for _, s in done})):
+        mine = [s for case, s in done if case.kind == kind and s["rate"] == rate]
         if not mine:
             continue
+        within = mine[0]["within"]
         held = [s["held_after"] for s in mine if s["held_after"] is not None]
         rows.append(
             [
                 kind,
+                rate,
                 f"{sum(not s['wrong'] for s in mine)} of {len(mine)}",
-                stated.within,
-                None if stated.within is None or not held else max(held),
+                within,
+                None if within is None or not held else max(held),
                 max(s["speed"] for s in mine),
                 max(s["torque"] for s in mine),
             ]

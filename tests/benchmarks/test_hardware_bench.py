@@ -112,6 +112,8 @@ def test_what_was_measured_is_kept_and_told(
         asked.append(case.name)
         wrong = ["held after 0.30 s"] if case.name == "nan-0001" else []
         facts = {"source": "left_arm", "start": 1.0, "held_after": 0.2, "speed": 0.5, "torque": 0.1}
+        stated = asdict(REACTIONS[case.kind].at(conditions.fault_rate))
+        facts |= {"rate": conditions.fault_rate, "within": stated["within"]}
         return {"case": asdict(case), "summary": {**facts, "wrong": wrong}}
 
     monkeypatch.setattr(bench, "run", run)
@@ -126,9 +128,17 @@ def test_what_was_measured_is_kept_and_told(
     assert main([*words, "--seeds", "0-1", "--kept"]) == 1
     told = capsys.readouterr().out
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in told.splitlines()]
-    assert ["nan", "1 of 2", "0.250", "0.200", "0.500", "0.100"] in rows
-    assert ["push", "2 of 2", "–", "–", "0.500", "0.100"] in rows
+    assert ["nan", "1.00", "1 of 2", "0.250", "0.200", "0.500", "0.100"] in rows
+    assert ["push", "1.00", "2 of 2", "–", "–", "0.500", "0.100"] in rows
     assert ["nan-0001", "held after 0.30 s"] in rows
+
+
+def test_what_waits_by_the_wall_clock_takes_less_of_a_slower_one() -> None:
+    assert REACTIONS["stale_estimate"].at(1.0) == REACTIONS["stale_estimate"]
+    slower = REACTIONS["stale_estimate"].at(0.5)
+    assert slower.within == pytest.approx(0.45 - 0.5 * 0.2)
+    assert REACTIONS["nan"].at(0.5).within == REACTIONS["nan"].within
+    assert REACTIONS["push"].at(0.5).within is None
 
 
 def test_memory_that_grows_is_found_in_noise() -> None:

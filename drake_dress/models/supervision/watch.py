@@ -70,14 +70,17 @@ class WatchState:
     Attributes:
         count: of messages looked at.
         stamp: of the last sound one, s; None before the first.
-        heard: when it came, s of the watch's own clock.
+        heard: when it came, s of the watch's own clock, or before: the first one that is looked at
+            may have waited.
         fault: what is wrong now.
+        came: whether a message came since the first look, so that `heard` is when it did.
     """
 
     count: int = 0
     stamp: float | None = None
     heard: float = 0.0
     fault: Fault = Fault.STALE
+    came: bool = False
 
 
 def watch(state: WatchState, arrival: Arrival, now: float, settings: WatchSettings) -> WatchState:
@@ -85,21 +88,22 @@ def watch(state: WatchState, arrival: Arrival, now: float, settings: WatchSettin
 
     What is fatal stays; all else goes when a sound message has come.
     """
-    fault, stamp, heard = state.fault, state.stamp, state.heard
+    fault, stamp, heard, came = state.fault, state.stamp, state.heard, state.came
     if arrival.count != state.count:
         found = arrival.fault
         if not found & (Fault.MALFORMED | Fault.WRONG_SIZE) and stamp is not None:
             gone = arrival.stamp - stamp
             if gone < 0.0:
                 found |= Fault.TIME_BACK
-            elif gone > now - heard + settings.jump:
+            elif came and gone > now - heard + settings.jump:
                 found |= Fault.CLOCK_JUMP
         fault = (fault & FATAL) | found
         # the same stamp again is the same message again
         if not found & ~TELLING and (stamp is None or arrival.stamp > stamp):
+            came = stamp is not None
             stamp, heard = arrival.stamp, now
     if stamp is None or now - heard > settings.max_age:
         fault |= Fault.STALE
     else:
         fault &= ~Fault.STALE
-    return WatchState(arrival.count, stamp, heard, fault)
+    return WatchState(arrival.count, stamp, heard, fault, came)

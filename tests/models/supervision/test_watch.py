@@ -55,10 +55,20 @@ def test_what_is_not_sound_is_told_until_something_sound_comes(fault: Fault) -> 
     ("stamp", "fault"), [(2.9, Fault.TIME_BACK), (3.0 + 3600.0, Fault.CLOCK_JUMP)]
 )
 def test_a_clock_that_leaps_is_never_believed_again(stamp: float, fault: Fault) -> None:
-    state = watch(heard(), Arrival(2, stamp), 10.005, SETTINGS)
+    state = watch(heard(9.995, 2.995), Arrival(2, 3.0), 10.0, SETTINGS)
+    state = watch(state, Arrival(3, stamp), 10.005, SETTINGS)
     assert state.fault & fault
-    state = watch(state, Arrival(3, 3.01), 10.01, SETTINGS)
+    state = watch(state, Arrival(4, 3.01), 10.01, SETTINGS)
     assert state.fault & fault
+
+
+def test_a_message_that_waited_for_the_first_look_is_no_leap_of_the_clock() -> None:
+    """What was sent a second before a run begins is there as it begins; the next one comes soon."""
+    settings = WatchSettings(max_age=0.5)
+    state = watch(WatchState(), Arrival(1, 3.0), 10.0, settings)
+    state = watch(state, Arrival(2, 4.2), 10.1, settings)
+    assert state.fault is Fault.NONE
+    assert watch(state, Arrival(3, 5.4), 10.2, settings).fault & Fault.CLOCK_JUMP
 
 
 def test_a_source_that_does_not_follow_still_tells_where_it_is() -> None:
