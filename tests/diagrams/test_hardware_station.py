@@ -94,6 +94,8 @@ class Pair:
         builder.AddNamedSystem("lab", self.lab.diagram)
         builder.AddNamedSystem("run", self.dressing.diagram)
         self.simulator = Simulator(builder.Build())
+        # as a run does: its process must be there and compiled before plans are waited for
+        self.dressing.rehearse(heard.garment, heard.person, lambda: False)
         self.simulator.Initialize()
         self.root = self.simulator.get_context()
 
