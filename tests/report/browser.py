@@ -85,12 +85,25 @@ def screenshot(
         "--enable-unsafe-swiftshader",
         "--hide-scrollbars",
         "--window-size=900,600",
-        f"--user-data-dir={folder / ('profile-' + name)}",
         *pace,
         f"--screenshot={picture}",
-        url,
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=_TIME_LIMIT, check=False)
+
+    def take(profile: str) -> subprocess.CompletedProcess[str]:
+        place = f"--user-data-dir={folder / profile}"
+        return subprocess.run(
+            [*command, place, url],
+            capture_output=True,
+            text=True,
+            timeout=_TIME_LIMIT,
+            check=False,
+        )
+
+    try:
+        done = take(f"profile-{name}")
+    except subprocess.TimeoutExpired:
+        # now and then the browser itself hangs before it has begun
+        done = take(f"profile-{name}-again")
     if not picture.is_file():
         raise RuntimeError(f"chromium made no picture of {url}: {done.stderr[-800:]}")
     return np.asarray(image.imread(picture), dtype=np.float64)[:, :, :3]
