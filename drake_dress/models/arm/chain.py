@@ -8,6 +8,8 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.vector3 import length
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -161,9 +163,9 @@ def find_rotation_error(now, asked):  # type: ignore[no-untyped-def]
         [0.5 * (r[2, 1] - r[1, 2]), 0.5 * (r[0, 2] - r[2, 0]), 0.5 * (r[1, 0] - r[0, 1])]
     )
     cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
-    length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    if length > 1e-6:
-        return vector * (np.arctan2(length, cosine) / length)
+    sine = length(vector)
+    if sine > 1e-6:
+        return vector * (np.arctan2(sine, cosine) / sine)
     if cosine > 0.0:
         return vector
     # half a turn: r = 2 a aᵀ − 1
@@ -173,4 +175,4 @@ def find_rotation_error(now, asked):  # type: ignore[no-untyped-def]
             k = a
     axis = r[:, k].copy()
     axis[k] += 1.0
-    return axis * (np.pi / np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+    return axis * (np.pi / length(axis))

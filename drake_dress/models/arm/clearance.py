@@ -8,6 +8,8 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.vector3 import length
+
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
@@ -98,25 +100,22 @@ def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
         away: (3,) written: unit vector from there to here.
     """
     s, t = nearest(a, b, c, d)
-    length2 = 0.0
     for k in range(3):
         here[k] = a[k] + s * (b[k] - a[k])
         there[k] = c[k] + t * (d[k] - c[k])
         away[k] = here[k] - there[k]
-        length2 += away[k] * away[k]
-    length = np.sqrt(length2)
-    size = length
-    if length <= 1e-9:
+    apart = size = length(away)
+    if apart <= 1e-9:
         # axes that cross have no direction apart; any across both will do
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             away[k] = (b[i] - a[i]) * (d[j] - c[j]) - (b[j] - a[j]) * (d[i] - c[i])
-        size = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+        size = length(away)
         if size <= 1e-12:
             away[0], away[1], away[2], size = 0.0, 0.0, 1.0, 1.0
     for k in range(3):
         away[k] /= size
-    return length
+    return apart
 
 
 @nb.njit(cache=True, nogil=True)

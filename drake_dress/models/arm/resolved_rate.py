@@ -34,6 +34,7 @@ from drake_dress.models.arm.clearance import (
     place_capsules,
 )
 from drake_dress.models.arm.joint_bounds import find_rate_bounds
+from drake_dress.models.vector3 import length
 
 FloatArray = npt.NDArray[np.float64]
 # DAQP's kinds of rows.
@@ -240,7 +241,7 @@ def _programme(arms, home, p, q, rate, position, velocity, rotation, step, perso
         tool = links[i, n + 1]
         jacobian = find_tool_jacobian(links[i])
         turning = p.rotation_gain * find_rotation_error(tool[:3, :3], rotation[i])
-        turning *= min(1.0, p.max_turning / max(_length(turning), 1e-12))
+        turning *= min(1.0, p.max_turning / max(length(turning), 1e-12))
         turn = jacobian[3:]
         cost[own, own] = np.eye(n) + p.rotation_weight * (turn.T @ turn)
         slope[own] = p.home_gain * (q[i] - home[i]) - p.rotation_weight * (turn.T @ turning)
@@ -283,7 +284,7 @@ def _programme(arms, home, p, q, rate, position, velocity, rotation, step, perso
 def _add_outward(links, other, p, slope):  # type: ignore[no-untyped-def]
     """Takes from `slope` (J,) the rates that move link 3 away from that of the other arm."""
     way = links[3, :3, 3] - other[3, :3, 3]
-    apart = _length(way)
+    apart = length(way)
     if apart >= p.outward_distance:
         return
     way *= p.outward_gain * (p.outward_distance - apart) / max(apart, 1e-9)
@@ -347,8 +348,3 @@ def _approach(distance, p, step):  # type: ignore[no-untyped-def]
     stops = np.sqrt(2.0 * p.approach_acceleration * max(room, 0.0))
     inside = min(room, 0.0) / (10.0 * step)
     return -min(stops, max(room, 0.0) / step) - inside
-
-
-@nb.njit(cache=True, nogil=True)
-def _length(v):  # type: ignore[no-untyped-def]
-    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)

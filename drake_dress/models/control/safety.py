@@ -65,6 +65,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.models.control.projection import BALL, HALF_SPACE, excess, find_nearest
+from drake_dress.models.vector3 import dot, length
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -390,7 +391,7 @@ def _govern(  # type: ignore[no-untyped-def]
         seen[i] = np.isfinite(measured_position[i]).all() and np.isfinite(measured_force[i]).all()
         if seen[i]:
             _low_pass(force[i], measured_force[i], limits, dt)
-        size[i] = _length(force[i])
+        size[i] = length(force[i])
         relaxed = relaxed and size[i] < limits.soft_force
         if seen[i]:
             # counted down as it is counted up: a force that chatters about the limit counts, too
@@ -473,7 +474,7 @@ def _low_pass(force, measured, limits, dt):  # type: ignore[no-untyped-def]
     """Updates the force (3,) that is answered to, N: as measured where it is over the limit."""
     share = min(1.0, dt / limits.filter_time) if limits.filter_time > 0.0 else 1.0
     bounded = np.minimum(np.maximum(measured, -_LARGEST), _LARGEST)
-    if _length(bounded) >= limits.hard_force:
+    if length(bounded) >= limits.hard_force:
         share = 1.0
     for a in range(3):
         force[a] = bounded[a] if share == 1.0 else force[a] + share * (bounded[a] - force[a])
@@ -489,7 +490,7 @@ def _limit_force(force, size, wanted, limits, stopped, space):  # type: ignore[n
         space[4] = -max(limits.relax_speed, giving_way)
         return
     left = max(0.0, (limits.hard_force - size) / (limits.hard_force - limits.soft_force))
-    space[4] = left * max(0.0, _dot(pull, wanted)) - giving_way
+    space[4] = left * max(0.0, dot(pull, wanted)) - giving_way
 
 
 @nb.njit(cache=True, nogil=True)
@@ -499,7 +500,7 @@ def _limit_distance(position, other, reach, limits, dt, spaces, count):  # type:
     Returns how many spaces there are then.
     """
     away = position - other
-    apart = _length(away)
+    apart = length(away)
     if limits.least_distance > 0.0 and apart > 1e-9:
         closing = _stoppable(apart - limits.least_distance, limits, dt)
         spaces[count, 0], spaces[count, 1:4] = HALF_SPACE, -away / apart
@@ -533,7 +534,7 @@ def _keep_within(radius, offset, reach, limits, space):  # type: ignore[no-untyp
 
     Outside, back into it, slowly.
     """
-    distance = _length(offset)
+    distance = length(offset)
     if distance <= radius:
         space[0], space[1:4], space[4] = BALL, -offset / reach, radius / reach
     else:
@@ -545,7 +546,7 @@ def _keep_within(radius, offset, reach, limits, space):  # type: ignore[no-untyp
 def _time_to_rest(velocity, limits, dt):  # type: ignore[no-untyped-def]
     """Returns τ, s: a command that brakes after this step moves on by τ v at most."""
     slowed = limits.max_acceleration * dt
-    fastest = min(limits.max_speed, _length(velocity) + slowed)
+    fastest = min(limits.max_speed, length(velocity) + slowed)
     return dt + fastest / (2.0 * limits.max_acceleration)
 
 
@@ -572,9 +573,9 @@ def _governed(wanted, last, sets, kinds, limits, dt, must_stop, out):  # type: i
     """
     cut = 0
     slowed, braked = limits.max_acceleration * dt, limits.max_braking * dt
-    if _length(wanted) > limits.max_speed * (1.0 + 1e-9):
+    if length(wanted) > limits.max_speed * (1.0 + 1e-9):
         cut |= _SPEED
-    if _length(wanted - last) > slowed * (1.0 + 1e-9):
+    if length(wanted - last) > slowed * (1.0 + 1e-9):
         cut |= _ACCELERATION
     for k in range(2, len(sets)):
         if excess(sets[k], wanted) > 1e-9:
@@ -587,7 +588,7 @@ def _governed(wanted, last, sets, kinds, limits, dt, must_stop, out):  # type: i
         sets[1, 4] = braked
         if not find_nearest(wanted, sets, out):
             _go_as_far_as_it_goes(wanted, last, sets, out)
-        if _length(out - last) > slowed * (1.0 + 1e-9):
+        if length(out - last) > slowed * (1.0 + 1e-9):
             cut |= _BRAKING
     _draw_within(out, last, limits.max_speed, braked)
     return cut
@@ -609,7 +610,7 @@ def _go_as_far_as_it_goes(wanted, last, sets, out):  # type: ignore[no-untyped-d
         far = witness - normal * (100.0 * sets[1, 4])
         if not find_nearest(far, kept[:k], lowest):
             lowest[:] = witness
-        kept[k, 4] = max(kept[k, 4], _dot(normal, lowest))
+        kept[k, 4] = max(kept[k, 4], dot(normal, lowest))
         if not find_nearest(witness, kept[: k + 1], witness):
             witness[:] = lowest
     if not find_nearest(wanted, kept, out):
@@ -620,13 +621,13 @@ def _go_as_far_as_it_goes(wanted, last, sets, out):  # type: ignore[no-untyped-d
 def _face(ball, point, half_space):  # type: ignore[no-untyped-def]
     """Writes the half-space that holds the ball and touches it on the side of `point` (3,)."""
     toward = point - ball[1:4]
-    size = _length(toward)
+    size = length(toward)
     half_space[0] = HALF_SPACE
     if size > 1e-12:
         half_space[1:4] = toward / size
     else:
         half_space[1:3], half_space[3] = 0.0, 1.0
-    half_space[4] = _dot(half_space[1:4], ball[1:4]) + ball[4]
+    half_space[4] = dot(half_space[1:4], ball[1:4]) + ball[4]
 
 
 @nb.njit(cache=True, nogil=True)
@@ -636,19 +637,9 @@ def _draw_within(velocity, last, speed, change):  # type: ignore[no-untyped-def]
     Drawing back toward the origin does not lead away from `last`: both are in the ball of speed.
     """
     moved = velocity - last
-    size = _length(moved)
+    size = length(moved)
     if size > change:
         velocity[:] = last + moved * (change / size)
-    size = _length(velocity)
+    size = length(velocity)
     if size > speed:
         velocity *= speed / size
-
-
-@nb.njit(cache=True, nogil=True)
-def _length(v):  # type: ignore[no-untyped-def]
-    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
-
-
-@nb.njit(cache=True, nogil=True)
-def _dot(u, v):  # type: ignore[no-untyped-def]
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
