@@ -1,0 +1,210 @@
+"""`python -m benchmarks.reach LOG…`: how far arms fall behind grippers that floated.
+
+Follows the grippers of logged dressings with two arms, in numbers alone, for each placement of
+their bases. A placement is good where arms are never far behind: what they do not reach, the
+controller cannot dress with. Logs are of `drake-dress run` with floating grippers, `run.h5`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cloth.table import Table
+from benchmarks.logged import logged_scenario, opened
+from benchmarks.parser import OneLineParser, exit_with
+from drake_dress.diagrams.arms import ArmPlacement, ArmReachError, set_up_arms
+from drake_dress.models.arm.clearance import Capsules
+from drake_dress.models.arm.resolved_rate import GripperGoal
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log import RunLog
+
+_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Grippers of a dressing, and the person beside them, every `_STEP`.
+
+    Attributes:
+        name: of the log's folder.
+        grippers: (T,2,3) m. velocity: (T,2,3) m/s.
+        first, second: (T,K,3) ends of the person's capsules, m. radius: (K,) m.
+        shoulders: height of the person's, m.
+    """
+
+    name: str
+    grippers: np.ndarray
+    velocity: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    radius: np.ndarray
+    shoulders: float
+
+    def person(self, k: int) -> Capsules:
+        """Returns where the person is."""
+        return Capsules(self.first[k], self.second[k], self.radius)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How arms followed: lag (T,2), m; least distances between arms and to the person, m."""
+
+    lag: np.ndarray
+    between: float
+    to_person: float
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Prints a table; returns 0, 2 for bad arguments."""
+    options = _parser().parse_args(arguments)
+    placements = [
+        ArmPlacement(behind, spread, offset, math.radians(tilt))
+        for behind, spread, offset, tilt in itertools.product(
+            options.behind, options.spread, options.height, options.tilt
+        )
+    ]
+    runs = [recorded(path, log) for path, log in opened(options.logs)]
+    print(table(runs, placements).text())
+    return 0
+
+
+def recorded(path: Path, log: RunLog) -> Recorded:
+    """Returns what a log holds of grippers and person."""
+    scenario = logged_scenario(log)
+    if scenario.station.arms.model != "floating":
+        raise SystemExit(f"{path}: station.arms.model: is panda, expected floating")
+    time = np.arange(0.0, log.time[-1], _STEP)
+
+    def at(rows: np.ndarray) -> np.ndarray:
+        flat = rows.reshape(len(rows), -1)
+        columns = [np.interp(time, log.time, column) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(len(time), *rows.shape[1:])
+
+    grippers = at(np.stack([log.gripper_position[side] for side in SIDES], axis=1))
+    file = log.file
+    return Recorded(
+        path.parent.name,
+        grippers,
+        np.gradient(grippers, _STEP, axis=0),
+        at(file["human/capsule_a"][:]),
+        at(file["human/capsule_b"][:]),
+        file["human/capsule_radius"][:],
+        float(log.joint_position[0, [0, 3], 2].mean()),
+    )
+
+
+def follow(run: Recorded, placement: ArmPlacement) -> Followed:
+    """Returns how arms that stand there follow the grippers.
+
+    Args:
+        run: whose grippers.
+        placement: of the bases; its height is over the shoulders.
+
+    Raises:
+        ArmReachError: they do not reach where the run begins.
+    """
+    stands = ArmPlacement(
+        placement.distance_behind,
+        placement.spread,
+        run.shoulders + placement.height,
+        placement.tilt,
+    )
+    setup = set_up_arms(stands, run.grippers[0], run.person(0))
+    pair, q, rate = setup.pair, setup.start, np.zeros_like(setup.start)
+    lag = np.zeros((len(run.grippers), 2))
+    between = to_person = np.inf
+    for k in range(len(run.grippers) - 1):
+        left, right = (
+            GripperGoal(run.grippers[k + 1, i], run.velocity[k, i], stands.hand) for i in (0, 1)
+        )
+        found = pair.rates(q, rate, (left, right), _STEP, run.person(k))
+        rate = found.rate
+        q = q + _STEP * rate
+        between = min(between, found.between_arms)
+        to_person = min(to_person, float(found.to_person.min()))
+        for i, arm in enumerate(pair.arms):
+            lag[k + 1, i] = np.linalg.norm(arm.tool_position(q[i]) - run.grippers[k + 1, i])
+    return Followed(lag, between, to_person)
+
+
+def table(runs: Sequence[Recorded], placements: Sequence[ArmPlacement]) -> Table:
+    """Returns a row a placement: lag over all runs, the worst run's, and least distances."""
+    rows = []
+    for placement in placements:
+        name = (
+            f"{placement.distance_behind:g} behind, {placement.spread:g} apart, "
+            f"{placement.height:+g} high, {math.degrees(placement.tilt):.0f}°"
+        )
+        try:
+            done = [follow(run, placement) for run in runs]
+        except ArmReachError as error:
+            rows.append([name, None, None, None, str(error).split(":")[-1].strip(), None, None])
+            continue
+        lags = [1e3 * f.lag for f in done]
+        worst = int(np.argmax([lag.max() for lag in lags]))
+        over = np.concatenate([lag.max(axis=1) for lag in lags])
+        rows.append(
+            [
+                name,
+                float(np.percentile(over, 99)),
+                100.0 * float((over > 10.0).mean()),
+                float(lags[worst].max()),
+                runs[worst].name,
+                100.0 * min(f.between for f in done),
+                100.0 * min(f.to_person for f in done),
+            ]
+        )
+    return Table(
+        "Arms behind floating grippers",
+        [
+            "bases",
+            "99 %, mm",
+            "over 10 mm, %",
+            "largest, mm",
+            "in",
+            "arms apart, cm",
+            "arm to person, cm",
+        ],
+        rows,
+    )
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} are no numbers such as 0.8,0.85") from None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="python -m benchmarks.reach",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="run.h5, floating")
+    for option, default, unit in (
+        ("behind", "0.85", "of the bases behind the person, m"),
+        ("spread", "1.0", "between them, m"),
+        ("height", "-0.45", "of them over the shoulders, m"),
+        ("tilt", "35", "of the hands, degrees"),
+    ):
+        parser.add_argument(
+            f"--{option}",
+            type=_numbers,
+            default=_numbers(default),
+            metavar="X,…",
+            help=f"{unit}; default {default}",
+        )
+    return parser
+
+
+if __name__ == "__main__":
+    exit_with(main)
