@@ -337,9 +337,9 @@ class Arms:
     """What carries the grippers: nothing (they float), or two Panda arms behind the person."""
 
     model: str = "floating"  # or panda
-    distance_behind: float = 0.85  # of the arms' bases behind the person, m
-    spread: float = 1.0  # between them, m
-    height_offset: float = -0.45  # of both, over the person's shoulders, m
+    distance_behind: float = 0.7  # of the arms' bases behind the person, m
+    spread: float = 1.1  # between them, m
+    height_offset: float = -0.25  # of both, over the person's shoulders, m
     tilt_deg: float = 35.0  # of the hands, which point forward and this much down
     rate: float = 200.0  # of the joints' commands, Hz
     mode: str = "position_velocity"  # what is commanded: or position, or velocity alone
