@@ -20,6 +20,7 @@ from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario, opened
 from benchmarks.parser import OneLineParser, exit_with
 from drake_dress.diagrams.arms import ArmPlacement, ArmReachError, set_up_arms
+from drake_dress.errors import UserError
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.resolved_rate import GripperGoal
 from drake_dress.models.sides import SIDES
@@ -76,10 +77,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def recorded(path: Path, log: RunLog) -> Recorded:
-    """Returns what a log holds of grippers and person."""
+    """Returns what a log holds of grippers and person.
+
+    Raises:
+        UserError: its grippers are on arms already.
+    """
     scenario = logged_scenario(log)
     if scenario.station.arms.model != "floating":
-        raise SystemExit(f"{path}: station.arms.model: is panda, expected floating")
+        raise UserError(str(path), "station.arms.model", "is panda, expected floating")
     time = np.arange(0.0, log.time[-1], _STEP)
 
     def at(rows: np.ndarray) -> np.ndarray:
