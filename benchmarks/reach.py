@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,10 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario, opened
 from benchmarks.parser import OneLineParser, exit_with
-from drake_dress.diagrams.arms import ArmPlacement, ArmReachError, set_up_arms
+from drake_dress.diagrams.arms import ArmReachError, set_up_arms
+from drake_dress.diagrams.build import placement
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.scenario.schema import Arms
 from drake_dress.errors import UserError
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.resolved_rate import GripperGoal
@@ -37,7 +39,7 @@ class Recorded:
         name: of the log's folder.
         grippers: (T,2,3) m. velocity: (T,2,3) m/s.
         first, second: (T,K,3) ends of the person's capsules, m. radius: (K,) m.
-        shoulders: height of the person's, m.
+        scenario: of the dressing.
     """
 
     name: str
@@ -46,7 +48,7 @@ class Recorded:
     first: np.ndarray
     second: np.ndarray
     radius: np.ndarray
-    shoulders: float
+    scenario: Scenario
 
     def person(self, k: int) -> Capsules:
         """Returns where the person is."""
@@ -66,8 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Prints a table; returns 0, 2 for bad arguments."""
     options = _parser().parse_args(arguments)
     placements = [
-        ArmPlacement(behind, spread, offset, math.radians(tilt))
-        for behind, spread, offset, tilt in itertools.product(
+        Arms("panda", behind, spread, height, tilt)
+        for behind, spread, height, tilt in itertools.product(
             options.behind, options.spread, options.height, options.tilt
         )
     ]
@@ -93,34 +95,31 @@ def recorded(path: Path, log: RunLog) -> Recorded:
         return np.stack(columns, axis=1).reshape(len(time), *rows.shape[1:])
 
     grippers = at(np.stack([log.gripper_position[side] for side in SIDES], axis=1))
-    file = log.file
+    first, second, radius = log.capsules
     return Recorded(
         path.parent.name,
         grippers,
         np.gradient(grippers, _STEP, axis=0),
-        at(file["human/capsule_a"][:]),
-        at(file["human/capsule_b"][:]),
-        file["human/capsule_radius"][:],
-        float(log.joint_position[0, [0, 3], 2].mean()),
+        at(first),
+        at(second),
+        radius,
+        scenario,
     )
 
 
-def follow(run: Recorded, placement: ArmPlacement) -> Followed:
-    """Returns how arms that stand there follow the grippers.
+def follow(run: Recorded, arms: Arms) -> Followed:
+    """Returns how arms that stand so follow the grippers.
 
     Args:
         run: whose grippers.
-        placement: of the bases; its height is over the shoulders.
+        arms: where they stand.
 
     Raises:
         ArmReachError: they do not reach where the run begins.
     """
-    stands = ArmPlacement(
-        placement.distance_behind,
-        placement.spread,
-        run.shoulders + placement.height,
-        placement.tilt,
-    )
+    station = replace(run.scenario.station, arms=arms)
+    stands = placement(replace(run.scenario, station=station))
+    assert stands is not None
     setup = set_up_arms(stands, run.grippers[0], run.person(0))
     pair, q, rate = setup.pair, setup.start, np.zeros_like(setup.start)
     lag = np.zeros((len(run.grippers), 2))
@@ -139,16 +138,16 @@ def follow(run: Recorded, placement: ArmPlacement) -> Followed:
     return Followed(lag, between, to_person)
 
 
-def table(runs: Sequence[Recorded], placements: Sequence[ArmPlacement]) -> Table:
+def table(runs: Sequence[Recorded], placements: Sequence[Arms]) -> Table:
     """Returns a row a placement: lag over all runs, the worst run's, and least distances."""
     rows = []
-    for placement in placements:
+    for arms in placements:
         name = (
-            f"{placement.distance_behind:g} behind, {placement.spread:g} apart, "
-            f"{placement.height:+g} high, {math.degrees(placement.tilt):.0f}°"
+            f"{arms.distance_behind:g} behind, {arms.spread:g} apart, "
+            f"{arms.height_offset:+g} high, {arms.tilt_deg:.0f}°"
         )
         try:
-            done = [follow(run, placement) for run in runs]
+            done = [follow(run, arms) for run in runs]
         except ArmReachError as error:
             rows.append([name, None, None, None, str(error).split(":")[-1].strip(), None, None])
             continue
@@ -195,18 +194,19 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="run.h5, floating")
+    usual = Arms()
     for option, default, unit in (
-        ("behind", "0.85", "of the bases behind the person, m"),
-        ("spread", "1.0", "between them, m"),
-        ("height", "-0.45", "of them over the shoulders, m"),
-        ("tilt", "35", "of the hands, degrees"),
+        ("behind", usual.distance_behind, "of the bases behind the person, m"),
+        ("spread", usual.spread, "between them, m"),
+        ("height", usual.height_offset, "of them over the shoulders, m"),
+        ("tilt", usual.tilt_deg, "of the hands, degrees"),
     ):
         parser.add_argument(
             f"--{option}",
             type=_numbers,
-            default=_numbers(default),
+            default=[default],
             metavar="X,…",
-            help=f"{unit}; default {default}",
+            help=f"{unit}; default {default:g}",
         )
     return parser
 

@@ -16,5 +16,8 @@ def wilson(right: int, count: int) -> tuple[float, float]:
     middle = (share + _Z * _Z / (2 * count)) / (1 + _Z * _Z / count)
     spread = _Z / (1 + _Z * _Z / count)
     spread *= math.sqrt(share * (1 - share) / count + _Z * _Z / (4 * count * count))
-    # none and all of them end at 0 and 1, but for rounding
-    return max(0.0, middle - spread), min(1.0, middle + spread)
+    # of none and of all they end there, but for rounding
+    return (
+        middle - spread if right > 0 else 0.0,
+        middle + spread if right < count else 1.0,
+    )

@@ -139,10 +139,10 @@ def inject(
         timeout=120.0 / rate,
     )
     outcome = play(plan)
-    played = read_summary(out / "lab" / "summary.json")["realtime_factor"]
-    if played < KEPT_UP * rate:
+    kept = read_summary(out / "lab" / "summary.json")["realtime_factor"]
+    if kept < KEPT_UP * rate:
         raise RuntimeError(
-            f"the lab played {played:.2f} of time, expected {rate:g}; a slower rate may be kept"
+            f"the lab played {kept:.2f} of time, expected {rate:g}; a slower rate may be kept"
         )
     found = _judged(kind, stated, start, lasting, out)
     wrong: list[str] = found["wrong"]

@@ -80,15 +80,6 @@ class SerialArm:
         return jacobian
 
 
-def rotation_error(now: FloatArray, asked: FloatArray) -> FloatArray:
-    """Returns (3,) the rotation vector in W that turns `now` (3,3) to `asked` (3,3), rad.
-
-    At half a turn its axis is one of two; half a turn less rounding is as exact as any.
-    """
-    vector: FloatArray = find_rotation_error(now, asked)
-    return vector
-
-
 # What follows is called from compiled code, too: a cycle of 5 ms has no time for small arrays.
 
 
@@ -152,8 +143,11 @@ def moved_by(links, point, owner, out):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def find_rotation_error(now, asked):  # type: ignore[no-untyped-def]
-    """Returns (3,), as `rotation_error`."""
+def rotation_error(now, asked):  # type: ignore[no-untyped-def]
+    """Returns (3,) the rotation vector in W that turns `now` (3,3) to `asked` (3,3), rad.
+
+    At half a turn its axis is one of two; half a turn less rounding is as exact as any.
+    """
     r = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):

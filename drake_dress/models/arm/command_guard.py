@@ -16,7 +16,7 @@ most of it: with more, what has been caught up could not be braked in time, and 
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -39,9 +39,8 @@ class Stop(IntEnum):
     JUMP = 4  # farther from the one before than the joints could have gone
 
 
-@dataclass(frozen=True)
-class GuardSettings:
-    """What commands may do.
+class GuardSettings(NamedTuple):
+    """What commands may do, as kernels take it: numbers alone.
 
     Attributes:
         follow_time: τ above, s.
@@ -120,7 +119,6 @@ def follow(
         settings: what commands may do.
     """
     after = np.empty(3 * len(state.position) + 2)
-    s = settings or _USUAL
     _follow(
         state.packed(),
         position is not None,
@@ -130,25 +128,12 @@ def follow(
         bool(fresh),
         (limits.lower, limits.upper, limits.speed, limits.acceleration),
         float(dt),
-        _Settings._make(map(float, astuple(s))),
+        settings or GuardSettings(),
         after,
     )
     return DriveState.unpacked(after)
 
 
-class _Settings(NamedTuple):
-    """`GuardSettings` as kernels take them, in the same order."""
-
-    follow_time: float
-    spare: float
-    jump: float
-    pause: float
-    resume: float
-    braking: float
-    speed: float
-
-
-_USUAL = GuardSettings()
 _NONE, _ENDED, _NOT_FINITE, _OUTSIDE_LIMITS, _JUMP = (int(v) for v in Stop)
 
 

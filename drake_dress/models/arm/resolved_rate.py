@@ -11,7 +11,7 @@ of joints faster.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import daqp
@@ -21,10 +21,10 @@ import numpy.typing as npt
 
 from drake_dress.models.arm.chain import (
     SerialArm,
-    find_rotation_error,
     find_tool_jacobian,
     moved_by,
     place_links,
+    rotation_error,
 )
 from drake_dress.models.arm.clearance import (
     ArmShape,
@@ -42,9 +42,8 @@ _BOUND, _EQUAL, _SOFT = 0, 5, 8
 _NOBODY = Capsules(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
-@dataclass(frozen=True)
-class RateParameters:
-    """Settings of the arms' control.
+class RateParameters(NamedTuple):
+    """Settings of the arms' control, as kernels take them: numbers alone.
 
     Attributes:
         position_gain: of a gripper's error, 1/s. rotation_gain: of a hand's, 1/s.
@@ -122,12 +121,10 @@ class ArmPair:
     free_links: int = 2
     parameters: RateParameters = field(default_factory=RateParameters)
     _compiled: tuple[_Arm, _Arm] = field(init=False, repr=False, compare=False)
-    _gains: _Gains = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         compiled = tuple(_compiled(a, s) for a, s in zip(self.arms, self.shapes, strict=True))
         object.__setattr__(self, "_compiled", compiled)
-        object.__setattr__(self, "_gains", _Gains(*map(float, astuple(self.parameters))))
 
     def rates(
         self,
@@ -150,7 +147,7 @@ class ArmPair:
         cost, slope, rows, upper, lower, kinds, between, to_person = _programme(
             self._compiled,
             np.ascontiguousarray(self.home, dtype=np.float64),
-            self._gains,
+            self.parameters,
             np.array(q, dtype=np.float64),
             np.array(rate, dtype=np.float64),
             np.stack([goal.position for goal in goals]),
@@ -185,22 +182,6 @@ class _Arm(NamedTuple):
     second: FloatArray
     radius: FloatArray
     owner: npt.NDArray[np.int64]
-
-
-class _Gains(NamedTuple):
-    """`RateParameters` as kernels take them, in the same order."""
-
-    position_gain: float
-    rotation_gain: float
-    outward_gain: float
-    outward_distance: float
-    home_gain: float
-    max_turning: float
-    rotation_weight: float
-    slowdown_weight: float
-    least_distance: float
-    seen_distance: float
-    approach_acceleration: float
 
 
 def _compiled(arm: SerialArm, shape: ArmShape) -> _Arm:
@@ -240,7 +221,7 @@ def _programme(arms, home, p, q, rate, position, velocity, rotation, step, perso
         arm, own, slower = arms[i], slice(i * n, i * n + n), 2 * n + i
         tool = links[i, n + 1]
         jacobian = find_tool_jacobian(links[i])
-        turning = p.rotation_gain * find_rotation_error(tool[:3, :3], rotation[i])
+        turning = p.rotation_gain * rotation_error(tool[:3, :3], rotation[i])
         turning *= min(1.0, p.max_turning / max(length(turning), 1e-12))
         turn = jacobian[3:]
         cost[own, own] = np.eye(n) + p.rotation_weight * (turn.T @ turn)

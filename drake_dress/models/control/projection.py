@@ -78,8 +78,9 @@ def nearest(
     sets: list[Ball | HalfSpace] = [*balls, *half_spaces]
     rows = np.array([s.row for s in sets])
     out = np.empty(3)
-    found = find_nearest(np.asarray(point, dtype=np.float64), rows, out)
-    return out if found else None
+    if not find_nearest(np.asarray(point, dtype=np.float64), rows, out):
+        return None
+    return point if np.array_equal(out, point) else out
 
 
 @nb.njit(cache=True, nogil=True)

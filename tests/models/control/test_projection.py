@@ -71,8 +71,7 @@ def test_projection_makes_an_obtuse_angle_with_every_point_of_the_sets(seed: int
 def test_point_inside_is_not_moved() -> None:
     point = np.array([0.1, -0.2, 0.05])
     ball = Ball(np.zeros(3), 1.0)
-    found = nearest(point, [ball], [HalfSpace(np.array([1.0, 0.0, 0.0]), 0.2)])
-    np.testing.assert_array_equal(found, point)
+    assert nearest(point, [ball], [HalfSpace(np.array([1.0, 0.0, 0.0]), 0.2)]) is point
 
 
 def test_sets_that_do_not_meet_have_no_nearest_point() -> None:
