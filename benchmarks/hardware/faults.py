@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hardware.two_processes import Plan, play
+from benchmarks.hardware.two_processes import Plan, play_usable
 from drake_dress.errors import UserError
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES
@@ -109,7 +109,8 @@ def inject(
         overrides: further KEY=VALUE for both processes.
 
     Raises:
-        RuntimeError: the lab did not keep up with the rate, so that nothing can be judged.
+        RuntimeError: lab or run did not begin, or the lab did not keep up with the rate, so that
+            nothing can be judged.
     """
     rng = np.random.default_rng([seed, *kind.encode()])
     stated = REACTIONS[kind].at(rate)
@@ -138,7 +139,7 @@ def inject(
         fill_at=start / rate if kind == "disk_full" else None,
         timeout=120.0 / rate,
     )
-    outcome = play(plan)
+    outcome = play_usable(plan)
     kept = read_summary(out / "lab" / "summary.json")["realtime_factor"]
     if kept < KEPT_UP * rate:
         raise RuntimeError(

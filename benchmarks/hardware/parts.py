@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hardware.faults import inject
-from benchmarks.hardware.two_processes import Plan, play
+from benchmarks.hardware.two_processes import Plan, play_usable
 from drake_dress.errors import UserError
 from drake_dress.report.summary import read_summary
 
@@ -85,14 +85,14 @@ def _measured(
 
 
 def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
-    play(Plan(conditions.scenario, str(out), [*_COARSE, "duration=30", *overrides]))
+    play_usable(Plan(conditions.scenario, str(out), [*_COARSE, "duration=30", *overrides]))
     summary = read_summary(out / "run" / "summary.json")
     return {key: summary[key] for key in ("command_rate_hz", "command_latency_ms", "start_up_s")}
 
 
 def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     rate = conditions.rate
-    done = play(Plan(conditions.scenario, str(out), [*overrides], rate=rate, timeout=1200.0))
+    done = play_usable(Plan(conditions.scenario, str(out), [*overrides], rate=rate, timeout=1200.0))
     sides = {"run": done.run_status, "lab": done.lab_status}
     keys = ("reason", "dressing_time_s", "max_gripper_force_N")
     summaries = {name: read_summary(out / name / "summary.json") for name in sides}
@@ -110,16 +110,20 @@ def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> di
 def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     # so coarse that nothing succeeds, or the run would end
     duration = 60.0 * conditions.minutes
-    done = play(
+    done = play_usable(
         Plan(
             conditions.scenario,
             str(out),
             [*_COARSE, *_COARSER, f"duration={duration}", *overrides],
-            timeout=duration + 120.0,
+            timeout=duration + 300.0,
             sampled=True,
         )
     )
-    memory = {"run": done.run_memory, "lab": done.lab_memory}
+    # afterwards each writes its report
+    count = int(duration)
+    if len(done.run_memory) < count:
+        raise RuntimeError(f"they ran for {len(done.run_memory)} s, expected {count}")
+    memory = {"run": done.run_memory[:count], "lab": done.lab_memory[:count]}
     return {
         "minutes": conditions.minutes,
         **{name: growth(values) for name, values in memory.items()},

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import psutil
 
+from benchmarks.parser import UNUSABLE
 from drake_dress.diagrams.lab import OPEN
 
 _ROOT = Path(__file__).parents[2]
@@ -37,7 +38,7 @@ class Plan:
         kill_at: SIGKILL to the run, s after the first command.
         fill_at: when the run's disk is filled, s after the first command.
         timeout: for the lab to open, and then for all of it, s.
-        sampled: whether memory is sampled, each second.
+        sampled: whether memory is sampled, each second from the first command on.
     """
 
     scenario: str
@@ -95,6 +96,22 @@ def play(plan: Plan) -> Outcome:
         return Outcome(**json.loads(answer.read_text(encoding="utf-8")))
 
 
+def play_usable(plan: Plan) -> Outcome:
+    """Returns how a lab and a run went that could both begin.
+
+    Raises:
+        RuntimeError: one of them could not; the message ends with its own.
+    """
+    done = play(plan)
+    for name, status, words in (
+        ("lab", done.lab_status, done.lab_words),
+        ("run", done.run_status, done.run_words),
+    ):
+        if status == UNUSABLE:
+            raise RuntimeError(f"the {name} did not begin: {words.strip().splitlines()[-1]}")
+    return done
+
+
 def _inside(plan: Plan) -> Outcome:
     out = Path(plan.out)
     run_out = out / "run"
@@ -133,7 +150,7 @@ def _inside(plan: Plan) -> Outcome:
             process["lab"].kill()
     process["run"] = started("run")
     memory: dict[str, list[float]] = {"lab": [], "run": []}
-    begin, begun, filled, sampled = time.monotonic(), None, False, 0.0
+    begin, begun, filled = time.monotonic(), None, False
     while any(p.poll() is None for p in process.values()):
         time.sleep(_POLL)
         now = time.monotonic()
@@ -151,8 +168,7 @@ def _inside(plan: Plan) -> Outcome:
             if now - begun >= plan.fill_at:
                 filled = True
                 _fill(run_out / "filler")
-        if plan.sampled and now - sampled >= 1.0:
-            sampled = now
+        if plan.sampled and begun is not None and now - begun >= len(memory["lab"]):
             for name, p in process.items():
                 memory[name].append(memory_of(p.pid))
     for file in files.values():

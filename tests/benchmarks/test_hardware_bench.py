@@ -12,7 +12,7 @@ import pytest
 from benchmarks.hardware import __main__ as bench
 from benchmarks.hardware.__main__ import main
 from benchmarks.hardware.faults import REACTIONS, inject
-from benchmarks.hardware.parts import Case, Conditions, growth
+from benchmarks.hardware.parts import Case, Conditions, growth, run
 from benchmarks.hardware.two_processes import Plan, available, memory_of, play
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
@@ -108,7 +108,9 @@ def test_what_was_measured_is_kept_and_told(
 ) -> None:
     asked = []
 
-    def run(case: Case, conditions: Conditions, out: Path, overrides: list[str]) -> dict[str, Any]:
+    def noted(
+        case: Case, conditions: Conditions, out: Path, overrides: list[str]
+    ) -> dict[str, Any]:
         asked.append(case.name)
         wrong = ["held after 0.30 s"] if case.name == "nan-0001" else []
         facts = {"source": "left_arm", "start": 1.0, "held_after": 0.2, "speed": 0.5, "torque": 0.1}
@@ -116,7 +118,7 @@ def test_what_was_measured_is_kept_and_told(
         facts |= {"rate": conditions.fault_rate, "within": stated["within"]}
         return {"case": asdict(case), "summary": {**facts, "wrong": wrong}}
 
-    monkeypatch.setattr(bench, "run", run)
+    monkeypatch.setattr(bench, "run", noted)
     monkeypatch.setattr(bench, "available", lambda: True)
     file = tmp_path / "results.json"
     words = ["--only", "faults", "--kinds", "nan,push", "--json", str(file)]
@@ -139,6 +141,15 @@ def test_what_waits_by_the_wall_clock_takes_less_of_a_slower_one() -> None:
     assert slower.within == pytest.approx(0.45 - 0.5 * 0.2)
     assert REACTIONS["nan"].at(0.5).within == REACTIONS["nan"].within
     assert REACTIONS["push"].at(0.5).within is None
+
+
+@needs_network
+def test_what_cannot_begin_is_told_as_what_it_is(tmp_path: Path) -> None:
+    conditions = Conditions(SCENARIO, rate=1.0, fault_rate=1.0, minutes=2000.0)
+    found = run(Case("soak"), conditions, tmp_path)
+    assert "summary" not in found
+    assert found["problem"].startswith("the lab did not begin: ")
+    assert "duration: is 120000.0, expected" in found["problem"]
 
 
 def test_memory_that_grows_is_found_in_noise() -> None:

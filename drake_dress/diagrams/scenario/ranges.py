@@ -28,10 +28,11 @@ CHOICES = {
     "station.arms.mode": ("position_velocity", "position", "velocity"),
 }
 
-# Ranges by the end of the dotted key, both ends allowed; all other numbers must be finite.
+# Ranges by the end of the dotted key, the longest counts, both ends allowed; all other numbers
+# must be finite.
 _RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63 - 1),
-    "duration": (0.1, 600.0),
+    "duration": (0.1, 86400.0),
     "arms.distance_behind": (-5.0, 5.0),
     "arms.spread": (0.0, 5.0),
     "arms.height_offset": (-2.0, 2.0),
@@ -172,8 +173,8 @@ def plain(key: str) -> str:
 
 def range_of(key: str) -> tuple[float, float] | None:
     """Returns the range of the number at a dotted key, both ends allowed, if it has one."""
-    name = plain(key)
-    for end, bounds in _RANGES.items():
-        if name == end or name.endswith("." + end):
-            return bounds
+    name = "." + plain(key)
+    ends = [end for end in _RANGES if name.endswith("." + end)]
+    if ends:
+        return _RANGES[max(ends, key=len)]
     return _OF_MEASURES if ".measures." in key else _OF_EFFECTS.get(key)
