@@ -11,6 +11,7 @@ from drake_dress.diagrams.scenario import (
     load_scenario,
     resolved_yaml,
 )
+from drake_dress.diagrams.scenario.ranges import range_of
 from drake_dress.diagrams.scenario.schema import Arm, Variation
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
@@ -92,6 +93,21 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
     assert scenario.duration == 3.0
     assert scenario.garment.mesh is not None and scenario.garment.mesh.file == "x.obj"
     assert scenario.seed == 5
+
+
+@pytest.mark.parametrize(
+    ("key", "allowed"),
+    [
+        ("duration", (0.1, 86400.0)),
+        ("lab.faults[3].duration", (0.0, 1e4)),
+        ("person.behaviour.motions[0].turn.duration", (0.1, 60.0)),
+        ("plant.material.no_such_key", None),
+    ],
+)
+def test_the_longest_end_of_a_key_says_which_numbers_it_takes(
+    key: str, allowed: tuple[float, float] | None
+) -> None:
+    assert range_of(key) == allowed
 
 
 def test_old_name_of_the_force_limit_still_sets_it(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def write(path: Path, garment: GarmentMesh, samples: list[Sample]) -> Path:
     with RunLogWriter(
         path,
         garment=garment,
-        scenario_text="name: synthetic\n",
+        scenario_text="seed: 3\n",
         version="0.0",
         seed=3,
         radius=np.full(6, ARM_RADIUS),

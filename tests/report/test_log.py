@@ -41,7 +41,7 @@ def test_what_is_read_is_what_was_written(path, garment, samples):
     with RunLog.open(path) as log:
         assert len(log) == len(samples)
         assert log.time.tolist() == [s.time for s in samples]  # to the last bit
-        assert (log.seed, log.version, log.scenario_text) == (3, "0.0", "name: synthetic\n")
+        assert (log.seed, log.version, log.scenario_text) == (3, "0.0", "seed: 3\n")
         np.testing.assert_array_equal(log.faces, garment.faces)
         np.testing.assert_array_equal(log.rest_position, garment.rest_position)
         for name, loop in garment.loops.items():
