@@ -5,7 +5,8 @@ whole. A disk that is nearly full ends the log before HDF5 is in trouble, which 
 space to close the file is kept back for that. A process that is killed leaves what was flushed
 last: samples are written together about once a second, rows of bulky datasets are never rewritten,
 and HDF5 is told to keep its own bookkeeping in memory between flushes, so that the file on disk is
-consistent at all times but during a flush.
+consistent at all times but during a flush. That memory grows with every row; closing the file and
+opening it again, every few thousand samples, gives it back.
 
 Writing and flushing a second of samples takes tens of milliseconds, for which no command may wait:
 a thread does it. Who appends hears of a failure with a later sample.
@@ -14,6 +15,7 @@ a thread does it. Who appends hears of a failure with a later sample.
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import tempfile
 import time as clock
@@ -48,6 +50,7 @@ _RESERVE, _LEAST_FREE = 16 << 20, 4 << 20
 _MOST_WAITING = 64  # samples that are kept in memory between flushes
 _MOST_BEHIND = 512  # samples that are kept while those before them are still being written
 _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+_MOST_OPEN = 2000  # samples that are written before the file is opened anew
 
 
 @dataclass(frozen=True)
@@ -169,17 +172,18 @@ class RunLogWriter:
     ) -> None:
         self.path = Path(path)
         try:
-            self._file = h5py.File(self.path, "w")
+            self._lock: int | None = _locked(self.path)
+            self._file = _open(self.path, "w")
         except OSError as error:
             raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
-        _keep_metadata_until_flush(self._file)
         self._reserve = _reserved(self.path.parent, _RESERVE)
         if self._reserve is None:
             self._file.close()
+            os.close(self._lock)
             self.path.unlink()
             raise UserError(str(path), "", "no room on the disk, expected 16 MB at least")
         self._flush_period = flush_period
-        self._count = 0
+        self._count = self._count_opened = 0
         self._last_time = -np.inf
         self._series: dict[str, h5py.Dataset] = {}
         self._shapes: dict[str, tuple[int, ...]] = {}
@@ -283,20 +287,23 @@ class RunLogWriter:
 
     def close(self) -> None:
         """Closes the file with as many whole samples as were appended; may be called twice."""
-        if not self._file:
+        if self._lock is None:
             return
         try:
             self._drain()
         finally:
             self._worker.shutdown()
             self._release()
-            self._write(self._waiting, flush=False)
-            self._waiting = []
-            # An interrupt may have come in the middle of a sample.
-            for dataset in self._series.values():
-                if dataset.shape[0] != self._count:
-                    dataset.resize(self._count, axis=0)
-            self._file.close()
+            if self._file:
+                self._write(self._waiting, flush=False)
+                self._waiting = []
+                # An interrupt may have come in the middle of a sample.
+                for dataset in self._series.values():
+                    if dataset.shape[0] != self._count:
+                        dataset.resize(self._count, axis=0)
+                self._file.close()
+            os.close(self._lock)
+            self._lock = None
 
     def __enter__(self) -> RunLogWriter:
         return self
@@ -342,7 +349,7 @@ class RunLogWriter:
             "/human/capsule_b": sample.capsule_b,
         }
         for name, array in optional.items():
-            if name in self._series:
+            if name in self._shapes:
                 # not the dataset's, which would wait for what is being written
                 rows[name] = np.full(self._shapes[name], np.nan) if array is None else array
         return rows
@@ -417,6 +424,15 @@ class RunLogWriter:
             self._count = count
         if flush:
             self._file.flush()
+            if self._count - self._count_opened >= _MOST_OPEN:
+                self._open_anew()
+
+    def _open_anew(self) -> None:
+        """Empties what HDF5 keeps of the file in memory, all of which is on the disk."""
+        self._file.close()
+        self._file = _open(self.path, "r+")
+        self._series = {name: self._file[name] for name in self._series}
+        self._count_opened = self._count
 
     def _check_space(self) -> None:
         if self._reserve is None:
@@ -449,13 +465,35 @@ def _reserved(directory: Path, size: int) -> int | None:
         return None
 
 
-def _keep_metadata_until_flush(file: h5py.File) -> None:
+def _locked(path: Path) -> int:
+    """Returns a file that is locked as HDF5 locks what it writes, and stays so until it is closed.
+
+    HDF5's own lock would end wherever it is opened anew, and who read then would keep us out.
+
+    Raises:
+        OSError: it cannot be, or another one writes or reads it.
+    """
+    number = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        # not every file system has locks
+        if error.errno not in (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP):
+            os.close(number)
+            raise
+    return number
+
+
+def _open(path: Path, mode: str) -> h5py.File:
+    """Returns a file that keeps its bookkeeping in memory until it is flushed."""
+    file = h5py.File(path, mode, locking=False)
     configuration = file.id.get_mdc_config()
     configuration.evictions_enabled = False
     configuration.incr_mode = 0
     configuration.flash_incr_mode = 0
     configuration.decr_mode = 0
     file.id.set_mdc_config(configuration)
+    return file
 
 
 def _label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:

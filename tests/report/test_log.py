@@ -16,6 +16,7 @@ import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
+from drake_dress.report import log_writer
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import JOINT_NAMES
 from drake_dress.report.log_writer import RunLogWriter
@@ -151,8 +152,10 @@ def test_killed_process_leaves_what_was_flushed(tmp_path):
 import time
 import numpy as np
 from dataclasses import replace
+from drake_dress.report import log_writer
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
+log_writer._MOST_OPEN = 50
 garment = synthetic.coat(0.06)
 sample = synthetic.dressing(garment, count=2)[0]
 writer = RunLogWriter({str(path)!r}, garment=garment, scenario_text="", version="", seed=0,
@@ -184,6 +187,79 @@ for i in range(10**6):
     with RunLog.open(path) as log:
         assert len(log) == 602
         assert np.isfinite(log.garment_position(len(log) - 1)).all()
+
+
+def test_memory_does_not_grow_with_samples(tmp_path, garment, samples, monkeypatch):
+    """What HDF5 keeps of a file until it is closed, 1 kB a sample, is 100 MB an hour."""
+    monkeypatch.setattr(log_writer, "_MOST_OPEN", 50)
+    path = tmp_path / "run.h5"
+    kept = []
+    count = 800
+    with RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.0,
+    ) as writer:  # fmt: skip
+        for k in range(count):
+            moved = np.asarray(samples[0].garment_position) + k
+            writer.append(replace(samples[0], time=float(k), garment_position=moved))
+            if k % 10 == 9:
+                writer._drain()
+                kept.append(writer._file.id.get_mdc_size()[2])
+        writer.note("note", "there")
+    third = len(kept) // 3
+    assert max(kept[-third:]) < 1.2 * max(kept[:third])
+    with RunLog.open(path) as log:
+        assert log.time.tolist() == list(range(count))
+        first = np.asarray(samples[0].garment_position)
+        for k in (0, 49, 50, 51, count - 1):
+            np.testing.assert_allclose(log.garment_position(k), first + k, atol=1e-4)
+
+
+def test_a_file_that_cannot_be_opened_again_ends_the_log(tmp_path, garment, samples, monkeypatch):
+    monkeypatch.setattr(log_writer, "_MOST_OPEN", 2)
+    path = tmp_path / "run.h5"
+    writer = RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.0,
+    )  # fmt: skip
+    writer.append(samples[0])
+    writer._drain()
+    path.rename(tmp_path / "gone.h5")
+    writer.append(samples[1])
+    with pytest.raises(OSError, match=r"run\.h5"):
+        writer.append(samples[2])
+        writer._drain()
+    writer.close()
+    with RunLog.open(tmp_path / "gone.h5") as log:
+        assert len(log) == 2
+
+
+def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
+    tmp_path, garment, samples, monkeypatch
+):
+    """Nor in between, when it is opened anew."""
+    monkeypatch.setattr(log_writer, "_MOST_OPEN", 1)
+    path = tmp_path / "run.h5"
+    opened = log_writer._open
+
+    def refused(*words):
+        with pytest.raises(UserError, match="still being written"):
+            RunLog.open(path)
+        return opened(*words)
+
+    words = {
+        "garment": garment, "scenario_text": "", "version": "", "seed": 0, "radius": np.ones(6),
+        "capsule_radius": np.ones(6), "flush_period": 0.0,
+    }  # fmt: skip
+    with RunLogWriter(path, **words) as writer:
+        monkeypatch.setattr(log_writer, "_open", refused)
+        for sample in samples[:3]:
+            writer.append(sample)
+            writer._drain()
+        with pytest.raises(UserError, match="cannot be written"):
+            RunLogWriter(path, **words)
+    with RunLog.open(path) as log:
+        assert len(log) == 3
 
 
 def test_time_must_increase(tmp_path, garment, samples):
