@@ -24,12 +24,18 @@ from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.stills import floor_height
 
 MAX_BYTES = 25_000_000
+# Nodes times frames that are looked at: of hours of a garment there are more than memory holds.
+MAX_NODES = 10_000_000
 _RESOLUTION = 1e-4  # m
 _INT16_STEPS = 65_000
 
 
 def write_replay_html(
-    log: RunLog, path: str | Path, fps: float = 15.0, max_bytes: int = MAX_BYTES
+    log: RunLog,
+    path: str | Path,
+    fps: float = 15.0,
+    max_bytes: int = MAX_BYTES,
+    max_nodes: int = MAX_NODES,
 ) -> None:
     """Writes the replay of a log.
 
@@ -38,12 +44,16 @@ def write_replay_html(
         path: of the HTML file.
         fps: frames a second of simulated time; the page interpolates. Halved until the file fits.
         max_bytes: size the file keeps below.
+        max_nodes: nodes times frames that it keeps below.
 
     Raises:
         UserError: the log has no samples.
     """
     if not len(log):
         raise UserError(str(log.path), "/time", "holds no sample; expected at least one")
+    nodes = len(log.rest_position)
+    while len(_frames(log.time, fps)) * nodes > max_nodes and fps > 1e-3:
+        fps *= 0.5
     while True:
         page = _page(log, fps)
         if len(page) <= max_bytes or fps < 0.5:

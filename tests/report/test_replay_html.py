@@ -89,6 +89,21 @@ def test_size_is_kept_below_its_limit(page, tmp_path):
     assert (tmp_path / "small.html").stat().st_size <= limit
 
 
+def test_long_logs_have_fewer_frames_a_second(page, tmp_path):
+    """Half of them, and half of that, until as many are left as may be."""
+
+    def count(**limits):
+        with RunLog.open(page.parent / "run.h5") as log:
+            write_replay_html(log, tmp_path / "some.html", **limits)
+            meta = re.search(r'"frames": (\d+)', (tmp_path / "some.html").read_text())
+            return int(meta.group(1)), len(log.rest_position)
+
+    every, nodes = count()
+    few, _ = count(max_nodes=every * nodes // 3)
+    assert every // 6 < few <= every // 3
+    assert count(max_nodes=1)[0] >= 1
+
+
 def test_empty_log_is_refused(tmp_path):
     path = synthetic.write(tmp_path / "run.h5", synthetic.coat(0.06), [])
     with RunLog.open(path) as log, pytest.raises(UserError):
