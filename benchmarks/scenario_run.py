@@ -9,12 +9,26 @@ from pathlib import Path
 
 
 def run_scenario(
-    scenario: Path, out: Path, overrides: Sequence[str] = (), seed: int | None = None
+    scenario: Path,
+    out: Path,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    report: bool = True,
 ) -> tuple[int, str]:
-    """Returns the exit status, and why the run could not be used (empty where it could)."""
+    """Returns the exit status, and why the run could not be used (empty where it could).
+
+    Args:
+        scenario: file.
+        out: directory that it writes to.
+        overrides: KEY=VALUE for the scenario.
+        seed: of the run; None for the scenario's own.
+        report: whether report and replay are written beside log and summary.
+    """
     command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
     # others run beside it
     command += ["--one-process", "--out", str(out)]
+    if not report:
+        command.append("--no-report")
     if seed is not None:
         command += ["--seed", str(seed)]
     for item in overrides:

@@ -141,7 +141,7 @@ def run_case(
         look: what to take from the folder that it wrote.
     """
     with place_of(case, folder) as out:
-        status, problem = run_scenario(scenario, out, settings, seed)
+        status, problem = run_scenario(scenario, out, settings, seed, report=folder is not None)
         if problem:
             return {"case": asdict(case), "problem": problem}
         summary = read_summary(out / "summary.json")

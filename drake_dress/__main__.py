@@ -106,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
         help="simulate the garment and solve for plans in this process, too, where other runs use "
         "the other cores; the numbers are the same",
     )
+    _add_report(run)
     run.set_defaults(command=_run)
 
     lab = verbs.add_parser(
@@ -122,6 +123,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="R",
         help="at most R simulated seconds per second (default: 1)",
     )
+    _add_report(lab)
     lab.set_defaults(command=_sim_station)
 
     calibrate = verbs.add_parser(
@@ -191,6 +193,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_report(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--report",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="write report and replay beside log and summary",
+    )
+
+
 def _calibrate(options: argparse.Namespace) -> int:
     from drake_dress.diagrams.calibration import calibrate_camera, parse_board, write_board
     from drake_dress.diagrams.scenario import load_scenario
@@ -217,7 +228,7 @@ def _sim_station(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, options.set, options.seed)
     source = Path(options.scenario)
     out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}-lab")
-    return run_lab(scenario, source, out, options.realtime_rate)
+    return run_lab(scenario, source, out, options.realtime_rate, options.report)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -228,7 +239,9 @@ def _run(options: argparse.Namespace) -> int:
     source = Path(options.scenario)
     out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
     beside = not options.one_process and (os.cpu_count() or 1) > 1
-    return run_scenario(scenario, source, out, options.meshcat, options.realtime_rate, beside)
+    return run_scenario(
+        scenario, source, out, options.meshcat, options.realtime_rate, beside, options.report
+    )
 
 
 def _replay(options: argparse.Namespace) -> int:

@@ -38,7 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if not (options.kept or available()):
         raise UserError("bench", _NAME, "no network namespace, expected the right to unshare")
-    conditions = Conditions(options.scenario, options.rate, options.fault_rate, options.minutes)
+    conditions = Conditions(
+        options.scenario,
+        options.rate,
+        options.fault_rate,
+        options.minutes,
+        report=options.keep is not None,
+    )
 
     def measured(case: Case, keep: Path | None, overrides: Sequence[str]) -> dict[str, Any]:
         with place_of(case, keep) as out:

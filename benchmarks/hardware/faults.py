@@ -96,6 +96,7 @@ def inject(
     out: Path,
     rate: float = 1.0,
     overrides: Sequence[str] = (),
+    report: bool = False,
 ) -> dict[str, Any]:
     """Returns what a fault did, and under "wrong" what was not as stated.
 
@@ -107,6 +108,7 @@ def inject(
         rate: simulated seconds per second. A machine that does other work too is late by
             milliseconds of its own; at a slower rate they are fewer of those that are judged.
         overrides: further KEY=VALUE for both processes.
+        report: whether lab and run write report and replay, too.
 
     Raises:
         RuntimeError: lab or run did not begin, or the lab did not keep up with the rate, so that
@@ -138,6 +140,7 @@ def inject(
         kill_at=start / rate if kind == "killed" else None,
         fill_at=start / rate if kind == "disk_full" else None,
         timeout=120.0 / rate,
+        report=report,
     )
     outcome = play_usable(plan)
     kept = read_summary(out / "lab" / "summary.json")["realtime_factor"]

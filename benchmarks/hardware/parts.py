@@ -46,12 +46,14 @@ class Conditions:
         scenario: file of lab and run.
         rate: of the dressing, simulated seconds per second. fault_rate: of the faults.
         minutes: of the soak.
+        report: whether lab and run write report and replay, too.
     """
 
     scenario: str
     rate: float
     fault_rate: float
     minutes: float
+    report: bool = False
 
 
 def run(
@@ -81,18 +83,41 @@ def _measured(
         return _dressing(conditions, out, overrides)
     if case.part == "soak":
         return _soak(conditions, out, overrides)
-    return inject(case.kind, case.seed, conditions.scenario, out, conditions.fault_rate, overrides)
+    return inject(
+        case.kind,
+        case.seed,
+        conditions.scenario,
+        out,
+        conditions.fault_rate,
+        overrides,
+        conditions.report,
+    )
 
 
 def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
-    play_usable(Plan(conditions.scenario, str(out), [*_COARSE, "duration=30", *overrides]))
+    plan = Plan(
+        conditions.scenario,
+        str(out),
+        [*_COARSE, "duration=30", *overrides],
+        report=conditions.report,
+    )
+    play_usable(plan)
     summary = read_summary(out / "run" / "summary.json")
     return {key: summary[key] for key in ("command_rate_hz", "command_latency_ms", "start_up_s")}
 
 
 def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     rate = conditions.rate
-    done = play_usable(Plan(conditions.scenario, str(out), [*overrides], rate=rate, timeout=1200.0))
+    done = play_usable(
+        Plan(
+            conditions.scenario,
+            str(out),
+            [*overrides],
+            rate=rate,
+            timeout=1200.0,
+            report=conditions.report,
+        )
+    )
     sides = {"run": done.run_status, "lab": done.lab_status}
     keys = ("reason", "dressing_time_s", "max_gripper_force_N")
     summaries = {name: read_summary(out / name / "summary.json") for name in sides}
@@ -117,9 +142,10 @@ def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[s
             [*_COARSE, *_COARSER, f"duration={duration}", *overrides],
             timeout=duration + 300.0,
             sampled=True,
+            report=conditions.report,
         )
     )
-    # afterwards each writes its report
+    # afterwards each concludes
     count = int(duration)
     if len(done.run_memory) < count:
         raise RuntimeError(f"they ran for {len(done.run_memory)} s, expected {count}")

@@ -39,6 +39,7 @@ class Plan:
         fill_at: when the run's disk is filled, s after the first command.
         timeout: for the lab to open, and then for all of it, s.
         sampled: whether memory is sampled, each second from the first command on.
+        report: whether report and replay are written beside log and summary.
     """
 
     scenario: str
@@ -51,6 +52,7 @@ class Plan:
     fill_at: float | None = None
     timeout: float = 600.0
     sampled: bool = False
+    report: bool = False
 
 
 @dataclass(frozen=True)
@@ -122,10 +124,10 @@ def _inside(plan: Plan) -> Outcome:
             ["mount", "-t", "tmpfs", "-o", "size=48m", "tmpfs", str(run_out)], check=True
         )
     files = {name: (out / f"{name}.log").open("w") for name in ("lab", "run")}
-    rate = ["--realtime-rate", str(plan.rate)]
+    common = ["--realtime-rate", str(plan.rate), "--report" if plan.report else "--no-report"]
     words = {
-        "lab": ["sim-station", plan.scenario, "--out", str(out / "lab"), *rate],
-        "run": ["run", plan.scenario, "--no-meshcat", "--out", str(run_out), *rate],
+        "lab": ["sim-station", plan.scenario, "--out", str(out / "lab"), *common],
+        "run": ["run", plan.scenario, "--no-meshcat", "--out", str(run_out), *common],
     }
     sets = {
         "lab": [*plan.settings, *plan.lab_settings],

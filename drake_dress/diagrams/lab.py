@@ -76,7 +76,9 @@ class Lab:
     lcm: DrakeLcm
 
 
-def run_lab(scenario: Scenario, source: Path, out: Path, realtime_rate: float = 1.0) -> int:
+def run_lab(
+    scenario: Scenario, source: Path, out: Path, realtime_rate: float = 1.0, report: bool = True
+) -> int:
     """Plays a scenario's lab until its commands have ended; returns the exit status.
 
     Args:
@@ -84,6 +86,7 @@ def run_lab(scenario: Scenario, source: Path, out: Path, realtime_rate: float = 
         source: the scenario's file, for messages and paths relative to it.
         out: directory to write to.
         realtime_rate: at most this many simulated seconds per second.
+        report: whether report and replay are written beside log and summary.
 
     Raises:
         UserError: the garment or the arms cannot be used, or there is no bus.
@@ -121,8 +124,7 @@ def run_lab(scenario: Scenario, source: Path, out: Path, realtime_rate: float = 
         (out / "run.h5").unlink()
         print("interrupted" if ended is None else f"no run: {ended}")
         return INTERRUPTED if ended is None else NOT_DRESSED
-    success, reason = conclude(out, wall_time)
-    print(f"log, report and replay: {out}")
+    success, reason = conclude(out, wall_time, report)
     if ended is None:
         print("interrupted: what had run is in the log")
         return INTERRUPTED

@@ -49,6 +49,7 @@ def run_scenario(
     meshcat: bool = True,
     realtime_rate: float = 0.0,
     beside: bool = False,
+    report: bool = True,
 ) -> int:
     """Runs a scenario and writes log, summary, report and replay; returns the exit status.
 
@@ -61,6 +62,7 @@ def run_scenario(
             for hardware.
         beside: whether the simulated garment is stepped, and the global controller solves, in
             processes of their own.
+        report: whether report and replay are written beside log and summary.
 
     Raises:
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
@@ -92,8 +94,7 @@ def run_scenario(
         _note(dressing, ending, writer)
     wall_time = clock.perf_counter() - begin
 
-    success, reason = conclude(out, wall_time)
-    print(f"log, report and replay: {out}")
+    success, reason = conclude(out, wall_time, report)
     if ending.interrupted:
         print("interrupted: what had run is in the log")
         return INTERRUPTED
@@ -242,12 +243,18 @@ def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
     return watch.conclusion(watch.GetMyContextFromRoot(simulator.get_context()))
 
 
-def conclude(out: Path, wall_time: float) -> tuple[bool, str | None]:
-    """Writes summary, report and replay of the log in `out`; returns success and reason."""
+def conclude(out: Path, wall_time: float, report: bool = True) -> tuple[bool, str | None]:
+    """Writes the summary of the log in `out`, and report and replay if they are wanted.
+
+    Returns:
+        success and reason.
+    """
     with RunLog.open(out / "run.h5") as log:
         measures = measure(log)
         summary = summarize(log, wall_time=wall_time, measures=measures)
         write_summary(summary, out / "summary.json")
-        write_report(out, measures=measures)
-        write_replay_html(log, out / "replay.html")
+        if report:
+            write_report(out, measures=measures)
+            write_replay_html(log, out / "replay.html")
+    print(f"{'log, report and replay' if report else 'log and summary'}: {out}")
     return bool(summary["success"]), summary["reason"]

@@ -38,10 +38,31 @@ def test_run_that_ends_too_early_says_so(run: tuple[int, Path]) -> None:
         assert (folder / "out" / name).stat().st_size > 1000
 
 
-def test_same_seed_gives_the_same_numbers(run: tuple[int, Path]) -> None:
+@pytest.fixture(scope="module")
+def again(run: tuple[int, Path]) -> Path:
     _, folder = run
-    main(["run", str(folder / "short.yaml"), "--out", str(folder / "again"), "--no-meshcat"])
-    with h5py.File(folder / "out" / "run.h5") as a, h5py.File(folder / "again" / "run.h5") as b:
+    out = folder / "again"
+    words = ["--out", str(out), "--no-meshcat", "--no-report"]
+    assert main(["run", str(folder / "short.yaml"), *words]) == 1
+    return out
+
+
+def test_a_run_without_report_writes_log_and_summary_alone(
+    run: tuple[int, Path], again: Path
+) -> None:
+    assert {path.name for path in again.iterdir()} == {"run.h5", "summary.json"}
+    _, folder = run
+    first, second = (json.loads((p / "summary.json").read_text()) for p in (folder / "out", again))
+    timed = {key for key in first if first[key] != second[key]}
+    assert timed <= {
+        "wall_time_s", "realtime_factor", "global_rate_hz", "local_rate_hz",
+        "global_solve_ms", "local_solve_ms",
+    }  # fmt: skip
+
+
+def test_same_seed_gives_the_same_numbers(run: tuple[int, Path], again: Path) -> None:
+    _, folder = run
+    with h5py.File(folder / "out" / "run.h5") as a, h5py.File(again / "run.h5") as b:
         for name in ("garment/position", "gripper/left/force", "human/joint_position"):
             np.testing.assert_array_equal(a[name][()], b[name][()])
 
