@@ -108,7 +108,7 @@ BAD_YAML = {
     ),
     "unknown preset": ("garment: {coat: {preset: cape}}", ["garment.coat.preset", "jacket"]),
     "unknown station": ("station: {kind: moon}", ["station.kind", "simulated"]),
-    "too long": ("duration: 1e9", ["duration", "600"]),
+    "too long": ("duration: 1e9", ["duration", "86400"]),
     "no time": ("duration: 0", ["duration", "0.1"]),
     "negative seed": ("seed: -1", ["seed", "0"]),
     "not a number": ("plant: {time_step: .nan}", ["plant.time_step", "finite"]),
