@@ -95,29 +95,14 @@ def _measured(
 
 
 def _commands(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
-    plan = Plan(
-        conditions.scenario,
-        str(out),
-        [*_COARSE, "duration=30", *overrides],
-        report=conditions.report,
-    )
-    play_usable(plan)
+    play_usable(_plan(conditions, out, [*_COARSE, "duration=30", *overrides]))
     summary = read_summary(out / "run" / "summary.json")
     return {key: summary[key] for key in ("command_rate_hz", "command_latency_ms", "start_up_s")}
 
 
 def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     rate = conditions.rate
-    done = play_usable(
-        Plan(
-            conditions.scenario,
-            str(out),
-            [*overrides],
-            rate=rate,
-            timeout=1200.0,
-            report=conditions.report,
-        )
-    )
+    done = play_usable(_plan(conditions, out, overrides, rate=rate, timeout=1200.0))
     sides = {"run": done.run_status, "lab": done.lab_status}
     keys = ("reason", "dressing_time_s", "max_gripper_force_N")
     summaries = {name: read_summary(out / name / "summary.json") for name in sides}
@@ -135,16 +120,8 @@ def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> di
 def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
     # so coarse that nothing succeeds, or the run would end
     duration = 60.0 * conditions.minutes
-    done = play_usable(
-        Plan(
-            conditions.scenario,
-            str(out),
-            [*_COARSE, *_COARSER, f"duration={duration}", *overrides],
-            timeout=duration + 300.0,
-            sampled=True,
-            report=conditions.report,
-        )
-    )
+    settings = [*_COARSE, *_COARSER, f"duration={duration}", *overrides]
+    done = play_usable(_plan(conditions, out, settings, timeout=duration + 300.0, sampled=True))
     # afterwards each concludes
     count = int(duration)
     if len(done.run_memory) < count:
@@ -154,6 +131,11 @@ def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[s
         "minutes": conditions.minutes,
         **{name: growth(values) for name, values in memory.items()},
     }
+
+
+def _plan(conditions: Conditions, out: Path, settings: Sequence[str], **words: Any) -> Plan:
+    """Returns what is started, with what all of these have in common."""
+    return Plan(conditions.scenario, str(out), list(settings), report=conditions.report, **words)
 
 
 def growth(memory: Sequence[float]) -> dict[str, float]:

@@ -282,7 +282,8 @@ class RunLogWriter:
         if self._file:
             yield self._file
         else:
-            with h5py.File(self.path, "a") as file:
+            # a lock of its own would stumble over ours
+            with h5py.File(self.path, "a", locking=self._lock is None) as file:
                 yield file
 
     def close(self) -> None:

@@ -229,9 +229,12 @@ def test_a_file_that_cannot_be_opened_again_ends_the_log(tmp_path, garment, samp
     with pytest.raises(OSError, match=r"run\.h5"):
         writer.append(samples[2])
         writer._drain()
+    (tmp_path / "gone.h5").rename(path)
+    writer.note("ended_by", "the file was gone")
     writer.close()
-    with RunLog.open(tmp_path / "gone.h5") as log:
+    with RunLog.open(path) as log:
         assert len(log) == 2
+        assert log.ended_by == "the file was gone"
 
 
 def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
