@@ -18,7 +18,6 @@ from pathlib import Path
 import psutil
 
 from benchmarks.parser import UNUSABLE
-from drake_dress.diagrams.lab import OPEN
 
 _ROOT = Path(__file__).parents[2]
 _NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
@@ -82,10 +81,13 @@ def play(plan: Plan) -> Outcome:
     Raises:
         RuntimeError: they could not be started.
     """
+    # not by the process that only starts others, which would take seconds to import it
+    from drake_dress.diagrams.lab import OPEN
+
     with tempfile.TemporaryDirectory() as place:
         paper, answer = Path(place) / "plan.json", Path(place) / "outcome.json"
         paper.write_text(json.dumps(asdict(plan)), encoding="utf-8")
-        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer}"
+        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer} '{OPEN}'"
         done = subprocess.run(
             ["unshare", "-nm", "sh", "-c", inside],
             cwd=_ROOT,
@@ -114,7 +116,7 @@ def play_usable(plan: Plan) -> Outcome:
     return done
 
 
-def _inside(plan: Plan) -> Outcome:
+def _inside(plan: Plan, lab_open: str) -> Outcome:
     out = Path(plan.out)
     run_out = out / "run"
     run_out.mkdir(parents=True, exist_ok=True)
@@ -146,7 +148,7 @@ def _inside(plan: Plan) -> Outcome:
 
     process = {"lab": started("lab")}
     opening = time.monotonic()
-    while OPEN not in (out / "lab.log").read_text() and process["lab"].poll() is None:
+    while lab_open not in (out / "lab.log").read_text() and process["lab"].poll() is None:
         time.sleep(_POLL)
         if time.monotonic() - opening > plan.timeout:
             process["lab"].kill()
@@ -217,4 +219,4 @@ def memory_of(pid: int) -> float:
 
 if __name__ == "__main__":
     given = Plan(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given))), encoding="utf-8")
+    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given, sys.argv[3]))), encoding="utf-8")
