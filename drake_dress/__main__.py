@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import re
@@ -15,7 +16,7 @@ import drake_dress
 from drake_dress import __version__
 from drake_dress.errors import UserError
 
-UNUSABLE, INTERRUPTED = 2, 130
+FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
 # By name, what each measures; the first is the default.
 BENCHMARKS = {
     "cloth": "accuracy and speed of the garment, beside other simulators where installed",
@@ -61,6 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"drake-dress: {error}", file=sys.stderr)
         return UNUSABLE
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        print(f"drake-dress: {error.filename or 'disk'}: {error.strerror}", file=sys.stderr)
+        return FAILED
     except KeyboardInterrupt:
         print("drake-dress: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -1,12 +1,13 @@
 """Writes the log of a run, `run.h5`, while it runs.
 
 The file must be of use however the run ends. A run that is interrupted closes it with all samples
-whole. A disk that is nearly full ends the log before HDF5 is in trouble, which it does not survive:
-space to close the file is kept back for that. A process that is killed leaves what was flushed
-last: samples are written together about once a second, rows of bulky datasets are never rewritten,
-and HDF5 is told to keep its own bookkeeping in memory between flushes, so that the file on disk is
-consistent at all times but during a flush. That memory grows with every row; closing the file and
-opening it again, every few thousand samples, gives it back.
+whole. A disk that is full ends the log before HDF5 is in trouble, which it does not survive: room
+for what is to be written is the file's own before it is, and space for the end is kept back. A
+process that is killed leaves what was flushed last: samples are written together about once a
+second, rows of bulky datasets are never rewritten, and HDF5 is told to keep its own bookkeeping in
+memory between flushes, so that the file on disk is consistent at all times but during a flush. That
+memory grows with every row; closing the file and opening it again, every few thousand samples,
+gives it back.
 
 Writing and flushing a second of samples takes tens of milliseconds, for which no command may wait:
 a thread does it. Who appends hears of a failure with a later sample.
@@ -14,10 +15,7 @@ a thread does it. Who appends hears of a failure with a later sample.
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import os
-import tempfile
 import time as clock
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -35,6 +33,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.disk import give_back, keep_room, locked, reserved
 from drake_dress.report.log_schema import (
     ARM_SERIES,
     CLEARANCES,
@@ -45,8 +44,8 @@ from drake_dress.report.log_schema import (
 )
 
 _FLUSH_PERIOD = 1.0  # s of wall time
-# Kept back on the disk for the end, and what must be free beside it, bytes.
-_RESERVE, _LEAST_FREE = 16 << 20, 4 << 20
+# Kept back on the disk for the end, and what HDF5 writes beside samples, at most, bytes.
+_RESERVE, _BESIDE = 16 << 20, 4 << 20
 _MOST_WAITING = 64  # samples that are kept in memory between flushes
 _MOST_BEHIND = 512  # samples that are kept while those before them are still being written
 _SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
@@ -172,16 +171,24 @@ class RunLogWriter:
     ) -> None:
         self.path = Path(path)
         try:
-            self._lock: int | None = _locked(self.path)
+            self._lock: int | None = locked(self.path)
             self._file = _open(self.path, "w")
         except OSError as error:
             raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
-        self._reserve = _reserved(self.path.parent, _RESERVE)
-        if self._reserve is None:
+        self._reserve = reserved(self.path.parent, _RESERVE)
+        try:
+            if self._reserve is None:
+                raise OSError
+            keep_room(self._lock, 0, _BESIDE)
+        except OSError as error:
+            self._release()
             self._file.close()
             os.close(self._lock)
             self.path.unlink()
-            raise UserError(str(path), "", "no room on the disk, expected 16 MB at least")
+            least = (_RESERVE + _BESIDE) >> 20
+            message = f"no room on the disk, expected {least} MB at least"
+            raise UserError(str(path), "", message) from error
+        self._unflushed = 0  # bytes
         self._flush_period = flush_period
         self._count = self._count_opened = 0
         self._last_time = -np.inf
@@ -267,27 +274,48 @@ class RunLogWriter:
             self._hand_over(due)
 
     def note(self, name: str, value: str | float) -> None:
-        """Writes something about the run as an attribute of the file, which may be closed."""
-        with self._opened() as file:
+        """Writes something about the run as an attribute of the file, which may be closed.
+
+        Raises:
+            OSError: there is no room for it.
+        """
+        with self._opened(len(str(value))) as file:
             file.attrs[name] = value
 
     def series(self, name: str, rows: npt.ArrayLike, unit: str) -> None:
-        """Writes a series of its own, that has not a row a sample."""
-        with self._opened() as file:
-            _label(file.create_dataset(name, data=np.asarray(rows, dtype=np.float64)), unit, None)
+        """Writes a series of its own, that has not a row a sample.
+
+        Raises:
+            OSError: there is no room for it.
+        """
+        data = np.asarray(rows, dtype=np.float64)
+        with self._opened(data.nbytes) as file:
+            _label(file.create_dataset(name, data=data), unit, None)
 
     @contextmanager
-    def _opened(self) -> Iterator[h5py.File]:
+    def _opened(self, size: int) -> Iterator[h5py.File]:
+        """Gives the file, with room for so many bytes."""
         self._drain()
         if self._file:
+            self._make_room(size)
             yield self._file
-        else:
+            return
+        number = os.open(self.path, os.O_RDWR)
+        try:
+            keep_room(number, os.fstat(number).st_size, size + _BESIDE)
             # a lock of its own would stumble over ours
             with h5py.File(self.path, "a", locking=self._lock is None) as file:
                 yield file
+        finally:
+            give_back(number)
+            os.close(number)
 
     def close(self) -> None:
-        """Closes the file with as many whole samples as were appended; may be called twice."""
+        """Closes the file with as many whole samples as were appended; may be called twice.
+
+        Raises:
+            OSError: the last ones could not be written.
+        """
         if self._lock is None:
             return
         try:
@@ -295,16 +323,13 @@ class RunLogWriter:
         finally:
             self._worker.shutdown()
             self._release()
-            if self._file:
-                self._write(self._waiting, flush=False)
-                self._waiting = []
-                # An interrupt may have come in the middle of a sample.
-                for dataset in self._series.values():
-                    if dataset.shape[0] != self._count:
-                        dataset.resize(self._count, axis=0)
-                self._file.close()
-            os.close(self._lock)
-            self._lock = None
+            try:
+                if self._file:
+                    self._finish()
+            finally:
+                give_back(self._lock)
+                os.close(self._lock)
+                self._lock = None
 
     def __enter__(self) -> RunLogWriter:
         return self
@@ -398,7 +423,11 @@ class RunLogWriter:
         if busy and len(self._waiting) < _MOST_BEHIND:
             return
         self._drain()
-        self._check_space()
+        try:
+            self._make_room(_bytes(self._waiting))
+        except OSError:
+            self.close()
+            raise
         batch, self._waiting = self._waiting, []
         self._writing = self._worker.submit(self._write, batch, flush)
         if flush:
@@ -425,6 +454,7 @@ class RunLogWriter:
             self._count = count
         if flush:
             self._file.flush()
+            self._unflushed = 0
             if self._count - self._count_opened >= _MOST_OPEN:
                 self._open_anew()
 
@@ -435,14 +465,32 @@ class RunLogWriter:
         self._series = {name: self._file[name] for name in self._series}
         self._count_opened = self._count
 
-    def _check_space(self) -> None:
-        if self._reserve is None:
-            return
-        needed = sum(value.nbytes for row in self._waiting for value in row.values())
-        disk = os.statvfs(self.path.parent)
-        if disk.f_bavail * disk.f_frsize < needed + _LEAST_FREE:
-            self.close()
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+    def _make_room(self, size: int) -> None:
+        """Has the file that is open have room for so many bytes more.
+
+        Raises:
+            OSError: there is none.
+        """
+        assert self._lock is not None
+        needed = self._unflushed + size
+        try:
+            keep_room(self._lock, self._file.id.get_filesize(), needed + _BESIDE)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
+        self._unflushed = needed
+
+    def _finish(self) -> None:
+        """Writes what is waiting and closes the file that is open."""
+        try:
+            self._make_room(_bytes(self._waiting))
+            self._write(self._waiting, flush=False)
+            self._waiting = []
+            # An interrupt may have come in the middle of a sample.
+            for dataset in self._series.values():
+                if dataset.shape[0] != self._count:
+                    dataset.resize(self._count, axis=0)
+        finally:
+            self._file.close()
 
     def _release(self) -> None:
         """Gives back what was kept back on the disk."""
@@ -451,38 +499,8 @@ class RunLogWriter:
             self._reserve = None
 
 
-def _reserved(directory: Path, size: int) -> int | None:
-    """Returns an open file without a name that takes so many bytes; None if there is no room."""
-    try:
-        number, name = tempfile.mkstemp(dir=directory)
-        os.unlink(name)
-        try:
-            os.posix_fallocate(number, 0, size)
-        except OSError:
-            os.close(number)
-            raise
-        return number
-    except OSError:
-        return None
-
-
-def _locked(path: Path) -> int:
-    """Returns a file that is locked as HDF5 locks what it writes, and stays so until it is closed.
-
-    HDF5's own lock would end wherever it is opened anew, and who read then would keep us out.
-
-    Raises:
-        OSError: it cannot be, or another one writes or reads it.
-    """
-    number = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        # not every file system has locks
-        if error.errno not in (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP):
-            os.close(number)
-            raise
-    return number
+def _bytes(rows: list[dict[str, npt.NDArray[Any]]]) -> int:
+    return sum(value.nbytes for row in rows for value in row.values())
 
 
 def _open(path: Path, mode: str) -> h5py.File:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -16,7 +15,7 @@ import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
-from drake_dress.report import log_writer
+from drake_dress.report import disk, log_writer
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import JOINT_NAMES
 from drake_dress.report.log_writer import RunLogWriter
@@ -152,7 +151,7 @@ def test_killed_process_leaves_what_was_flushed(tmp_path):
 import time
 import numpy as np
 from dataclasses import replace
-from drake_dress.report import log_writer
+from drake_dress.report import disk, log_writer
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 log_writer._MOST_OPEN = 50
@@ -360,7 +359,7 @@ def test_what_is_no_log_is_refused(tmp_path):
 
 
 def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, monkeypatch):
-    """As `statvfs` tells of it; a disk that is really full is in the benchmark of hardware."""
+    """Full but for what the log keeps back."""
     path = tmp_path / "run.h5"
     writer = RunLogWriter(
         path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
@@ -370,11 +369,14 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
         writer.append(sample)
     # waits for what is being written
     writer.note("note", "")
-    full = os.statvfs(tmp_path)
-    monkeypatch.setattr(
-        os, "statvfs", lambda _: SimpleNamespace(f_bavail=0, f_frsize=full.f_frsize)
-    )
-    with pytest.raises(OSError, match="No space left"):
+    keep_room = disk.keep_room
+
+    def full(*words):
+        monkeypatch.setattr(log_writer, "keep_room", keep_room)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(log_writer, "keep_room", full)
+    with pytest.raises(OSError, match=r"No space left.*run\.h5"):
         writer.append(samples[3])
     writer.note("ended_by", "log: cannot be written")
     writer.close()
@@ -382,6 +384,105 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
         assert len(log) == 4
         assert log.ended_by == "log: cannot be written"
     assert [p.name for p in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_disk_without_any_room_keeps_what_was_written(tmp_path, garment, samples, monkeypatch):
+    """Another one took what the log had kept back."""
+    path = tmp_path / "run.h5"
+    writer = RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.0,
+    )  # fmt: skip
+    for sample in samples[:3]:
+        writer.append(sample)
+        writer._drain()
+
+    def full(*words):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(log_writer, "keep_room", full)
+    with pytest.raises(OSError, match="No space left"):
+        writer.append(samples[3])
+    with pytest.raises(OSError, match="No space left"):
+        writer.note("ended_by", "log: cannot be written")
+    writer.close()
+    with RunLog.open(path) as log:
+        assert len(log) == 3
+        assert log.ended_by is None
+
+
+_FILLED = """
+import sys, threading, time
+from dataclasses import replace
+from pathlib import Path
+import numpy as np
+from drake_dress.report.log import RunLog
+from drake_dress.report.log_writer import RunLogWriter
+from tests.report import synthetic
+
+place = Path(sys.argv[1])
+path, filler = place / "run.h5", place / "filler"
+garment = synthetic.coat(0.06)
+sample = synthetic.dressing(garment, count=2)[0]
+
+def fill(after):
+    time.sleep(after)
+    try:
+        with filler.open("wb") as file:
+            while True:
+                file.write(bytes(1 << 20))
+                file.flush()
+    except OSError:
+        pass
+
+for after in np.random.default_rng(0).uniform(0.1, 0.5, 6):
+    writer = RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.02,
+    )
+    filling = threading.Thread(target=fill, args=[after])
+    filling.start()
+    count, begin = 0, time.monotonic()
+    try:
+        while time.monotonic() - begin < 20.0:
+            count += 1
+            writer.append(replace(sample, time=float(count)))
+        raise SystemExit("the disk was not filled")
+    except OSError as error:
+        # not HDF5's, which has more to say
+        assert str(error) == f"[Errno 28] No space left on device: {str(path)!r}", error
+    writer.note("ended_by", "full")
+    writer.close()
+    with RunLog.open(path) as log:
+        assert len(log) == count and log.ended_by == "full"
+    assert path.stat().st_blocks * 512 < path.stat().st_size + 65536
+    filling.join()
+    filler.unlink()
+    path.unlink()
+"""
+
+
+def test_a_disk_that_is_filled_meanwhile_does_not_crash_hdf5(tmp_path):
+    """A disk of its own, filled at any moment of a write."""
+    mount = f"mount -t tmpfs -o size=48m tmpfs {tmp_path}"
+    alone = ["unshare", "-m", "sh", "-c"]
+    try:
+        if subprocess.run([*alone, mount], capture_output=True, check=False).returncode:
+            pytest.skip("no disk may be mounted")
+    except FileNotFoundError:
+        pytest.skip("no unshare")
+    program = tmp_path.parent / "filled.py"
+    program.write_text(_FILLED)
+    root = str(Path(__file__).parents[2])
+    done = subprocess.run(
+        [*alone, f"{mount} && exec {sys.executable} {program} {tmp_path}"],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": root},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
