@@ -31,6 +31,10 @@ CAMERA = (
 )
 # A fault that passes lasts this long, s; then what is left of the run.
 LASTING, AFTER = 0.8, 1.0
+# An image must be older than the others, and may be on its way.
+LASTING_CAMERA = 1.5
+# s of this machine's clock, after which a fault ends the run
+PATIENCE = 3.0
 # A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
 KEPT_UP = 0.9
 # A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
@@ -89,6 +93,11 @@ REACTIONS = {
 }
 
 
+def lasts(kind: str, rate: float) -> float:
+    """Returns how long a fault lasts that must not end the run, simulated s."""
+    return min(LASTING_CAMERA if kind == "stale_camera" else LASTING, PATIENCE * rate)
+
+
 def inject(
     kind: str,
     seed: int,
@@ -119,7 +128,7 @@ def inject(
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
     played = kind.split("_")[0] if kind.startswith("stale") else kind
-    lasting = 1.5 if kind == "stale_camera" else LASTING
+    lasting = lasts(kind, rate)
     lab = []
     if kind not in ("killed", "disk_full"):
         lab = [
