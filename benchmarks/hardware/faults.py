@@ -33,7 +33,7 @@ CAMERA = (
 LASTING, AFTER = 0.8, 1.0
 # An image must be older than the others, and may be on its way.
 LASTING_CAMERA = 1.5
-# s of this machine's clock, after which a fault ends the run
+# A fault that lasts longer ends the run, s.
 PATIENCE = 3.0
 # A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
 KEPT_UP = 0.9
@@ -93,11 +93,6 @@ REACTIONS = {
 }
 
 
-def lasts(kind: str, rate: float) -> float:
-    """Returns how long a fault lasts that must not end the run, simulated s."""
-    return min(LASTING_CAMERA if kind == "stale_camera" else LASTING, PATIENCE * rate)
-
-
 def inject(
     kind: str,
     seed: int,
@@ -128,7 +123,7 @@ def inject(
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
     played = kind.split("_")[0] if kind.startswith("stale") else kind
-    lasting = lasts(kind, rate)
+    lasting = LASTING_CAMERA if kind == "stale_camera" else LASTING
     lab = []
     if kind not in ("killed", "disk_full"):
         lab = [
@@ -142,6 +137,8 @@ def inject(
             *COARSE,
             *([CAMERA] if kind == "stale_camera" else []),
             f"duration={start + lasting + AFTER + 1.0}",
+            # which goes by this machine's clock
+            f"station.hardware.patience={PATIENCE / rate}",
             *overrides,
         ],
         lab,

@@ -11,10 +11,9 @@ import pytest
 
 from benchmarks.hardware import __main__ as bench
 from benchmarks.hardware.__main__ import main
-from benchmarks.hardware.faults import REACTIONS, STILL_OVER, inject, lasts
+from benchmarks.hardware.faults import REACTIONS, inject
 from benchmarks.hardware.parts import Case, Conditions, growth, run
 from benchmarks.hardware.two_processes import Plan, available, memory_of, play
-from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
 
@@ -164,13 +163,3 @@ def test_memory_that_grows_is_found_in_noise() -> None:
         assert abs(found["per_hour"] - rate) < 0.6
         assert 168.0 * found["per_hour"] < found["week_at_most"]
         assert 168.0 * rate < found["week_at_most"] < 168.0 * (rate + 1.2)
-
-
-@pytest.mark.parametrize("rate", [0.35, 0.5, 1.0])
-def test_a_fault_lasts_until_it_is_judged_and_no_run_ends_for_it(rate: float) -> None:
-    patience = load_scenario(SCENARIO).station.hardware.patience
-    for kind, reaction in REACTIONS.items():
-        assert lasts(kind, rate) / rate <= patience
-        within = reaction.at(rate).within
-        if within is not None and kind not in ("killed", "disk_full"):
-            assert within < lasts(kind, rate) - STILL_OVER
