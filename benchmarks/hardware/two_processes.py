@@ -171,7 +171,7 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
         if begun is not None and plan.fill_at is not None and not filled:
             if now - begun >= plan.fill_at:
                 filled = True
-                _fill(run_out / "filler")
+                fill(run_out / "filler")
         if plan.sampled and begun is not None and now - begun >= len(memory["lab"]):
             for name, p in process.items():
                 memory[name].append(memory_of(p.pid))
@@ -197,7 +197,8 @@ def _set(values: list[str]) -> list[str]:
     return [word for value in values for word in ("--set", value)]
 
 
-def _fill(path: Path) -> None:
+def fill(path: Path) -> None:
+    """Writes a file that takes all that is left on its disk."""
     try:
         with path.open("wb") as file:
             while True:

@@ -37,6 +37,14 @@ def path(tmp_path, garment, samples):
     return synthetic.write(tmp_path / "run.h5", garment, samples)
 
 
+def eager_writer(path, garment):
+    """Returns one that flushes every sample."""
+    return RunLogWriter(
+        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
+        capsule_radius=np.ones(6), flush_period=0.0,
+    )  # fmt: skip
+
+
 def test_what_is_read_is_what_was_written(path, garment, samples):
     with RunLog.open(path) as log:
         assert len(log) == len(samples)
@@ -151,7 +159,7 @@ def test_killed_process_leaves_what_was_flushed(tmp_path):
 import time
 import numpy as np
 from dataclasses import replace
-from drake_dress.report import disk, log_writer
+from drake_dress.report import log_writer
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 log_writer._MOST_OPEN = 50
@@ -194,10 +202,7 @@ def test_memory_does_not_grow_with_samples(tmp_path, garment, samples, monkeypat
     path = tmp_path / "run.h5"
     kept = []
     count = 800
-    with RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.0,
-    ) as writer:  # fmt: skip
+    with eager_writer(path, garment) as writer:
         for k in range(count):
             moved = np.asarray(samples[0].garment_position) + k
             writer.append(replace(samples[0], time=float(k), garment_position=moved))
@@ -217,10 +222,7 @@ def test_memory_does_not_grow_with_samples(tmp_path, garment, samples, monkeypat
 def test_a_file_that_cannot_be_opened_again_ends_the_log(tmp_path, garment, samples, monkeypatch):
     monkeypatch.setattr(log_writer, "_MOST_OPEN", 2)
     path = tmp_path / "run.h5"
-    writer = RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.0,
-    )  # fmt: skip
+    writer = eager_writer(path, garment)
     writer.append(samples[0])
     writer._drain()
     path.rename(tmp_path / "gone.h5")
@@ -361,18 +363,14 @@ def test_what_is_no_log_is_refused(tmp_path):
 def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, monkeypatch):
     """Full but for what the log keeps back."""
     path = tmp_path / "run.h5"
-    writer = RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.0,
-    )  # fmt: skip
+    writer = eager_writer(path, garment)
     for sample in samples[:3]:
         writer.append(sample)
     # waits for what is being written
     writer.note("note", "")
-    keep_room = disk.keep_room
 
     def full(*words):
-        monkeypatch.setattr(log_writer, "keep_room", keep_room)
+        monkeypatch.setattr(log_writer, "keep_room", disk.keep_room)
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(log_writer, "keep_room", full)
@@ -389,10 +387,7 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
 def test_a_disk_without_any_room_keeps_what_was_written(tmp_path, garment, samples, monkeypatch):
     """Another one took what the log had kept back."""
     path = tmp_path / "run.h5"
-    writer = RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.0,
-    )  # fmt: skip
+    writer = eager_writer(path, garment)
     for sample in samples[:3]:
         writer.append(sample)
         writer._drain()
@@ -416,6 +411,7 @@ import sys, threading, time
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
+from benchmarks.hardware.two_processes import fill
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
@@ -425,22 +421,16 @@ path, filler = place / "run.h5", place / "filler"
 garment = synthetic.coat(0.06)
 sample = synthetic.dressing(garment, count=2)[0]
 
-def fill(after):
+def fill_later(after):
     time.sleep(after)
-    try:
-        with filler.open("wb") as file:
-            while True:
-                file.write(bytes(1 << 20))
-                file.flush()
-    except OSError:
-        pass
+    fill(filler)
 
 for after in np.random.default_rng(0).uniform(0.1, 0.5, 6):
     writer = RunLogWriter(
         path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
         capsule_radius=np.ones(6), flush_period=0.02,
     )
-    filling = threading.Thread(target=fill, args=[after])
+    filling = threading.Thread(target=fill_later, args=[after])
     filling.start()
     count, begin = 0, time.monotonic()
     try:
