@@ -32,7 +32,6 @@ from drake_dress.report.log import RunLog
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.report.measures import measure
 from drake_dress.report.replay_html import write_replay_html
-from drake_dress.report.report_html import write_report
 from drake_dress.report.summary import summarize, write_summary
 from drake_dress.systems.command_meter import process_age
 
@@ -254,6 +253,9 @@ def conclude(out: Path, wall_time: float, report: bool = True) -> tuple[bool, st
         summary = summarize(log, wall_time=wall_time, measures=measures)
         write_summary(summary, out / "summary.json")
         if report:
+            # its plots take a second to import, which no robot has to wait for
+            from drake_dress.report.report_html import write_report
+
             write_report(out, measures=measures)
             write_replay_html(log, out / "replay.html")
     print(f"{'log, report and replay' if report else 'log and summary'}: {out}")

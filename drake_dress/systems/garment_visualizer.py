@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from pydrake.geometry import Box, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
@@ -155,6 +153,10 @@ class DressingScene:
 
 def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
     """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
+    # most of a second of a run's start, and few runs are watched
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(0.18 * len(text) + 0.4, 0.6), dpi=72)
     canvas = FigureCanvasAgg(figure)
     figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")

@@ -1,7 +1,7 @@
 """The station behind messages: the same ports, and a stated reaction to each fault.
 
 Lab and run share one diagram and a bus in memory here; two processes are in
-`test_two_processes.py`.
+`tests/benchmarks/test_hardware_bench.py`.
 """
 
 from __future__ import annotations

@@ -34,16 +34,15 @@ def is_right(found, answer):
     return found.verdict in ("named", "ambiguous") and answer["effect"] in named
 
 
-def test_a_handful_of_effects_hidden_at_random_is_found(tmp_path):
+def test_two_of_three_effects_hidden_at_random_are_found(tmp_path):
     names = sorted(set(EFFECTS) - NEED_CONTACT)
     right = []
-    for draw in range(6):
-        if draw >= 3 and sum(right) >= 2:
-            break
+    # a third case only where it decides
+    while right.count(True) < 2 and right.count(False) < 2:
         seed = secrets.randbelow(10**6)
         hide = names[seed % len(names)]
-        right.append(is_right(*verdict_and_answer(hide, seed, tmp_path / str(draw))))
-    assert sum(right) >= 2 * len(right) / 3
+        right.append(is_right(*verdict_and_answer(hide, seed, tmp_path / str(len(right)))))
+    assert right.count(True) == 2
 
 
 def test_where_nothing_is_hidden_nothing_is_named(tmp_path):
