@@ -94,6 +94,8 @@ class DressingScene:
         self._drawn: set[str] = set()
         self._label_at: npt.NDArray[np.float64] | None = None
         self.label = ""
+        # what draws text is imported, and finds its fonts, now and not while arms move
+        _text_mesh("left", _TEXT_HEIGHT)
 
     def show_garment(self, position: npt.NDArray[np.float64]) -> None:
         """Draws the nodes (n,3), m: outside and lining in a colour each."""
@@ -153,7 +155,7 @@ class DressingScene:
 
 def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
     """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
-    # most of a second of a run's start, and few runs are watched
+    # most of a second of a run's start where nobody watches
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
