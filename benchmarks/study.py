@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, some_of
+from benchmarks.parser import INTERRUPTED, at_least_one, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.interrupt import caught_interrupt
@@ -43,7 +43,11 @@ def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> No
 def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int = 2) -> None:
     """Adds the options that `carry_out` reads; `jobs` run side by side by default."""
     parser.add_argument(
-        "--jobs", type=int, default=jobs, metavar="N", help=f"runs side by side; default {jobs}"
+        "--jobs",
+        type=at_least_one,
+        default=jobs,
+        metavar="N",
+        help=f"runs side by side; default {jobs}",
     )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")

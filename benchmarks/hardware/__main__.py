@@ -21,7 +21,7 @@ from benchmarks.hardware.parts import PARTS, Case, Conditions, run
 from benchmarks.hardware.tables import tables, tell
 from benchmarks.hardware.two_processes import available
 from benchmarks.kept import seed_range
-from benchmarks.parser import OneLineParser, exit_with, some_of
+from benchmarks.parser import OneLineParser, at_least_one, exit_with, some_of
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
 
@@ -50,15 +50,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with place_of(case, keep) as out:
             return run(case, conditions, out, overrides)
 
-    chosen = _cases(options.only, options.kinds, options.seeds)
+    chosen = _cases(options.only, options.kinds, options.seeds, options.repeats)
     results, stopped = carry_out(options, _NAME, Case, chosen, measured, tables, tell)
     status = exit_status(results, stopped)
     return status or int(any(r["summary"].get("wrong") for r in results))
 
 
-def _cases(parts: Sequence[str], kinds: Sequence[str], seeds: Sequence[int]) -> list[Case]:
+def _cases(
+    parts: Sequence[str], kinds: Sequence[str], seeds: Sequence[int], repeats: int
+) -> list[Case]:
     """Returns what is to be measured, the seeds of faults outermost."""
-    alone = [Case(part) for part in PARTS if part in parts and part != "faults"]
+    often = {"commands": repeats, "faults": 0}
+    alone = [Case(p, seed=i) for p in PARTS if p in parts for i in range(often.get(p, 1))]
     faults = [Case("faults", kind, seed) for seed in seeds for kind in kinds]
     return alone + (faults if "faults" in parts else [])
 
@@ -81,6 +84,13 @@ def _parser() -> argparse.ArgumentParser:
         "--seeds", type=seed_range, default=range(20), metavar="A-B", help="of faults; default 0-19"
     )
     add_choices(parser, kinds=REACTIONS)
+    parser.add_argument(
+        "--repeats",
+        type=at_least_one,
+        default=5,
+        metavar="N",
+        help="of the commands, half a minute each; default 5",
+    )
     parser.add_argument("--rate", type=float, default=0.35, help="of the dressing; default 0.35")
     parser.add_argument(
         "--fault-rate",

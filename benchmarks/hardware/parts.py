@@ -26,7 +26,10 @@ _HOURS_A_WEEK = 168.0
 
 @dataclass(frozen=True)
 class Case:
-    """One measurement: `part` of PARTS; of a fault, its `kind` and what seeds it."""
+    """One measurement: `part` of PARTS; of a fault, its `kind`.
+
+    `seed` is that of a fault, and the number of a measurement of commands that are repeated.
+    """
 
     part: str
     kind: str = ""
@@ -35,7 +38,9 @@ class Case:
     @property
     def name(self) -> str:
         """For files and tables."""
-        return f"{self.kind}-{self.seed:04d}" if self.part == "faults" else self.part
+        if self.part in ("faults", "commands"):
+            return f"{self.kind or self.part}-{self.seed:04d}"
+        return self.part
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from benchmarks.cloth.table import Table
 from benchmarks.hardware.faults import REACTIONS
 from benchmarks.hardware.parts import Case
@@ -16,6 +18,7 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     done = [(Case(**r["case"]), r["summary"]) for r in results if "summary" in r]
     of_part = {case.part: summary for case, summary in done}
     faults = [(case, summary) for case, summary in done if case.part == "faults"]
+    commands = [summary for case, summary in done if case.part == "commands"]
 
     def rows(part: str, make: Callable[[dict[str, Any]], list[list[Any]]]) -> list[list[Any]]:
         return make(of_part[part]) if part in of_part else []
@@ -23,8 +26,8 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     return [
         Table(
             "Commands, coarse lab at full rate",
-            ["", "asked", "reached"],
-            rows("commands", _commands),
+            ["", "asked", "median", "least", "most", "as asked"],
+            _commands(commands),
         ),
         Table(
             "Dressing in two processes",
@@ -57,14 +60,29 @@ def tell(summary: dict[str, Any]) -> str:
     return "measured"
 
 
-def _commands(summary: dict[str, Any]) -> list[list[Any]]:
-    latency = summary["command_latency_ms"]
-    return [
-        ["rate, Hz", "200 ± 2 %", f"{summary['command_rate_hz']:.1f}"],
-        ["status to command, median, ms", "≤ 10", latency["median"]],
-        ["status to command, 99 %, ms", "≤ 25", latency["p99"]],
-        ["start of the process to first command, s", "≤ 10", summary["start_up_s"]],
-    ]
+def _commands(done: Sequence[dict[str, Any]]) -> list[list[Any]]:
+    """Returns what is asked, and of the measurements the middle, the ends, and how many meet it."""
+    rows = []
+    for name, asked, least, most, of in _ASKED:
+        values = [of(summary) for summary in done]
+        if values:
+            met = sum(least <= v <= most for v in values)
+            ends = float(np.median(values)), min(values), max(values)
+            rows.append([name, asked, *(f"{v:.1f}" for v in ends), f"{met} of {len(values)}"])
+    return rows
+
+
+# What is asked of commands: name, in words, from, to, and where it stands in a summary.
+_ASKED: list[tuple[str, str, float, float, Callable[[dict[str, Any]], float]]] = [
+    ("rate, Hz", "200 ± 2 %", 196.0, 204.0, lambda s: s["command_rate_hz"]),
+    ("status to command, median, ms", "≤ 10", 0.0, 10.0, lambda s: _latency(s, "median")),
+    ("status to command, 99 %, ms", "≤ 25", 0.0, 25.0, lambda s: _latency(s, "p99")),
+    ("start of the process to first command, s", "≤ 10", 0.0, 10.0, lambda s: s["start_up_s"]),
+]
+
+
+def _latency(summary: dict[str, Any], which: str) -> float:
+    return float(summary["command_latency_ms"][which])
 
 
 def _dressing(summary: dict[str, Any]) -> list[list[Any]]:

@@ -93,14 +93,45 @@ def test_a_run_without_a_lab_tells_who_is_silent(tmp_path: Path) -> None:
     assert "no commands came" in done.lab_words
 
 
-@pytest.mark.parametrize("words", [["--only", "nonsense"], ["--kinds", "nonsense"]])
-def test_a_part_that_there_is_not_is_told(
-    words: list[str], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--only", "nonsense"], "'nonsense' is none of"),
+        (["--kinds", "nonsense"], "'nonsense' is none of"),
+        (["--repeats", "0"], "--repeats: '0' is no count, expected 1 or more"),
+        (["--jobs", "-1"], "--jobs: '-1' is no count, expected 1 or more"),
+    ],
+)
+def test_what_cannot_be_measured_is_told(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2
-    assert "'nonsense' is none of" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+
+
+def test_commands_are_measured_often_and_told_with_their_spread(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rates = iter([201.0, 195.9, 198.0])
+
+    def noted(
+        case: Case, conditions: Conditions, out: Path, overrides: list[str]
+    ) -> dict[str, Any]:
+        latency = {"median": 5.0 + case.seed, "p99": 24.0 + case.seed}
+        facts = {"command_rate_hz": next(rates), "command_latency_ms": latency, "start_up_s": 8.0}
+        return {"case": asdict(case), "summary": facts}
+
+    monkeypatch.setattr(bench, "run", noted)
+    monkeypatch.setattr(bench, "available", lambda: True)
+    assert main(["--only", "commands", "--repeats", "3"]) == 0
+    told = capsys.readouterr().out
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in told.splitlines()]
+    assert ["rate, Hz", "200 ± 2 %", "198.0", "195.9", "201.0", "2 of 3"] in rows
+    assert ["status to command, median, ms", "≤ 10", "6.0", "5.0", "7.0", "3 of 3"] in rows
+    assert ["status to command, 99 %, ms", "≤ 25", "25.0", "24.0", "26.0", "2 of 3"] in rows
 
 
 def test_what_was_measured_is_kept_and_told(
