@@ -16,7 +16,7 @@ from typing import Any
 
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
-from benchmarks.parser import INTERRUPTED, OneLineParser
+from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one
 from drake_dress.interrupt import caught_interrupt
 
 # In the order of the paper, then what it does not have.
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="small meshes, within a minute")
     parser.add_argument(
         "--jobs",
-        type=_count,
+        type=at_least_one,
         default=1,
         metavar="N",
         help="scenes at once; 2 and more disturb times",
@@ -123,12 +123,6 @@ def _names(text: str) -> list[str]:
             f"{', '.join(unknown) or text!r} is no scene, expected some of {', '.join(SCENES)}"
         )
     return [name for name in SCENES if name in names]
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
-    return int(text)
 
 
 def _seconds(text: str) -> float:

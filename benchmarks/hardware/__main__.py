@@ -60,10 +60,11 @@ def _cases(
     parts: Sequence[str], kinds: Sequence[str], seeds: Sequence[int], repeats: int
 ) -> list[Case]:
     """Returns what is to be measured, the seeds of faults outermost."""
-    often = {"commands": repeats, "faults": 0}
-    alone = [Case(p, seed=i) for p in PARTS if p in parts for i in range(often.get(p, 1))]
-    faults = [Case("faults", kind, seed) for seed in seeds for kind in kinds]
-    return alone + (faults if "faults" in parts else [])
+    of_part = {
+        "commands": [Case("commands", seed=number) for number in range(repeats)],
+        "faults": [Case("faults", kind, seed) for seed in seeds for kind in kinds],
+    }
+    return [c for part in PARTS if part in parts for c in of_part.get(part, [Case(part)])]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -62,27 +62,23 @@ def tell(summary: dict[str, Any]) -> str:
 
 def _commands(done: Sequence[dict[str, Any]]) -> list[list[Any]]:
     """Returns what is asked, and of the measurements the middle, the ends, and how many meet it."""
-    rows = []
-    for name, asked, least, most, of in _ASKED:
-        values = [of(summary) for summary in done]
-        if values:
-            met = sum(least <= v <= most for v in values)
-            ends = float(np.median(values)), min(values), max(values)
-            rows.append([name, asked, *(f"{v:.1f}" for v in ends), f"{met} of {len(values)}"])
-    return rows
+    if not done:
+        return []
+    latency = [s["command_latency_ms"] for s in done]
+    rate, start = ([s[key] for s in done] for key in ("command_rate_hz", "start_up_s"))
+    middle, late = ([ms[key] for ms in latency] for key in ("median", "p99"))
 
+    def row(name: str, asked: str, values: list[float], least: float, most: float) -> list[Any]:
+        met = sum(least <= v <= most for v in values)
+        shown = (f"{v:.1f}" for v in (np.median(values), min(values), max(values)))
+        return [name, asked, *shown, f"{met} of {len(values)}"]
 
-# What is asked of commands: name, in words, from, to, and where it stands in a summary.
-_ASKED: list[tuple[str, str, float, float, Callable[[dict[str, Any]], float]]] = [
-    ("rate, Hz", "200 ± 2 %", 196.0, 204.0, lambda s: s["command_rate_hz"]),
-    ("status to command, median, ms", "≤ 10", 0.0, 10.0, lambda s: _latency(s, "median")),
-    ("status to command, 99 %, ms", "≤ 25", 0.0, 25.0, lambda s: _latency(s, "p99")),
-    ("start of the process to first command, s", "≤ 10", 0.0, 10.0, lambda s: s["start_up_s"]),
-]
-
-
-def _latency(summary: dict[str, Any], which: str) -> float:
-    return float(summary["command_latency_ms"][which])
+    return [
+        row("rate, Hz", "200 ± 2 %", rate, 196.0, 204.0),
+        row("status to command, median, ms", "≤ 10", middle, 0.0, 10.0),
+        row("status to command, 99 %, ms", "≤ 25", late, 0.0, 25.0),
+        row("start of the process to first command, s", "≤ 10", start, 0.0, 10.0),
+    ]
 
 
 def _dressing(summary: dict[str, Any]) -> list[list[Any]]:
