@@ -1,0 +1,171 @@
+"""What becomes of drawn bad inputs: scenarios, garment files, measured logs, messages.
+
+    drake-dress bench inputs --cases 5000
+    drake-dress bench inputs --cases 5000 --seed 7 --only mesh
+    drake-dress bench inputs --seed 7 --case 1234
+
+Each case is a sound input, changed. An impossible value has to be refused in one line, what is only
+written in another way has to be read the same, and all else may be either, but never a traceback,
+a silence above the limit, or a result that is not the input's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import secrets
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+from queue import SimpleQueue
+
+from benchmarks.cloth.table import Table
+from benchmarks.inputs.measurements import prepare
+from benchmarks.inputs.trials import Outcome, Result
+from benchmarks.inputs.worker import KINDS, Worker
+from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one, exit_with, some_of
+from benchmarks.section import END, begin, write_between
+from drake_dress import __version__
+from drake_dress.discrepancy.results import write_text
+from drake_dress.interrupt import caught_interrupt
+
+_NAME = "inputs"
+# Longest silence, s.
+LIMIT = 10.0
+_SHOWN = 40  # failures that are printed whole
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carries out the cases and prints a table.
+
+    Returns:
+        0, 1 if a case did not end as it has to, 2 for bad arguments, 130 after Ctrl-C.
+    """
+    options = _parser().parse_args(arguments)
+    seed = secrets.randbelow(10**6) if options.seed is None else options.seed
+    kinds = list(options.only)
+    chosen = [options.case] if options.case is not None else list(range(options.cases))
+    print(f"seed {seed}, {len(chosen)} cases of {', '.join(kinds)}", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder)
+        if "measured" in kinds:
+            prepare(base)
+        results, stopped = _run(seed, chosen, kinds, base, options.jobs)
+    shown = table(results, seed).text()
+    failures = [r for r in results if r.problem is not None]
+    for r in failures[:_SHOWN]:
+        print(f"\n{r.index} {r.kind} {r.mutation} ({r.expect}): {r.problem}\n  {r.told.strip()}")
+    print(f"\n{shown}\n\n{len(results) - len(failures)} of {len(results)} as they have to be")
+    if options.json is not None:
+        write_text(options.json, _as_json(results, seed))
+    if options.into is not None:
+        write_between(options.into, _NAME, shown)
+    return INTERRUPTED if stopped else int(bool(failures))
+
+
+def _run(
+    seed: int, chosen: Sequence[int], kinds: Sequence[str], base: Path, jobs: int
+) -> tuple[list[Result], bool]:
+    idle: SimpleQueue[Worker] = SimpleQueue()
+    workers = [Worker(base, LIMIT) for _ in range(min(jobs, len(chosen)))]
+    for worker in workers:
+        idle.put(worker)
+
+    def one(index: int) -> Result:
+        worker = idle.get()
+        try:
+            return worker.run(seed, index, kinds[index % len(kinds)])
+        finally:
+            idle.put(worker)
+
+    results: list[Result] = []
+    with caught_interrupt() as stop, ThreadPoolExecutor(len(workers)) as pool:
+        pending = [pool.submit(one, index) for index in chosen]
+        for future in as_completed(pending):
+            results.append(future.result())
+            if len(results) % 100 == 0:
+                wrong = sum(r.problem is not None for r in results)
+                print(f"{len(results)}/{len(chosen)}, {wrong} not as they have to be", flush=True)
+            if stop.is_set():
+                pool.shutdown(wait=False, cancel_futures=True)
+                break
+    for worker in workers:
+        worker.close()
+    return sorted(results, key=lambda r: r.index), stop.is_set()
+
+
+def table(results: Sequence[Result], seed: int) -> Table:
+    """Returns how many cases of each kind ended how."""
+    rows = []
+    for kind in [*KINDS, ""]:
+        of_kind = [r for r in results if kind in ("", r.kind)]
+        if not of_kind:
+            continue
+        count = Counter(r.outcome for r in of_kind)
+        rows.append(
+            [
+                kind or "all",
+                len(of_kind),
+                *(count[outcome] for outcome in Outcome),
+                sum((r.problem or "").startswith("accepted") for r in of_kind),
+                sum((r.problem or "").startswith("refused") for r in of_kind),
+                max(r.seconds for r in of_kind),
+                sum(r.problem is None for r in of_kind),
+            ]
+        )
+    header = ["input", "cases", *(str(o) for o in Outcome), "accepted wrongly", "refused wrongly"]
+    return Table(f"Drawn inputs, seed {seed}", [*header, "longest, s", "as they have to be"], rows)
+
+
+def _as_json(results: Sequence[Result], seed: int) -> str:
+    """Returns counts and failures: what was as it has to be is drawn again by its seed."""
+    failures = [asdict(r) for r in results if r.problem is not None]
+    shown = table(results, seed)
+    content = {
+        "version": __version__,
+        "seeds": [seed],
+        "cases": len(results),
+        "table": [dict(zip(shown.header, row, strict=True)) for row in shown.rows],
+        "failures": failures,
+        "figures": [
+            {
+                "name": "drawn inputs that end as they have to",
+                "value": len(results) - len(failures),
+                "unit": f"of {len(results)}",
+                "asked": len(results),
+                "met": not failures,
+            }
+        ],
+    }
+    return json.dumps(content, indent=1, default=str) + "\n"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog=f"drake-dress bench {_NAME}",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--cases", type=at_least_one, default=300, metavar="N", help="default 300")
+    parser.add_argument(
+        "--seed", type=int, metavar="S", help="of all that is drawn; default: a new one, printed"
+    )
+    parser.add_argument("--case", type=int, metavar="K", help="this one alone, of the same seed")
+    parser.add_argument(
+        "--only", type=some_of(tuple(KINDS)), default=list(KINDS), metavar="KIND,…",
+        help=", ".join(KINDS),
+    )  # fmt: skip
+    parser.add_argument("--jobs", type=at_least_one, default=2, metavar="N", help="default 2")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="counts and failures")
+    parser.add_argument(
+        "--into", type=Path, metavar="FILE.md",
+        help=f"put the table between {begin(_NAME)} and {END}",
+    )  # fmt: skip
+    return parser
+
+
+if __name__ == "__main__":
+    exit_with(main)

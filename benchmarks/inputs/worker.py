@@ -1,0 +1,92 @@
+"""Trials in a process of their own, which may hang or end without harm to the study."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.inputs import measurements
+from benchmarks.inputs.meshes import draw_mesh
+from benchmarks.inputs.scenarios import draw_scenario
+from benchmarks.inputs.trials import Expect, Outcome, Result, Trial, carry_out
+
+# By kind of input, what draws one.
+KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
+    "scenario": draw_scenario,
+    "mesh": draw_mesh,
+    "measured": measurements.draw_measurement,
+}
+# For a process to start and compile what it needs, s.
+_STARTING = 300.0
+
+
+class Worker:
+    """Carries out one trial at a time.
+
+    Args:
+        base: folder with what trials begin with.
+        limit: after which a trial counts as silent, s.
+    """
+
+    def __init__(self, base: Path, limit: float) -> None:
+        self._base, self._limit = base, limit
+        self._start()
+
+    def run(self, seed: int, index: int, kind: str) -> Result:
+        """Returns what became of the trial `index` of a kind of input."""
+        self._pipe.send((seed, index, kind))
+        mutation = ""
+        try:
+            if self._pipe.poll(self._limit):
+                mutation = self._pipe.recv()
+            if mutation and self._pipe.poll(self._limit):
+                result: Result = self._pipe.recv()
+                return result
+            outcome, problem = Outcome.SILENT, f"no answer within {self._limit:g} s"
+        except EOFError:
+            self._process.join()
+            outcome = Outcome.DIED
+            problem = f"the process ended with status {self._process.exitcode}"
+        self.close()
+        self._start()
+        return Result(index, kind, mutation, Expect.EITHER, outcome, "", self._limit, problem)
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._process.kill()
+        self._process.join()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=_serve, args=(other, self._base), daemon=True)
+        self._process.start()
+        other.close()
+        if not self._pipe.poll(_STARTING):
+            raise RuntimeError(f"a process did not start within {_STARTING:g} s")
+        self._pipe.recv()
+
+
+def draw(seed: int, index: int, kind: str) -> Trial:
+    """Returns a trial, which seed and index draw."""
+    return KINDS[kind](np.random.default_rng([seed, index]))
+
+
+def _serve(pipe: Connection, base: Path) -> None:
+    measurements.use_base(base)
+    # what is compiled or read once is no part of a trial
+    for kind in KINDS:
+        carry_out(0, kind, draw(0, 0, kind))
+    pipe.send("ready")
+    while True:
+        try:
+            seed, index, kind = pipe.recv()
+        except EOFError:
+            return
+        trial = draw(seed, index, kind)
+        pipe.send(f"{kind} {trial.mutation}")
+        pipe.send(carry_out(index, kind, trial))
