@@ -380,7 +380,7 @@ def _rows(log: _Log) -> list[list[str]]:
     for name, value in log.data.items():
         if name == _REST:
             continue
-        flat = value.reshape(len(value), -1)
+        flat = value.reshape(len(value), int(np.prod(value.shape[1:])))
         if value.ndim == 1:
             header.append(name)
         elif value.ndim == 2:

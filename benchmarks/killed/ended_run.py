@@ -1,0 +1,127 @@
+"""A run into the directory of an earlier one, ended at a moment by a signal or a full disk.
+
+    python -m benchmarks.killed.ended_run PLAN.json OUTCOME.json
+
+A disk that can be filled is mounted for that, for which the process needs a mount namespace of its
+own: `unshare -m`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from benchmarks.hardware.two_processes import fill
+
+# Of the disk that is filled: room for all files of such a run, and little more.
+_DISK = "size=40m"
+_POLL = 0.01
+_STAGE_LINE = re.compile(r" *([\d.]+) s  left ")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is run and how it ends.
+
+    Attributes:
+        scenario: file.
+        earlier: folder with the files of the earlier run.
+        out: folder to run in; the earlier files are copied there first.
+        settings: KEY=VALUE.
+        seed: of the run.
+        how: `kill`, `terminate` or `disk_full`; empty: it is left alone.
+        moment: since the process began, s.
+        timeout: s.
+    """
+
+    scenario: str
+    earlier: str
+    out: str
+    settings: list[str]
+    seed: int
+    how: str
+    moment: float
+    timeout: float = 300.0
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How it ended.
+
+    Attributes:
+        status: of the process, negative for a signal.
+        words: what it printed.
+        wall: from its beginning to its end, s.
+        acted: when it was done to it, s; None if the run was over before.
+        told: last simulated time that it had told on its progress lines, s, and when, s.
+    """
+
+    status: int
+    words: str
+    wall: float
+    acted: float | None
+    told: tuple[float, float]
+
+
+def play(plan: Plan) -> Ended:
+    """Carries out a plan; the disk of `disk_full` has to be this process's own."""
+    out = Path(plan.out)
+    out.mkdir(parents=True, exist_ok=True)
+    place = out
+    if plan.how == "disk_full":
+        place = out / "disk"
+        place.mkdir()
+        mount = ["mount", "-t", "tmpfs", "-o", _DISK, "tmpfs", str(place)]
+        subprocess.run(mount, check=True)
+    for path in Path(plan.earlier).iterdir():
+        shutil.copy(path, place / path.name)
+    command = [sys.executable, "-m", "drake_dress", "run", plan.scenario, "--no-meshcat"]
+    command += ["--one-process", "--out", str(place), "--seed", str(plan.seed)]
+    command += [word for value in plan.settings for word in ("--set", value)]
+    begin = time.monotonic()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    lines: list[str] = []
+    told = [0.0, 0.0]
+
+    def listen() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            found = _STAGE_LINE.match(line)
+            if found:
+                told[:] = [float(found.group(1)), time.monotonic() - begin]
+
+    listener = threading.Thread(target=listen)
+    listener.start()
+    acted: float | None = None
+    while process.poll() is None:
+        time.sleep(_POLL)
+        now = time.monotonic() - begin
+        if plan.how and acted is None and now >= plan.moment:
+            acted = now
+            if plan.how == "disk_full":
+                fill(place / "filler")
+            else:
+                process.send_signal(signal.SIGKILL if plan.how == "kill" else signal.SIGTERM)
+        if now > plan.timeout:
+            process.kill()
+    wall = time.monotonic() - begin
+    listener.join()
+    if place != out:
+        (place / "filler").unlink(missing_ok=True)
+        for path in place.iterdir():
+            shutil.copy(path, out / path.name)
+    return Ended(process.returncode, "".join(lines), wall, acted, (told[0], told[1]))
+
+
+if __name__ == "__main__":
+    given = Plan(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
+    Path(sys.argv[2]).write_text(json.dumps(asdict(play(given))), encoding="utf-8")

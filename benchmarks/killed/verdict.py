@@ -1,0 +1,89 @@
+"""What has to be true of a directory whose last run was ended, whatever the moment."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.killed.ended_run import Ended
+from drake_dress.errors import UserError
+from drake_dress.report.log import RunLog
+
+# What runs write.
+FILES = ("run.h5", "summary.json", "report.html", "replay.html")
+# Samples are flushed about once a second; what is being flushed at the end may be lost, s.
+_FLUSHED = 3.0
+# Exit statuses that a terminated run may have: as for other programs, or whole before it.
+_AFTER_TERMINATION = (143, 0, 1)
+
+
+def fingerprints(folder: Path) -> dict[str, str]:
+    """Returns a digest of each file of a run that a folder holds."""
+    return {
+        name: hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        for name in FILES
+        if (folder / name).is_file()
+    }
+
+
+def problems(
+    folder: Path, earlier: Mapping[str, str], seed: int, how: str, end: Ended
+) -> list[str]:
+    """Returns what is wrong with what an ended run left.
+
+    Args:
+        folder: of the run.
+        earlier: digests of the files that an earlier run had left there.
+        seed: of the ended run, which the earlier one does not share.
+        how: it was ended.
+        end: how it did.
+    """
+    wrong = []
+    if "Traceback" in end.words:
+        wrong.append("traceback")
+    if how == "terminate" and end.acted is not None and end.status not in _AFTER_TERMINATION:
+        # before the run could take a signal, the system ends it
+        if end.status != -15 or end.told[0] > 0.0:
+            wrong.append(f"exit status {end.status} after SIGTERM")
+    now = fingerprints(folder)
+    old = [name for name, digest in now.items() if earlier.get(name) == digest]
+    if old and len(old) < len(now):
+        wrong.append(f"mixture: {', '.join(old)} of the earlier run beside the later one's")
+    if old and set(old) != set(earlier):
+        wrong.append(f"of the earlier run only {', '.join(old)} left")
+    if old:
+        return wrong
+    if "run.h5" not in now:
+        if now or end.told[0] > 0.0:
+            wrong.append(f"no log, beside {', '.join(now) or 'nothing'}")
+        return wrong
+    wrong += _log_problems(folder, seed, end)
+    if "summary.json" in now:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        if summary["seed"] != seed:
+            wrong.append(f"summary of seed {summary['seed']}, log of {seed}")
+    return wrong
+
+
+def _log_problems(folder: Path, seed: int, end: Ended) -> list[str]:
+    try:
+        with RunLog.open(folder / "run.h5") as log:
+            time = log.time
+            if log.seed != seed:
+                return [f"log of seed {log.seed}, expected {seed}"]
+            for i in range(0, len(log), max(1, len(log) // 20)):
+                if not np.isfinite(log.garment_position(i)).all():
+                    return [f"sample {i} is not finite"]
+    except UserError as error:
+        # nothing had been written yet when it ended
+        return [f"log cannot be read: {error}"] if end.told[0] > 0.0 else []
+    if len(time) > 1 and np.any(np.diff(time) <= 0.0):
+        return ["time does not increase"]
+    until = end.wall if end.acted is None else end.acted
+    if until - end.told[1] > _FLUSHED and (not len(time) or time[-1] < end.told[0] - 0.1):
+        return [f"log ends at {time[-1] if len(time) else 0.0:.1f} s, {end.told[0]:g} s was told"]
+    return []
