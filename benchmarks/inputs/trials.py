@@ -17,7 +17,7 @@ from pathlib import Path
 from drake_dress.errors import UserError
 
 # One line of at most this many characters can be read.
-LONGEST_LINE = 500
+LONGEST_LINE = 720
 
 
 class Expect(StrEnum):

@@ -1,4 +1,8 @@
+import dataclasses
+import typing
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +17,14 @@ from drake_dress.diagrams.scenario import (
 )
 from drake_dress.diagrams.scenario.ranges import range_of
 from drake_dress.diagrams.scenario.schema import Arm, Variation
+from drake_dress.diagrams.scenario.typed import check_ranges
+from drake_dress.errors import UserError
+from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.prediction import ConstantVelocityPredictor, StillPredictor
 from drake_dress.models.human.tremor import TremorParameters
+from drake_dress.models.sides import SIDES
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.yaml"))
 
@@ -93,6 +101,50 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
     assert scenario.duration == 3.0
     assert scenario.garment.mesh is not None and scenario.garment.mesh.file == "x.obj"
     assert scenario.seed == 5
+
+
+def numbers_below(schema: Any, key: str = "") -> Iterator[str]:
+    """Yields the dotted key of every number that a type of the schema may hold."""
+    inner = [t for t in typing.get_args(schema) if t is not type(None)]
+    if dataclasses.is_dataclass(schema):
+        for name, hint in typing.get_type_hints(schema).items():
+            yield from numbers_below(hint, f"{key}.{name}" if key else name)
+    elif typing.get_origin(schema) is dict:
+        for name in LOOP_NAMES if key.endswith("loops") else SIDES:
+            yield from numbers_below(inner[1], f"{key}.{name}")
+    elif inner:
+        yield from numbers_below(inner[0], key)
+    elif schema in (int, float):
+        yield key
+
+
+def test_every_number_of_a_scenario_has_a_range() -> None:
+    keys = list(numbers_below(Scenario))
+    assert len(keys) > 200
+    assert [key for key in keys if range_of(key) is None] == []
+
+
+def test_every_default_is_within_its_range(tmp_path: Path) -> None:
+    scenario = load_scenario(write(tmp_path, "seed: 0"))
+    check_ranges("defaults", "", scenario)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("person: {measures: {forearm_length: 2.5}}", ["forearm_length", "0.1 to 0.55"]),
+        ("person: {measures: {shoulder_height: 0.03}}", ["shoulder_height", "0.5 to 2.2"]),
+        ("garment: {mesh: {file: a.obj, grasp: {left: [-4]}}}", ["grasp.left[0]", "-4"]),
+        ("controller: {global_mpc: {weights: {corridor: 1e12}}}", ["weights.corridor", "1e+06"]),
+    ],
+)
+def test_a_number_that_nothing_can_have_is_told(
+    tmp_path: Path, text: str, words: list[str]
+) -> None:
+    with pytest.raises(UserError) as error:
+        load_scenario(write(tmp_path, text))
+    for word in words:
+        assert word in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 import re
 
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
 
 # What the lab reports of, beside its cameras.
@@ -28,8 +30,8 @@ CHOICES = {
     "station.arms.mode": ("position_velocity", "position", "velocity"),
 }
 
-# Ranges by the end of the dotted key, the longest counts, both ends allowed; all other numbers
-# must be finite.
+# Ranges by the end of the dotted key, the longest counts, both ends allowed. Every number of the
+# schema has one.
 _RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63 - 1),
     "duration": (0.1, 86400.0),
@@ -52,6 +54,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "lab.wait": (0.1, 3600.0),
     "lab.rest": (0.0, 60.0),
     "lab.push": (0.0, 200.0),
+    "cameras.position": (-100.0, 100.0),
+    "cameras.target": (-100.0, 100.0),
     "cameras.width": (16, 4096),
     "cameras.height": (16, 4096),
     "cameras.fov_deg": (5.0, 150.0),
@@ -59,6 +63,21 @@ _RANGES: dict[str, tuple[float, float]] = {
     "lab.faults.start": (0.0, 1e4),
     "lab.faults.duration": (0.0, 1e4),
     "coat.scale": (0.7, 1.4),
+    **{
+        f"coat.{name}": (0.0, 3.0)  # m; together they are checked as the coat is made
+        for name in (
+            "body_length",
+            "chest",
+            "shoulder_width",
+            "sleeve_length",
+            "armhole_girth",
+            "cuff_girth",
+            "collar_height",
+            "front_opening",
+        )
+    },
+    **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
+    **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
     "material.bending_stiffness": (0.0, 1.0),
@@ -120,6 +139,9 @@ _RANGES: dict[str, tuple[float, float]] = {
     "local.stretch": (0.1, 1.0),
     "local.beside": (0.001, 1.0),
     "local.beside_speed": (0.001, 10.0),
+    "local.dragged": (0.0, 1.0),
+    "local.prepare_correction": (0.0, 1.0),
+    "local.dress_correction": (0.0, 1.0),
     "weights.position": (0.0, 1e6),
     "weights.direction": (0.0, 1e6),
     "weights.speed": (0.0, 1e6),
@@ -130,6 +152,14 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.entering_spread": (0.0, 1.0),
     "weights.clearance": (0.0, 1e6),
     "weights.free_clearance": (0.0, 1.0),
+    "weights.level": (0.0, 1e6),
+    "weights.least_level": (0.0, 1.0),
+    "weights.corridor": (0.0, 1e6),
+    "weights.corridor_radius": (0.0, 1.0),
+    "weights.corridor_length": (0.0, 2.0),
+    "weights.passage": (0.0, 1e6),
+    "weights.passage_radius": (0.0, 1.0),
+    "weights.passage_length": (0.0, 2.0),
     "command_rate": (10.0, 1000.0),
     "safety.max_speed": (0.001, 2.0),
     "safety.max_acceleration": (0.01, 50.0),
@@ -148,6 +178,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "safety.largest_distance": (0.05, 3.0),
     "gripper.max_speed": (0.001, 2.0),
     "gripper.max_acceleration": (0.01, 50.0),
+    "workspace.low": (-100.0, 100.0),
+    "workspace.high": (-100.0, 100.0),
     "start.distance_behind": (0.1, 2.0),
     "start.height_offset": (-1.0, 1.0),
     "start.lateral_offset": (-1.0, 1.0),
@@ -158,9 +190,34 @@ _RANGES: dict[str, tuple[float, float]] = {
     "variation.start_offset": (0.0, 0.3),
     "log.rate": (1.0, 250.0),
 }
-_OF_MEASURES = (0.005, 3.0)
+# Body sizes, m, and masses, kg: from a child of two to the largest adults measured, with room.
+_OF_MEASURES: dict[str, tuple[float, float]] = {
+    "shoulder_height": (0.5, 2.2),
+    "shoulder_width": (0.12, 0.65),
+    "upper_arm_length": (0.10, 0.50),
+    "forearm_length": (0.10, 0.55),
+    "upper_arm_radius": (0.015, 0.12),
+    "forearm_radius": (0.012, 0.09),
+    "hand_radius": (0.015, 0.08),
+    "chest_width": (0.12, 0.70),
+    "chest_depth": (0.08, 0.50),
+    "torso_length": (0.20, 0.80),
+    "hip_width": (0.12, 0.70),
+    "neck_radius": (0.02, 0.12),
+    "head_radius": (0.05, 0.15),
+    "leg_length": (0.30, 1.40),
+    "thigh_radius": (0.03, 0.20),
+    "upper_arm_mass": (0.1, 8.0),
+    "forearm_mass": (0.1, 6.0),
+}
+_RANGES |= {f"measures.{name}": bounds for name, bounds in _OF_MEASURES.items()}
 _OF_EFFECTS = {
     f"effects.{name}.{p.name}": (p.low, p.high)
+    for name, effect in EFFECTS.items()
+    for p in effect.parameters()
+} | {
+    # a parameter that data hardly tell may have a deviation far beyond its own range
+    f"effects.{name}.{p.name}_std": (0.0, 100.0 * (p.high - p.low))
     for name, effect in EFFECTS.items()
     for p in effect.parameters()
 }
@@ -177,4 +234,4 @@ def range_of(key: str) -> tuple[float, float] | None:
     ends = [end for end in _RANGES if name.endswith("." + end)]
     if ends:
         return _RANGES[max(ends, key=len)]
-    return _OF_MEASURES if ".measures." in key else _OF_EFFECTS.get(key)
+    return _OF_EFFECTS.get(key)

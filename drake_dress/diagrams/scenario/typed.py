@@ -81,6 +81,9 @@ def check_ranges(source: str, key: str, value: Any) -> None:
     elif isinstance(value, list):
         for i, item in enumerate(value):
             check_ranges(source, f"{key}[{i}]", item)
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            check_ranges(source, f"{key}.{name}", item)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise UserError(source, key, f"is {value}, expected a finite number")
