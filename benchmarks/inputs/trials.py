@@ -9,7 +9,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -118,26 +118,29 @@ def _problem(
 
 @contextmanager
 def _captured_output() -> Iterator[Callable[[], str]]:
-    """Provides what was written to standard output and error, by libraries in C too."""
+    """Provides what was written to standard output and error, by libraries in C too, and warned."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = [os.dup(1), os.dup(2)]
-    with tempfile.TemporaryFile() as file:
+    text: list[str] = []
+    with tempfile.TemporaryFile("w+", errors="replace") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
-        text: list[str] = []
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("always")
-                yield lambda: text[0]
+            with (
+                redirect_stdout(file),
+                redirect_stderr(file),
+                warnings.catch_warnings(record=True) as warned,
+            ):
+                warnings.simplefilter("default")
+                yield lambda: "".join(text)
         finally:
-            sys.stdout.flush()
-            sys.stderr.flush()
+            file.flush()
             for k, descriptor in enumerate(kept, start=1):
                 os.dup2(descriptor, k)
                 os.close(descriptor)
             file.seek(0)
-            text.append(file.read().decode(errors="replace"))
+            text += [file.read(), *(f"{w.category.__name__}: {w.message}" for w in warned)]
 
 
 def place() -> Path:

@@ -114,7 +114,7 @@ def stretched(sample: Sample, garment: GarmentMesh, factor: float) -> Sample:
     return replace(sample, garment_position=middle + factor * (position - middle))
 
 
-def write(path: Path, garment: GarmentMesh, samples: list[Sample]) -> Path:
+def write(path: Path, garment: GarmentMesh, samples: list[Sample], seed: int = 3) -> Path:
     """Writes samples to a log and returns its path."""
     _, _, radius = capsules(dressed_joints(garment))
     with RunLogWriter(
@@ -122,7 +122,7 @@ def write(path: Path, garment: GarmentMesh, samples: list[Sample]) -> Path:
         garment=garment,
         scenario_text="seed: 3\n",
         version="0.0",
-        seed=3,
+        seed=seed,
         radius=np.full(6, ARM_RADIUS),
         capsule_radius=radius,
         estimate_garment=garment,
