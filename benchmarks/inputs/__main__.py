@@ -70,7 +70,7 @@ def _run(
     seed: int, chosen: Sequence[int], kinds: Sequence[str], base: Path, jobs: int
 ) -> tuple[list[Result], bool]:
     idle: SimpleQueue[Worker] = SimpleQueue()
-    workers = [Worker(base, LIMIT) for _ in range(min(jobs, len(chosen)))]
+    workers = [Worker(kinds, base, LIMIT) for _ in range(min(jobs, len(chosen)))]
     for worker in workers:
         idle.put(worker)
 

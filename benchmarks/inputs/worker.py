@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -28,12 +28,13 @@ class Worker:
     """Carries out one trial at a time.
 
     Args:
+        kinds: of input, that it will be asked for.
         base: folder with what trials begin with.
         limit: after which a trial counts as silent, s.
     """
 
-    def __init__(self, base: Path, limit: float) -> None:
-        self._base, self._limit = base, limit
+    def __init__(self, kinds: Sequence[str], base: Path, limit: float) -> None:
+        self._kinds, self._base, self._limit = tuple(kinds), base, limit
         self._start()
 
     def run(self, seed: int, index: int, kind: str) -> Result:
@@ -63,7 +64,9 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other, self._base), daemon=True)
+        self._process = context.Process(
+            target=_serve, args=(other, self._kinds, self._base), daemon=True
+        )
         self._process.start()
         other.close()
         if not self._pipe.poll(_STARTING):
@@ -76,10 +79,10 @@ def draw(seed: int, index: int, kind: str) -> Trial:
     return KINDS[kind](np.random.default_rng([seed, index]))
 
 
-def _serve(pipe: Connection, base: Path) -> None:
+def _serve(pipe: Connection, kinds: Sequence[str], base: Path) -> None:
     measurements.use_base(base)
     # what is compiled or read once is no part of a trial
-    for kind in KINDS:
+    for kind in kinds:
         carry_out(0, kind, draw(0, 0, kind))
     pipe.send("ready")
     while True:
