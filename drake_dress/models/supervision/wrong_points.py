@@ -13,8 +13,9 @@ FloatArray = npt.NDArray[np.float64]
 # Rows of a person's points.
 _LEFT_ELBOW, _LEFT_HAND = 1, 2
 _OTHER_SIDE = [3, 4, 5, 0, 1, 2]
-# By which an estimate leaps to and fro, and is beside what it is of, m.
-_LEAP, _OFFSET, _FAR = 0.4, 1.0, 0.4
+# By which an estimate leaps to and fro, where each place alone could be, and by which it is beside
+# what it is of, m.
+_LEAP, _OFFSET, _FAR = 0.2, 1.0, 0.4
 _HUGE = 1e30
 
 
@@ -41,17 +42,6 @@ def _positions(change: Callable[[FloatArray], FloatArray]) -> WrongPoints:
     return lambda m: np.hstack([change(m.values[:, :3]), m.values[:, 3:]])
 
 
-def _leaping(rows: slice | int) -> WrongPoints:
-    """Returns what moves rows upward in every second message."""
-
-    def wrong(m: Moment) -> FloatArray:
-        values = m.values.copy()
-        values[rows, 2] += _LEAP * ((m.number + 1) % 2)
-        return values
-
-    return wrong
-
-
 def _without(rows: slice | int) -> WrongPoints:
     """Returns what writes rows as zero."""
 
@@ -66,6 +56,13 @@ def _without(rows: slice | int) -> WrongPoints:
 def _long_forearm(m: Moment) -> FloatArray:
     values = m.values.copy()
     values[_LEFT_HAND] += 2.0 * (values[_LEFT_HAND] - values[_LEFT_ELBOW])
+    return values
+
+
+def _leaping(m: Moment) -> FloatArray:
+    """Moves all forward in every second message."""
+    values = m.values.copy()
+    values[:, 0] += _LEAP * ((m.number + 1) % 2)
     return values
 
 
@@ -93,7 +90,7 @@ WRONG_POINTS: dict[str, WrongPoints] = {
     "person_y_up": _Y_UP,
     "person_huge": _positions(lambda x: _HUGE * x),
     "person_limb": _long_forearm,
-    "person_jump": _leaping(_LEFT_HAND),
+    "person_jump": _leaping,
     "person_offset": _positions(lambda x: x + [_OFFSET, 0.0, 0.0]),
     "person_frozen": _frozen,
     "garment_zero": _without(slice(None)),
@@ -103,7 +100,7 @@ WRONG_POINTS: dict[str, WrongPoints] = {
     "garment_scrambled": _scrambled,
     "garment_far": _positions(lambda x: x + [_FAR, 0.0, 0.0]),
     "garment_mirrored": _positions(lambda x: x * [1.0, -1.0, 1.0]),
-    "garment_jump": _leaping(slice(None)),
+    "garment_jump": _leaping,
     "garment_fast": _fast,  # velocities in mm/s
     "garment_frozen": _frozen,
 }
