@@ -66,7 +66,8 @@ class GarmentCheck:
         found, values = read_points(message, self._count)
         if found.fault:
             return found
-        nodes, velocity = values[:, :3], values[:, 3:] if values.shape[1] == 6 else None
+        nodes = np.ascontiguousarray(values[:, :3])
+        velocity = np.ascontiguousarray(values[:, 3:]) if values.shape[1] == 6 else None
         found, self._track = judge_garment(
             nodes, velocity, stamp(message), self._grippers(), self._track, self._bounds
         )

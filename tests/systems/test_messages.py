@@ -17,8 +17,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.arm.status_check import JointBounds
-from drake_dress.models.supervision.injection import InjectedFault
 from drake_dress.models.supervision.fault import Fault
+from drake_dress.models.supervision.injection import InjectedFault
 from drake_dress.systems.lcm_inbox import (
     Decoder,
     GuardedSerializer,
