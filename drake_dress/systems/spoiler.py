@@ -34,12 +34,11 @@ class Spoiler:
     def __init__(self, lcm_type: Any, spoils: Mapping[str, Spoil] | None = None) -> None:
         self._type, self._spoils = lcm_type, dict(spoils or {})
         self._rng = np.random.default_rng(0)
-        # of each fault that is on, its first message and how many came since
+        # of each fault that is on, the message that it remembers and how many came since
         self._begun: dict[str, tuple[Any, int]] = {}
-        self._overtaken: bytes | None = None
 
     def __call__(self, encoded: bytes, on: set[str]) -> list[bytes]:
-        """Returns what is sent in place of a message, in this order.
+        """Returns what is sent in place of a message.
 
         Args:
             encoded: the message.
@@ -50,10 +49,7 @@ class Spoiler:
             return []
         if "malformed" in on:
             return [self._rng.bytes(int(self._rng.integers(0, len(encoded) + 1)))]
-        if "reordered" not in on and self._overtaken is None and not on:
-            return [encoded]
-        changed = self._changed(encoded, on)
-        return self._in_order(changed, on)
+        return self._in_order(self._changed(encoded, on), on) if on else [encoded]
 
     def _changed(self, encoded: bytes, on: set[str]) -> bytes:
         message = self._type.decode(encoded)
@@ -61,7 +57,7 @@ class Spoiler:
             first, number = self._begun.get(kind, (self._type.decode(encoded), 0))
             self._begun[kind] = first, number + 1
             self._spoils[kind](message, first, number)
-        dated = message if hasattr(message, "utime") else message.header
+        dated = _dated(message)
         dated.utime += round(1e6 * sum(_SHIFTS[kind] for kind in on & set(_SHIFTS)))
         if "utime_zero" in on:
             dated.utime = 0
@@ -69,20 +65,32 @@ class Spoiler:
         return changed
 
     def _in_order(self, encoded: bytes, on: set[str]) -> list[bytes]:
-        overtaken, self._overtaken = self._overtaken, None
-        if overtaken is not None:
-            return [encoded, overtaken]
-        if "reordered" in on:
-            self._overtaken = encoded
-            return []
-        if "duplicated" in on:
-            return [encoded, encoded]
-        if "second_sender" in on:
-            message = self._type.decode(encoded)
-            dated = message if hasattr(message, "utime") else message.header
-            dated.utime += round(1e6 * SECOND_CLOCK)
-            return [encoded, message.encode()]
-        return [encoded]
+        """Returns what is sent now; each is alone, since a bus may keep the last of two."""
+        kind = next((k for k in ("reordered", "duplicated", "second_sender") if k in on), None)
+        if kind is None:
+            return [encoded]
+        kept, number = self._begun.get(kind, (encoded, 0))
+        if kind == "reordered":
+            # the first of three is sent after the second, in place of the third
+            turn = number % 3
+            self._begun[kind] = encoded if turn == 0 else kept, number + 1
+            return [[], [encoded], [kept]][turn]
+        again = number % 2 == 1
+        self._begun[kind] = encoded, number + 1
+        if kind == "duplicated":
+            return [kept if again else encoded]
+        return [self._of_another(encoded) if again else encoded]
+
+    def _of_another(self, encoded: bytes) -> bytes:
+        message = self._type.decode(encoded)
+        _dated(message).utime += round(1e6 * SECOND_CLOCK)
+        other: bytes = message.encode()
+        return other
+
+
+def _dated(message: Any) -> Any:
+    """Returns what of a message has the utime."""
+    return message if hasattr(message, "utime") else message.header
 
 
 def spoil_points(wrong: WrongPoints) -> Spoil:

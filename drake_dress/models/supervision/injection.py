@@ -17,9 +17,9 @@ GENERAL_KINDS = (
     "time_back",  # stamps of the past
     "clock_jump",  # stamps of the future
     "set_back",  # a clock that is set back by less than a period
-    "reordered",  # every second message overtakes the one before it
-    "duplicated",  # each message comes twice
-    "second_sender",  # another sender on the channel, with a clock of its own
+    "reordered",  # of each three messages, the second comes before the first
+    "duplicated",  # every second message is the one before it again
+    "second_sender",  # every second message is of another sender, with a clock of its own
     "utime_zero",  # stamps that are not filled in
 )
 # Of an arm.
