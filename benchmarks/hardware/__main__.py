@@ -2,6 +2,7 @@
 
     drake-dress bench hardware --only commands
     drake-dress bench hardware --only faults --seeds 0-19 --json hardware.json
+    drake-dress bench hardware --only beliefs --seeds 0-19 --json hardware.json
     drake-dress bench hardware --only dressing --rate 0.35
     drake-dress bench hardware --only soak --minutes 20
 
@@ -16,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hardware.faults import REACTIONS
+from benchmarks.hardware.faults import BELIEFS, FAULTS, REACTIONS
 from benchmarks.hardware.parts import PARTS, Case, Conditions, run
 from benchmarks.hardware.tables import tables, tell
 from benchmarks.hardware.two_processes import available
@@ -59,10 +60,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _cases(
     parts: Sequence[str], kinds: Sequence[str], seeds: Sequence[int], repeats: int
 ) -> list[Case]:
-    """Returns what is to be measured, the seeds of faults outermost."""
+    """Returns what is to be measured, the seeds of faults outermost.
+
+    Kinds that are named are those of "faults" as they are, and of "beliefs" as far as they are some
+    of it; each part has all of its own where none is named.
+    """
+    groups = {
+        "faults": kinds or list(FAULTS),
+        "beliefs": [kind for kind in kinds or BELIEFS if kind in BELIEFS],
+    }
     of_part = {
         "commands": [Case("commands", seed=number) for number in range(repeats)],
-        "faults": [Case("faults", kind, seed) for seed in seeds for kind in kinds],
+        **{
+            part: [Case("faults", kind, seed) for seed in seeds for kind in of_group]
+            for part, of_group in groups.items()
+        },
     }
     return [c for part in PARTS if part in parts for c in of_part.get(part, [Case(part)])]
 
@@ -85,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
         "--seeds", type=seed_range, default=range(20), metavar="A-B", help="of faults; default 0-19"
     )
     add_choices(parser, kinds=REACTIONS)
+    parser.set_defaults(kinds=[])
     parser.add_argument(
         "--repeats",
         type=at_least_one,

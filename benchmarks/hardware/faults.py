@@ -51,12 +51,16 @@ class Reaction:
         within: from its start until both grippers hold, s; None where they do not.
         ends: what the run ends with; None where it goes on.
         waits: of it, what the run waits by this machine's clock before there is a fault, s.
+        told: what the run's log must tell of it; None where nothing is asked.
+        lasting: of the fault, s.
     """
 
     source: tuple[str, ...]
     within: float | None
     ends: str | None
     waits: float = 0.0
+    told: str | None = None
+    lasting: float = LASTING
 
     def at(self, rate: float) -> Reaction:
         """Returns what is stated by a clock that is slower than this machine's, by `rate`.
@@ -73,11 +77,11 @@ _ALL = (*_ARMS, "garment", "person")
 # A status is stale at 50 ms, an estimate at 200 ms; then 20 ms until the governor has it, 10 ms
 # until the arms have, 60 ms of braking, 100 ms of the drives' own.
 _HOLD, _HOLD_ESTIMATE = 0.25, 0.45
-REACTIONS = {
+FAULTS = {
     "stale": Reaction(_ARMS, _HOLD, None, 0.05),
     "stale_estimate": Reaction(("garment", "person"), _HOLD_ESTIMATE, None, 0.2),
     # an image at 0.5 s; they come five times a second, and one may still be on its way
-    "stale_camera": Reaction(("camera_front",), 1.2, None, 0.5),
+    "stale_camera": Reaction(("camera_front",), 1.2, None, 0.5, lasting=LASTING_CAMERA),
     "bus_lost": Reaction(("left_arm",), _HOLD, None, 0.05),
     "arm_lost": Reaction(_ARMS, _HOLD, None, 0.05),
     "malformed": Reaction(_ALL, _HOLD, None),
@@ -91,6 +95,57 @@ REACTIONS = {
     # a log is written each second; then as if it were killed
     "disk_full": Reaction(("",), 1.6, "log: cannot be written", 1.0),
 }
+
+
+def _refused(source: str, told: str, within: float = _HOLD, lasting: float = LASTING) -> Reaction:
+    """Returns that arms hold at an estimate that cannot be, which is told, and go on after it."""
+    return Reaction((source,), within, None, told=told, lasting=lasting)
+
+
+def _dropped(told: str | None) -> Reaction:
+    """Returns that messages are dropped, and arms go on."""
+    return Reaction(_ALL, None, None, told=told)
+
+
+_LOST = "at (0, 0, 0), as a lost point written as zero"
+_DROPPED = "a repeated or late message is dropped"
+# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 2 cm.
+_FROZEN, _FROZEN_GARMENT, _LASTING_FROZEN = 0.5 + _HOLD, 1.0, 1.6
+# What cannot be, and what comes out of order.
+BELIEFS = {
+    "person_zero": _refused("person", _LOST),
+    "person_hand_zero": _refused("person", f"left hand {_LOST}"),
+    "person_mm": _refused("person", "coordinates are in mm"),
+    "person_cm": _refused("person", "coordinates are in cm"),
+    "person_swapped": _refused("person", "left and right are swapped"),
+    "person_y_up": _refused("person", "coordinates are y up"),
+    "person_huge": _refused("person", "shoulder width"),
+    "person_limb": _refused("person", "left forearm"),
+    "person_jump": _refused("person", "moved 0.2"),
+    "person_offset": _refused("person", "from where the scenario's person has them"),
+    "person_frozen": _refused("person", "the same to the last bit", _FROZEN, _LASTING_FROZEN),
+    "garment_zero": _refused("garment", "as lost points written as zero"),
+    "garment_lost": _refused("garment", "as lost points written as zero"),
+    "garment_mm": _refused("garment", "coordinates are in mm"),
+    "garment_y_up": _refused("garment", "coordinates are y up"),
+    "garment_scrambled": _refused("garment", "nodes in another order"),
+    "garment_far": _refused("garment", "nodes held by the"),
+    "garment_mirrored": _refused("garment", "mirrored left and right"),
+    "garment_jump": _refused("garment", "expected 0.12 m at most"),
+    "garment_fast": _refused("garment", "velocity of node"),
+    "garment_frozen": _refused(
+        "garment", "the same to the last bit", _FROZEN_GARMENT, _LASTING_FROZEN
+    ),
+    "mode_unknown": Reaction(_ARMS, _HOLD, None, told="robot_mode is 0 (kOther)"),
+    "joint_leap": Reaction(_ARMS, _HOLD, "speed limit", told="joint 1 moved 0.3"),
+    "utime_zero": Reaction(_ALL, _HOLD, None, told="utime is 0 after"),
+    "second_sender": Reaction(_ALL, _HOLD, "time back", told="a second sender on the channel"),
+    "reordered": _dropped(_DROPPED),
+    "duplicated": _dropped(_DROPPED),
+    # by less than a period, so that of an estimate nothing is late
+    "set_back": _dropped(None),
+}
+REACTIONS = FAULTS | BELIEFS
 
 
 def inject(
@@ -123,7 +178,7 @@ def inject(
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
     played = kind.split("_")[0] if kind.startswith("stale") else kind
-    lasting = LASTING_CAMERA if kind == "stale_camera" else LASTING
+    lasting = stated.lasting
     lab = []
     if kind not in ("killed", "disk_full"):
         lab = [
@@ -178,6 +233,8 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
     try:
         with RunLog.open(kept / "run.h5") as log:
             ended = log.ended_by
+            if kind in BELIEFS:
+                wrong += _untold(log.events, stated)
             # what was flushed a second before it was killed is there
             if log.time[-1] < start - 1.5:
                 wrong.append(f"run's log ends at {log.time[-1]:.2f} s")
@@ -191,6 +248,24 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
     if kind == "disk_full" and stated.ends not in (out / "run.log").read_text():
         wrong.append("does not tell that its log cannot be written")
     return {"held_after": held, **share, "ended": ended, "wrong": wrong}
+
+
+def _untold(events: Sequence[str], stated: Reaction) -> list[str]:
+    """Returns what the lines of a run's log lack, or have too much, from when arms may move on."""
+    lines = [line.split(" ", 1)[1] for line in events]
+    if "arms may move" not in lines:
+        return ["arms were never permitted to move"]
+    lines = lines[lines.index("arms may move") + 1 :]
+    wrong = []
+    if stated.told is not None and not any(stated.told in line for line in lines):
+        wrong.append(f"does not tell {stated.told!r}")
+    if stated.within is None and "arms hold" in lines:
+        wrong.append(f"arms hold: {'; '.join(lines)}")
+    if stated.within is not None and "arms hold" not in lines:
+        wrong.append("arms do not hold")
+    if stated.within is not None and stated.ends is None and "arms may move" not in lines:
+        wrong.append("arms do not move on afterwards")
+    return wrong
 
 
 def _lab_facts(

@@ -14,7 +14,8 @@ from benchmarks.hardware.two_processes import Plan, play_usable
 from drake_dress.errors import UserError
 from drake_dress.report.summary import read_summary
 
-PARTS = ("commands", "dressing", "soak", "faults")
+# Beliefs are faults, too: of what messages say.
+PARTS = ("commands", "dressing", "soak", "faults", "beliefs")
 # On two cores a lab keeps up with time if its garment is coarse.
 _COARSE = ["plant.spacing=0.035", "plant.time_step=0.005", "controller.command_rate=200"]
 _COARSER = ["plant.spacing=0.05", "controller.spacing=0.06"]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.hardware.faults import REACTIONS
+from benchmarks.hardware.faults import BELIEFS, FAULTS
 from benchmarks.hardware.parts import Case
 
 
@@ -42,7 +42,12 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         Table(
             "Faults",
             ["", "rate", "as stated", "held within, s", "longest, s", "speed", "torque"],
-            _faults(faults),
+            _faults(faults, FAULTS),
+        ),
+        Table(
+            "Messages that cannot be believed, or are out of order",
+            ["", "rate", "as stated", "held within, s", "longest, s", "speed", "torque"],
+            _faults(faults, BELIEFS),
         ),
         Table(
             "Not as stated",
@@ -111,9 +116,9 @@ def _memory(summary: dict[str, Any]) -> list[list[Any]]:
     ]
 
 
-def _faults(done: Sequence[tuple[Case, dict[str, Any]]]) -> list[list[Any]]:
+def _faults(done: Sequence[tuple[Case, dict[str, Any]]], kinds: Collection[str]) -> list[list[Any]]:
     rows = []
-    for kind, rate in itertools.product(REACTIONS, sorted({s["rate"] for _, s in done})):
+    for kind, rate in itertools.product(kinds, sorted({s["rate"] for _, s in done})):
         mine = [s for case, s in done if case.kind == kind and s["rate"] == rate]
         if not mine:
             continue

@@ -128,7 +128,7 @@ def hardware_parts(
     person = described_person(at)
     planned = planned_arms(at, person)
     policy = controller_policy(scenario, meshes.belief, person)
-    p = hardware_parameters(scenario, len(meshes.belief.rest_position))
+    p = hardware_parameters(scenario, meshes.belief)
     # subscriptions in Python end with their bus: a run has none
     heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
     robots = at_start(p, planned, heard.joints)

@@ -13,8 +13,8 @@ from drake_dress.diagrams.arms import ArmPlacement, ArmSetup
 from drake_dress.diagrams.behaviour import Behaviour, Kind
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.dressing import LocalSetup, Rates
-from drake_dress.diagrams.hardware_station import HardwareParameters, Links
-from drake_dress.diagrams.person import JointParameters, Person, add_person
+from drake_dress.diagrams.hardware_station import Beliefs, HardwareParameters, Links
+from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
 from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.station import (
     Sight,
@@ -23,6 +23,8 @@ from drake_dress.diagrams.station import (
     make_simulated_station,
     robots_at_start,
 )
+from drake_dress.models.arm.panda import LIMITS, panda
+from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.local_control import LocalController, constrained_ddp
@@ -34,7 +36,7 @@ from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, unique_edges
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
@@ -52,7 +54,11 @@ from drake_dress.models.human.prediction import (
     StillPredictor,
 )
 from drake_dress.models.human.tremor import TremorParameters
-from drake_dress.models.sides import SIDES
+from drake_dress.models.sides import SIDES, Side
+from drake_dress.models.supervision.garment_belief import GarmentBounds
+from drake_dress.models.supervision.garment_shape import ShapeBounds
+from drake_dress.models.supervision.person_belief import PersonBounds
+from drake_dress.models.supervision.person_pose import PoseBounds
 from drake_dress.models.supervision.supervision import Patience
 from drake_dress.solvers.cone_programme import cone_programme
 
@@ -112,13 +118,22 @@ def links(scenario: schema.Scenario) -> Links:
     )
 
 
-def hardware_parameters(scenario: schema.Scenario, node_count: int) -> HardwareParameters:
-    """Returns what a hardware station is made of, with so many nodes of the estimate."""
-    h = scenario.station.hardware
+def hardware_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> HardwareParameters:
+    """Returns what a hardware station is made of, with estimates of the garment `mesh`.
+
+    Raises:
+        ValueError: the scenario's grippers float.
+    """
+    h, stand = scenario.station.hardware, placement(scenario)
+    if stand is None:
+        raise ValueError("grippers float, expected arms")
+    left, right = (panda(stand.base(side)) for side in SIDES)
     return HardwareParameters(
         links=links(scenario),
         mode=scenario.station.arms.mode,
-        node_count=node_count,
+        node_count=len(mesh.rest_position),
+        arms=(left, right),
+        beliefs=beliefs(scenario, mesh),
         cameras=tuple(c.name for c in scenario.station.cameras),
         stale_status=h.stale_status,
         stale_estimate=h.stale_estimate,
@@ -127,6 +142,44 @@ def hardware_parameters(scenario: schema.Scenario, node_count: int) -> HardwareP
         wait=h.wait,
         start_distance=h.start_distance,
         start_angle=h.start_angle,
+    )
+
+
+def beliefs(scenario: schema.Scenario, mesh: GarmentMesh) -> Beliefs:
+    """Returns what messages may say of the arms, the scenario's person, and the garment `mesh`."""
+    b = scenario.station.hardware.beliefs
+    body, stance = measures(scenario.person), posture(scenario.person)
+    poses: dict[Side, ArmPose] = {
+        "left": arm(scenario.person.left_arm),
+        "right": arm(scenario.person.right_arm),
+    }
+    joints = JointParameters(**vars(scenario.person.joints))
+    pose = PoseBounds(
+        shoulders=np.stack([shoulder_joint(body, stance, side) for side in SIDES]),
+        limbs=(body.upper_arm_length, body.forearm_length),
+        limits=person_arms(body, stance, poses, joints).limits,
+        point_error=b.point_error,
+        length_share=b.limb_share,
+        shoulder_distance=b.shoulder_distance,
+        turn=math.radians(b.turn_deg),
+        joint_room=math.radians(b.joint_room_deg),
+    )
+    shape = ShapeBounds(
+        edges=unique_edges(mesh.faces),
+        rest_length=edge_lengths(mesh.rest_position, mesh.faces),
+        grasp=(mesh.grasp["left"], mesh.grasp["right"]),
+        extent=float(np.linalg.norm(np.ptp(mesh.rest_position, axis=0))),
+        node_noise=b.node_noise,
+        strain=b.strain,
+        least_edge=b.least_edge,
+        grasp_distance=b.grasp_distance,
+    )
+    return Beliefs(
+        joints=JointBounds(LIMITS, b.joint_leap, b.torque_share),
+        person=PersonBounds(pose, b.person_speed, b.frozen_time),
+        garment=GarmentBounds(
+            shape, b.garment_speed, b.garment_velocity, b.velocity_error, b.frozen_travel
+        ),
     )
 
 

@@ -29,33 +29,31 @@ from pydrake.systems.sensors import LcmImageArrayToImages
 from drake_dress.diagrams.arms import ArmSetup
 from drake_dress.diagrams.person import Person
 from drake_dress.diagrams.station import ARM_STATUS, Station
-from drake_dress.models.arm.panda import LIMITS
-from drake_dress.models.arm.status_check import joint_fault
+from drake_dress.models.arm.chain import SerialArm
+from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.sides import SIDES
-from drake_dress.models.supervision.supervision import Patience
-from drake_dress.models.supervision.watch import Fault, WatchSettings
+from drake_dress.models.supervision.fault import SOUND, Fault, Finding
+from drake_dress.models.supervision.garment_belief import GarmentBounds
+from drake_dress.models.supervision.person_belief import PersonBounds
+from drake_dress.models.supervision.supervision import Patience, words
+from drake_dress.models.supervision.watch import WatchSettings
 from drake_dress.systems.arm_measurement import ArmMeasurement
 from drake_dress.systems.command_meter import CommandMeter
+from drake_dress.systems.estimate_checks import GarmentCheck, PersonCheck
 from drake_dress.systems.lcm_inbox import (
     Check,
     Decoder,
     GuardedSerializer,
     InboxSerializer,
     cpp_serializer,
+    stamp,
 )
-from drake_dress.systems.point_messages import PointReceiver, check_points, decode_points
+from drake_dress.systems.point_messages import PointReceiver, decode_points
 from drake_dress.systems.station_watch import StationWatch
+from drake_dress.systems.status_messages import StatusCheck
 
 FloatArray = np.ndarray
 
-_JOINT_POINTS = 6
-# An arm in one of these does not follow commands.
-_STOPPED_MODES = (
-    lcmt_panda_status.kGuiding,
-    lcmt_panda_status.kReflex,
-    lcmt_panda_status.kUserStopped,
-    lcmt_panda_status.kAutomaticErrorRecovery,
-)
 # Of looking at what has come, s.
 _WATCH_PERIOD = 0.005
 _LISTENING_STEP = 0.05
@@ -94,6 +92,15 @@ class Links:
 
 
 @dataclass(frozen=True)
+class Beliefs:
+    """What messages may say to be believed: of each arm's joints, the person, the garment."""
+
+    joints: JointBounds
+    person: PersonBounds
+    garment: GarmentBounds
+
+
+@dataclass(frozen=True)
 class HardwareParameters:
     """What the hardware station is made of.
 
@@ -101,8 +108,11 @@ class HardwareParameters:
         links: of the messages.
         mode: of `panda_driver.MODES`.
         node_count: of the controller's garment.
+        arms: left and right, where they stand.
+        beliefs: bounds of what messages say.
         cameras: their names.
-        stale_status, stale_estimate, stale_camera: age at which a source is stale, s.
+        stale_status, stale_estimate, stale_camera: age at which a source is stale, s. A message
+            that is older than the newest one by no more is dropped without a fault.
         patience: with faults.
         wait: for the first messages, s.
         start_distance: of a gripper from where the run begins, at most, m.
@@ -113,6 +123,8 @@ class HardwareParameters:
     links: Links
     mode: str
     node_count: int
+    arms: tuple[SerialArm, SerialArm]
+    beliefs: Beliefs
     cameras: tuple[str, ...] = ()
     stale_status: float = 0.05
     stale_estimate: float = 0.2
@@ -179,43 +191,54 @@ class _Source:
     @cached_property
     def decoder(self) -> Decoder:
         """Shared by all who take the messages."""
-        return Decoder(self.lcm_type, self.check)
+        return Decoder(self.lcm_type, self.check, self.max_age)
 
 
-def status_fault(message: Any) -> Fault:
-    """Returns what is wrong with a `lcmt_panda_status`."""
-    given = (message.joint_position, message.joint_velocity, message.joint_torque_external)
-    if message.num_joints != len(LIMITS.lower):
-        return Fault.WRONG_SIZE
-    fault = joint_fault(*given, LIMITS)
-    if message.robot_mode in _STOPPED_MODES:
-        fault |= Fault.STOPPED
-    # idle, it takes up commands that go on from where it is
-    return fault | Fault.IDLE if message.robot_mode == lcmt_panda_status.kIdle else fault
-
-
-def _image_fault(message: Any) -> Fault:
+def _image_finding(message: Any) -> Finding:
     sizes = [image.width * image.height for image in message.images]
-    return Fault.NONE if sizes and min(sizes) > 0 else Fault.WRONG_SIZE
+    if sizes and min(sizes) > 0:
+        return SOUND
+    return Finding(Fault.WRONG_SIZE, "no image, or an empty one")
 
 
 def _sources(p: HardwareParameters) -> dict[str, _Source]:
-    sources = {
+    """Returns the sources of one listener, with checks that remember what it heard."""
+    arms = {
         f"{side}_arm": _Source(
-            p.links.of_arm("status", side), lcmt_panda_status, status_fault, p.stale_status
+            p.links.of_arm("status", side),
+            lcmt_panda_status,
+            StatusCheck(p.beliefs.joints),
+            p.stale_status,
         )
         for side in SIDES
     }
-    for name, channel, count in (
-        ("garment", p.links.garment, p.node_count),
-        ("person", p.links.person, _JOINT_POINTS),
-    ):
-        sources[name] = _Source(channel, lcmt_point_cloud, check_points(count), p.stale_estimate)
-    for name in p.cameras:
-        sources[f"camera_{name}"] = _Source(
-            p.links.of_camera(name), lcmt_image_array, _image_fault, p.stale_camera
+
+    def grippers() -> FloatArray | None:
+        statuses = [source.decoder.usable for source in arms.values()]
+        if any(status is None for status in statuses):
+            return None
+        return np.stack(
+            [
+                arm.tool_position(np.array(status.joint_position))
+                for arm, status in zip(p.arms, statuses, strict=True)
+            ]
         )
-    return sources
+
+    checks: dict[str, tuple[str, Check]] = {
+        "garment": (p.links.garment, GarmentCheck(p.node_count, p.beliefs.garment, grippers)),
+        "person": (p.links.person, PersonCheck(p.beliefs.person)),
+    }
+    estimates = {
+        name: _Source(channel, lcmt_point_cloud, check, p.stale_estimate)
+        for name, (channel, check) in checks.items()
+    }
+    cameras = {
+        f"camera_{name}": _Source(
+            p.links.of_camera(name), lcmt_image_array, _image_finding, p.stale_camera
+        )
+        for name in p.cameras
+    }
+    return arms | estimates | cameras
 
 
 def open_bus(url: str) -> DrakeLcm:
@@ -256,17 +279,30 @@ def listen(
     """
     sources = _sources(p)
     first: dict[str, Any] = {}
-    wrong: dict[str, Fault] = {}
+    wrong: dict[str, Finding] = {}
+
+    # a garment is held against the grippers, so it waits for both arms
+    waiting: set[str] = set()
+    arms = {f"{side}_arm" for side in SIDES}
 
     def take(name: str, raw: bytes) -> None:
         if name in first:
             return
-        message, fault = sources[name].decoder(raw)
+        if name == "garment" and not arms <= set(first):
+            waiting.add(name)
+            return
+        waiting.discard(name)
+        taken = sources[name].decoder(raw)
+        if taken.finding is None:
+            return
         # before the first command, an arm is idle
-        if fault & ~Fault.IDLE:
-            wrong[name] = fault
+        if taken.finding.fault & ~Fault.IDLE:
+            wrong[name] = taken.finding
+        elif stamp(taken.message) == 0.0:
+            # it may be the first message of a clock that begins
+            wrong[name] = Finding(Fault.UNSTAMPED, "utime is never filled in: it is 0")
         else:
-            first[name] = message
+            first[name] = taken.message
             told(name)
 
     for name, source in sources.items():
@@ -276,10 +312,7 @@ def listen(
         lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
     missing = [n for n in sources if n not in first]
     if missing:
-        parts = []
-        for n in missing:
-            why = f"came {wrong[n].name.lower().replace('_', ' ')}" if n in wrong else "is silent"  # type: ignore[union-attr]
-            parts.append(f"{sources[n].channel} {why}")
+        parts = [_unheard(sources[n].channel, wrong.get(n)) for n in missing if n not in waiting]
         raise StationSilentError(f"{', '.join(parts)} for {p.wait:g} s")
     points = {n: decode_points(first[n]) for n in ("garment", "person")}
     return Heard(
@@ -287,6 +320,14 @@ def listen(
         points["garment"][:, :3],  # type: ignore[index]
         points["person"][:, :3],  # type: ignore[index]
     )
+
+
+def _unheard(channel: str, wrong: Finding | None) -> str:
+    """Returns what came on a channel in place of something sound."""
+    if wrong is None:
+        return f"{channel} is silent"
+    reason = f": {wrong.reason}" if wrong.reason else ""
+    return f"{channel} came {words(wrong.fault)}{reason}"
 
 
 def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> ArmSetup:
@@ -338,7 +379,7 @@ def make_hardware_station(
     watch = builder.AddNamedSystem(
         "station_watch",
         StationWatch(
-            {n: WatchSettings(s.max_age) for n, s in sources.items()},
+            {n: WatchSettings(s.max_age, late=s.max_age) for n, s in sources.items()},
             p.patience,
             _WATCH_PERIOD,
             p.wall,

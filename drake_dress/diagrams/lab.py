@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,22 +39,27 @@ from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
+from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.injection import InjectedFault
 from drake_dress.models.supervision.supervision import Patience
-from drake_dress.models.supervision.watch import Fault, WatchSettings
+from drake_dress.models.supervision.watch import WatchSettings
+from drake_dress.models.supervision.wrong_points import WRONG_POINTS
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.apart import Apart
 from drake_dress.systems.camera_outbox import CameraOutbox, Take
 from drake_dress.systems.fault_player import FaultPlayer
 from drake_dress.systems.lcm_inbox import (
+    Check,
     Decoder,
     GuardedSerializer,
     InboxSerializer,
     cpp_serializer,
 )
-from drake_dress.systems.outbox import Outbox, Spoil, StatusOutbox
+from drake_dress.systems.outbox import Outbox, StatusOutbox
 from drake_dress.systems.point_messages import PointSender
+from drake_dress.systems.point_noise import PointNoise
 from drake_dress.systems.run_recorder import RunRecorder
+from drake_dress.systems.spoiler import Spoil, spoil_points
 from drake_dress.systems.station_watch import StationWatch
 
 # Is said when statuses come.
@@ -63,6 +68,8 @@ _CHUNK = 0.05
 # What pictures are taken of.
 _PICTURED = ("cheat_plant_state", "cheat_garment_position")
 _WATCH_PERIOD = 0.005
+# By which a joint is reported elsewhere, rad.
+_LEAP = 0.3
 
 
 @dataclass(frozen=True)
@@ -158,7 +165,8 @@ def make_lab(
     builder = DiagramBuilder()
     lab = builder.AddNamedSystem("station", station.diagram)
     bus = builder.AddNamedSystem("lcm", LcmInterfaceSystem(lcm))
-    stale = WatchSettings(scenario.lab.stale_command)
+    stale_command = scenario.lab.stale_command
+    stale = WatchSettings(stale_command, late=stale_command)
     watch = builder.AddNamedSystem(
         "command_watch",
         StationWatch({f"{s}_command": stale for s in SIDES}, Patience(), _WATCH_PERIOD),
@@ -176,7 +184,7 @@ def make_lab(
         serializer: SerializerInterface,
         lcm_type: Any,
         rate: float,
-        spoils: dict[str, Spoil],
+        spoils: Mapping[str, Spoil],
         kind: type[Outbox] = Outbox,
     ) -> Outbox:
         outbox = builder.AddNamedSystem(
@@ -189,7 +197,7 @@ def make_lab(
 
     for side in SIDES:
         channel = to.of_arm("command", side)
-        decoder = Decoder(lcmt_panda_command, _command_fault(sum(wanted.values())))
+        decoder = Decoder(lcmt_panda_command, _command_check(sum(wanted.values())), stale_command)
         inbox = builder.AddNamedSystem(
             f"{side}_command_inbox",
             LcmSubscriberSystem(channel=channel, serializer=InboxSerializer(decoder), lcm=bus),
@@ -230,7 +238,7 @@ def make_lab(
             cpp_serializer(lcmt_panda_status),
             lcmt_panda_status,
             h.status_rate,
-            {"nan": _nan_joints, "joint_limit": _joint_too_far},
+            _ARM_SPOILS,
             StatusOutbox,
         )
         builder.Connect(lab.GetOutputPort(f"cheat_{side}_arm_stop"), outbox.GetInputPort("stop"))
@@ -240,7 +248,14 @@ def make_lab(
     ):
         sender = builder.AddNamedSystem(f"{name}_points", PointSender(count, len(ports) > 1))
         for i, port in enumerate(ports):
-            builder.Connect(lab.GetOutputPort(f"estimate.{port}"), sender.get_input_port(i))
+            estimate = lab.GetOutputPort(f"estimate.{port}")
+            if name == "person":
+                noise = builder.AddNamedSystem(
+                    "person_noise", PointNoise(count, scenario.lab.person_noise, scenario.seed)
+                )
+                builder.Connect(estimate, noise.get_input_port())
+                estimate = noise.get_output_port()
+            builder.Connect(estimate, sender.get_input_port(i))
         send(
             name,
             getattr(to, name),
@@ -248,7 +263,7 @@ def make_lab(
             PySerializer(lcmt_point_cloud),
             lcmt_point_cloud,
             h.estimate_rate,
-            {"nan": _nan_points},
+            _POINT_SPOILS,
         )
     for camera in station_cameras(scenario):
         if take is not None:
@@ -384,30 +399,51 @@ def _play(
     return begun_at is not None, ended, wall
 
 
-def _command_fault(mode: int) -> Callable[[Any], Fault]:
+def _command_check(mode: int) -> Check:
     """Returns what tells what is wrong with a `lcmt_panda_command`."""
 
-    def check(message: Any) -> Fault:
+    def check(message: Any) -> Finding:
         # Drake's sender writes what it sends
         sizes = {1: message.num_joint_position, 2: message.num_joint_velocity}
         for bit, size in sizes.items():
             if size != (7 if mode & bit else 0):
-                return Fault.WRONG_SIZE
+                return Finding(Fault.WRONG_SIZE)
         values = [*message.joint_position, *message.joint_velocity]
-        return Fault.NONE if np.isfinite(values).all() else Fault.NOT_FINITE
+        return SOUND if np.isfinite(values).all() else Finding(Fault.NOT_FINITE)
 
     return check
 
 
-def _nan_joints(message: Any) -> None:
+def _nan_joints(message: Any, first: Any, number: int) -> None:
     message.joint_position = [float("nan")] * 7
 
 
-def _joint_too_far(message: Any) -> None:
+def _joint_too_far(message: Any, first: Any, number: int) -> None:
     position = list(message.joint_position)
     position[3] = float(LIMITS.upper[3]) + 0.05
     message.joint_position = position
 
 
-def _nan_points(message: Any) -> None:
+def _joint_elsewhere(message: Any, first: Any, number: int) -> None:
+    position = list(message.joint_position)
+    position[0] -= np.copysign(_LEAP, position[0])
+    message.joint_position = position
+
+
+def _mode_unknown(message: Any, first: Any, number: int) -> None:
+    message.robot_mode = lcmt_panda_status.kOther
+
+
+def _nan_points(message: Any, first: Any, number: int) -> None:
     message.data = np.full(len(message.data) // 4, np.nan, dtype="<f4").tobytes()
+
+
+_ARM_SPOILS: dict[str, Spoil] = {
+    "nan": _nan_joints,
+    "joint_limit": _joint_too_far,
+    "joint_leap": _joint_elsewhere,
+    "mode_unknown": _mode_unknown,
+}
+_POINT_SPOILS: dict[str, Spoil] = {"nan": _nan_points} | {
+    kind: spoil_points(wrong) for kind, wrong in WRONG_POINTS.items()
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time as clock
 from dataclasses import dataclass
@@ -142,6 +143,7 @@ def _note(dressing: Dressing, ending: Ending, writer: RunLogWriter) -> None:
     if isinstance(dressing.station, HardwareStation):
         events = dressing.station.watch.events
         writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
+        writer.note("dropped_messages", json.dumps(dressing.station.watch.dropped))
         meter = dressing.station.meter
         if meter.first is not None:
             times, ages = meter.commands

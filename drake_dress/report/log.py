@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -76,6 +77,12 @@ class RunLog:
         """Time from the start of the process to its first command to hardware, s."""
         value = self.file.attrs.get("start_up")
         return None if value is None else float(value)
+
+    @property
+    def dropped_messages(self) -> dict[str, int] | None:
+        """Repeated and late messages of each source that a run on hardware dropped."""
+        text = self.file.attrs.get("dropped_messages")
+        return None if text is None else dict(json.loads(str(text)))
 
     @property
     def behind(self) -> float | None:

@@ -60,8 +60,9 @@ def summarize(
     time from which both sleeves stay on (s and linking number). `safety_cut_s` is, for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
     where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
-    sending of a status to the command that answers it), `start_up_s` (to the first command) and
-    `fell_behind_s` (real time by which it was slower than asked).
+    sending of a status to the command that answers it), `start_up_s` (to the first command),
+    `fell_behind_s` (real time by which it was slower than asked) and `dropped_messages` (repeated
+    and late ones of each source).
     Of a run with arms: `max_joint_speed_share`, `max_joint_torque_share` of limits,
     `min_joint_margin_rad`, `arm_tracking_mm` (of grippers from where joints are commanded to be),
     `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand).
@@ -236,6 +237,7 @@ def _command_figures(log: RunLog) -> dict[str, Any]:
         },
         "start_up_s": log.start_up,
         "fell_behind_s": log.behind,
+        "dropped_messages": log.dropped_messages,
     }
 
 

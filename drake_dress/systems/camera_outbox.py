@@ -11,7 +11,7 @@ from pydrake.lcm import DrakeLcmInterface
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from drake_dress.models.supervision.injection import InjectedFault, kinds_at
-from drake_dress.systems.outbox import spoiled
+from drake_dress.systems.spoiler import Spoiler
 
 # Of looking whether a picture is there, s.
 _LOOKING_PERIOD = 0.01
@@ -58,7 +58,7 @@ class CameraOutbox(LeafSystem):
         super().__init__()
         self._name, self._channel, self._take, self._lcm = name, channel, take, lcm
         self._faults = tuple(faults)
-        self._rng = np.random.default_rng(0)
+        self._spoiler = Spoiler(lcmt_image_array)
         self._pending: Future[bytes] | None = None
         for port, size in zip(("plant_state", "garment_position"), sizes, strict=True):
             self.DeclareVectorInputPort(port, size)
@@ -82,7 +82,6 @@ class CameraOutbox(LeafSystem):
         picture, self._pending = self._pending.result(), None
         since = float(self.GetInputPort("since").Eval(context)[0])
         on = kinds_at(self._faults, f"camera_{self._name}", since)
-        encoded = spoiled(picture, on, lcmt_image_array, {}, self._rng)
-        if encoded is not None:
+        for encoded in self._spoiler(picture, on):
             self._lcm.Publish(self._channel, encoded)
         return EventStatus.Succeeded()

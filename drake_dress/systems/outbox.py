@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import struct
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from drake import lcmt_panda_status
 from pydrake.common.value import AbstractValue
 from pydrake.lcm import DrakeLcmInterface
@@ -15,15 +14,8 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.lcm import SerializerInterface
 
 from drake_dress.models.arm.command_guard import Stop
-from drake_dress.models.supervision.injection import (
-    CLOCK_JUMP,
-    TIME_BACK,
-    InjectedFault,
-    kinds_at,
-)
-
-# Changes a decoded message in place.
-Spoil = Callable[[Any], None]
+from drake_dress.models.supervision.injection import InjectedFault, kinds_at
+from drake_dress.systems.spoiler import Spoil, Spoiler
 
 
 class Outbox(LeafSystem):
@@ -47,7 +39,7 @@ class Outbox(LeafSystem):
         lcm: bus.
         period: s. offset: of the first message, s.
         faults: what goes wrong, and when.
-        spoils: what `nan` and `joint_limit` do to a message.
+        spoils: what kinds of faults do to a message, beside those that `Spoiler` knows.
     """
 
     def __init__(
@@ -60,13 +52,12 @@ class Outbox(LeafSystem):
         period: float,
         offset: float = 0.0,
         faults: Sequence[InjectedFault] = (),
-        spoils: dict[str, Spoil] | None = None,
+        spoils: Mapping[str, Spoil] | None = None,
     ) -> None:
         super().__init__()
         self._source, self._channel = source, channel
-        self._serializer, self._type, self._lcm = serializer, lcm_type, lcm
-        self._faults, self._spoils = tuple(faults), spoils or {}
-        self._rng = np.random.default_rng(0)
+        self._serializer, self._lcm, self._faults = serializer, lcm, tuple(faults)
+        self._spoiler = Spoiler(lcm_type, spoils)
         self.DeclareAbstractInputPort("message", serializer.CreateDefaultValue())
         self.DeclareVectorInputPort("since", 1)
         self.DeclarePeriodicPublishEvent(period, offset, self._publish)
@@ -81,41 +72,10 @@ class Outbox(LeafSystem):
         if self._faults and since.HasValue(context):
             on = kinds_at(self._faults, self._source, float(since.Eval(context)[0]))
         value: AbstractValue = self.GetInputPort("message").EvalAbstract(context)
-        encoded = self._stamped(context, self._serializer.Serialize(value))
-        sent = spoiled(encoded, on, self._type, self._spoils, self._rng)
-        if sent is None:
-            return EventStatus.DidNothing()
-        self._lcm.Publish(self._channel, sent)
-        return EventStatus.Succeeded()
-
-
-def spoiled(
-    encoded: bytes, on: set[str], lcm_type: Any, spoils: dict[str, Spoil], rng: np.random.Generator
-) -> bytes | None:
-    """Returns what is sent in place of a message while faults are on; None if nothing is.
-
-    Args:
-        encoded: the message.
-        on: kinds of faults, of `models.supervision.injection`.
-        lcm_type: Python class of the message.
-        spoils: what kinds of faults do to a decoded message.
-        rng: of bytes that are no message.
-    """
-    if on & {"stale", "bus_lost", "arm_lost"}:
-        return None
-    if "malformed" in on:
-        garbage: bytes = rng.bytes(int(rng.integers(0, len(encoded) + 1)))
-        return garbage
-    if not on:
-        return encoded
-    message = lcm_type.decode(encoded)
-    for kind in on & set(spoils):
-        spoils[kind](message)
-    shift = TIME_BACK * ("time_back" in on) + CLOCK_JUMP * ("clock_jump" in on)
-    dated = message if hasattr(message, "utime") else message.header
-    dated.utime += round(1e6 * shift)
-    changed: bytes = message.encode()
-    return changed
+        sent = self._spoiler(self._stamped(context, self._serializer.Serialize(value)), on)
+        for encoded in sent:
+            self._lcm.Publish(self._channel, encoded)
+        return EventStatus.Succeeded() if sent else EventStatus.DidNothing()
 
 
 class StatusOutbox(Outbox):

@@ -6,7 +6,7 @@ z, m, and vx, vy, vz, m/s, where it has velocities: float32, in the world frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from drake import lcmt_point_cloud, lcmt_point_cloud_field
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from drake_dress.models.supervision.watch import Fault
+from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.systems.lcm_inbox import Received
 
 FloatArray = npt.NDArray[np.float64]
@@ -63,16 +63,32 @@ def decode_points(message: Any) -> FloatArray | None:
     return values
 
 
-def check_points(count: int) -> Callable[[Any], Fault]:
+def check_points(count: int) -> Callable[[Any], Finding]:
     """Returns a check of messages of so many points."""
+    return lambda message: read_points(message, count)[0]
 
-    def check(message: Any) -> Fault:
-        values = decode_points(message)
-        if values is None or len(values) != count:
-            return Fault.WRONG_SIZE
-        return Fault.NONE if np.isfinite(values).all() else Fault.NOT_FINITE
 
-    return check
+def read_points(message: Any, count: int, names: Sequence[str] = ()) -> tuple[Finding, FloatArray]:
+    """Returns whether a message is of so many points, all finite, and the points.
+
+    Args:
+        message: `lcmt_point_cloud`.
+        count: of the points.
+        names: of the points, where they have some.
+
+    Returns:
+        what is wrong, and (count,3) or (count,6) as of `decode_points`; (0,3) if something is.
+    """
+    values, none = decode_points(message), np.zeros((0, 3))
+    if values is None:
+        return Finding(Fault.WRONG_SIZE, f"no cloud of float32 x, y, z in frame {FRAME!r}"), none
+    if len(values) != count:
+        return Finding(Fault.WRONG_SIZE, f"{len(values)} points, expected {count}"), none
+    if not np.isfinite(values).all():
+        k = int(np.argmin(np.isfinite(values).all(axis=1)))
+        name = names[k] if names else f"point {k}"
+        return Finding(Fault.NOT_FINITE, f"{name} is {values[k].tolist()}"), none
+    return SOUND, values
 
 
 class PointSender(LeafSystem):

@@ -11,13 +11,14 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from drake_dress.models.immutable import Immutable
+from drake_dress.models.supervision.fault import TELLING
 from drake_dress.models.supervision.supervision import (
     Patience,
     SupervisionState,
     supervise,
     told,
 )
-from drake_dress.models.supervision.watch import TELLING, WatchSettings, WatchState, watch
+from drake_dress.models.supervision.watch import Arrival, WatchSettings, WatchState, watch
 from drake_dress.systems.lcm_inbox import Received
 
 # Changes that are remembered, from the first on; a source that flaps must not fill the memory.
@@ -48,8 +49,8 @@ class StationWatch(LeafSystem):
     Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) of each source, flags
     of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
     while none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it
-    reports that it does not follow. Beside the ports, `events` tells
-    what changed.
+    reports that it does not follow. Beside the ports, `events` tells what changed, and `dropped`
+    counts the repeated and late messages of each source.
 
     Args:
         sources: by name, what is asked of each.
@@ -73,6 +74,7 @@ class StationWatch(LeafSystem):
         self._patience = patience
         # what changed, when: s and a line
         self.events: list[tuple[float, str]] = []
+        self.dropped = dict.fromkeys(self.sources, 0)
         count = len(self.sources)
         self._memory = self.DeclareAbstractState(
             Value(_Memory((WatchState(),) * count, SupervisionState.of(count)))
@@ -98,12 +100,16 @@ class StationWatch(LeafSystem):
     def _update(self, context: Context, state: State) -> None:
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
         now = clock.monotonic() if self._wall else context.get_time()
+        arrivals: list[Arrival] = [
+            self.get_input_port(i).Eval(context).arrival for i in range(len(self.sources))
+        ]
         watched = tuple(
-            watch(w, self.get_input_port(i).Eval(context).arrival, now, self._settings[i])
-            for i, w in enumerate(memory.watched)
+            watch(w, arrival, now, settings)
+            for w, arrival, settings in zip(memory.watched, arrivals, self._settings, strict=True)
         )
         supervised = supervise(memory.supervised, [w.fault for w in watched], now, self._patience)
         self._note(memory, watched, supervised, context.get_time())
+        self._count(arrivals, context.get_time())
         state.get_mutable_abstract_state(self._memory).set_value(_Memory(watched, supervised))
 
     def _note(
@@ -114,12 +120,21 @@ class StationWatch(LeafSystem):
         now: float,
     ) -> None:
         lines = [
-            told(self._told(i), w.fault) if w.fault else f"{self._told(i)}: sound"
+            told(self._told(i), w.fault, w.reason) if w.fault else f"{self._told(i)}: sound"
             for i, (old, w) in enumerate(zip(before.watched, watched, strict=True))
             if old.fault != w.fault
         ]
         if before.supervised.permitted != supervised.permitted:
             lines.append("arms may move" if supervised.permitted else "arms hold")
+        self._tell(now, lines)
+
+    def _count(self, arrivals: list[Arrival], now: float) -> None:
+        for i, (name, arrival) in enumerate(zip(self.sources, arrivals, strict=True)):
+            if arrival.dropped and not self.dropped[name]:
+                self._tell(now, [f"{self._told(i)}: a repeated or late message is dropped"])
+            self.dropped[name] = arrival.dropped
+
+    def _tell(self, now: float, lines: list[str]) -> None:
         if len(self.events) < _REMEMBERED:
             self.events += [(now, line) for line in lines]
 
@@ -128,11 +143,11 @@ class StationWatch(LeafSystem):
 
     def conclusion(self, context: Context) -> str | None:
         """Returns why the run ends, in its own context; None while it goes on."""
-        supervised: SupervisionState = (
-            context.get_abstract_state(self._memory).get_value().supervised
-        )
-        i = supervised.ended_by
-        return None if i is None else told(self._told(i), supervised.faults[i])
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        i = memory.supervised.ended_by
+        if i is None:
+            return None
+        return told(self._told(i), memory.supervised.faults[i], memory.watched[i].reason)
 
 
 def _valid(i: int, memory: _Memory) -> list[float]:

@@ -34,7 +34,6 @@ from drake_dress.diagrams.hardware_station import (
     at_start,
     listen,
     make_hardware_station,
-    status_fault,
 )
 from drake_dress.diagrams.lab import Lab, make_lab
 from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
@@ -42,7 +41,6 @@ from drake_dress.diagrams.scenario.schema import LabFault
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES
-from drake_dress.models.supervision.watch import Fault
 
 SOURCE = Path(__file__).parents[2] / "scenarios" / "lab.yaml"
 COARSE = ("plant.spacing=0.06", "controller.spacing=0.06", "plant.iterations=5")
@@ -75,7 +73,7 @@ class Pair:
         )
         at = station_parameters(scenario, meshes.belief)
         person = described_person(at)
-        p = replace(hardware_parameters(scenario, len(meshes.belief.rest_position)), wall=False)
+        p = replace(hardware_parameters(scenario, meshes.belief), wall=False)
         assert self.simulated.robots is not None
         joints = self.simulated.robots.start
         robots = at_start(p, planned_arms(at, person), joints)
@@ -300,7 +298,7 @@ def test_a_run_does_not_start_from_elsewhere() -> None:
     meshes, _ = garments(scenario, SOURCE)
     at = station_parameters(scenario, meshes.belief)
     planned = planned_arms(at, described_person(at))
-    p = hardware_parameters(scenario, len(meshes.belief.rest_position))
+    p = hardware_parameters(scenario, meshes.belief)
     joints = planned.start.copy()
     joints[1, 3] += 0.15
     with pytest.raises(NotAtStartError, match=r"right arm is .* rad from where the run begins"):
@@ -311,7 +309,7 @@ def test_a_run_does_not_start_from_elsewhere() -> None:
 
 def test_silence_is_told_with_its_channels() -> None:
     scenario = load("station.hardware.wait=0.2")
-    p = hardware_parameters(scenario, 10)
+    p = hardware_parameters(scenario, garments(scenario, SOURCE)[0].belief)
     lcm = DrakeLcm("memq://")
 
     def speak() -> bool:
@@ -322,10 +320,3 @@ def test_silence_is_told_with_its_channels() -> None:
         StationSilentError, match=r"PANDA_STATUS_LEFT came malformed.*PERSON_ESTIMATE is silent"
     ):
         listen(p, lcm, stopped=speak)
-
-
-def test_a_status_of_other_joints_is_refused() -> None:
-    from drake import lcmt_panda_status
-
-    message = lcmt_panda_status()
-    assert status_fault(message) is Fault.WRONG_SIZE

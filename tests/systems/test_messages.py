@@ -15,10 +15,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmInterfaceSystem, LcmSubscriberSystem, PySerializer
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_dress.diagrams.hardware_station import status_fault
 from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.arm.status_check import JointBounds
+from drake_dress.models.supervision.fault import Fault
 from drake_dress.models.supervision.injection import InjectedFault
-from drake_dress.models.supervision.watch import Fault
 from drake_dress.systems.lcm_inbox import (
     Decoder,
     GuardedSerializer,
@@ -34,6 +34,7 @@ from drake_dress.systems.point_messages import (
     decode_points,
     encode_points,
 )
+from drake_dress.systems.status_messages import StatusCheck, mode_finding
 
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 _ARRAYS = (
@@ -50,6 +51,7 @@ _ARRAYS = (
 def status(utime: int = 7, position: np.ndarray = HOME) -> lcmt_panda_status:
     message = lcmt_panda_status()
     message.utime, message.num_joints = utime, 7
+    message.robot_mode = lcmt_panda_status.kMove
     message.joint_position = list(position)
     for name in _ARRAYS:
         setattr(message, name, [0.0] * 7)
@@ -59,11 +61,11 @@ def status(utime: int = 7, position: np.ndarray = HOME) -> lcmt_panda_status:
 class Ear:
     """Takes statuses from a bus in memory, for Python and for Drake's receiver."""
 
-    def __init__(self) -> None:
+    def __init__(self, late: float = 0.0) -> None:
         builder = DiagramBuilder()
         self.lcm = DrakeLcm("memq://")
         bus = builder.AddSystem(LcmInterfaceSystem(self.lcm))
-        decoder = Decoder(lcmt_panda_status, status_fault)
+        decoder = Decoder(lcmt_panda_status, StatusCheck(JointBounds(LIMITS)), late)
         inbox = builder.AddNamedSystem(
             "inbox", LcmSubscriberSystem(channel="S", serializer=InboxSerializer(decoder), lcm=bus)
         )
@@ -146,6 +148,52 @@ def test_an_arm_that_does_not_follow_tells_so_and_where_it_is(mode: int, fault: 
     np.testing.assert_array_equal(seen, HOME + 0.01)
 
 
+@given(st.integers(-128, 127))
+def test_an_arm_follows_in_one_mode_alone(mode: int) -> None:
+    found = mode_finding(mode)
+    if mode == lcmt_panda_status.kMove:
+        assert found.fault is Fault.NONE
+    elif mode == lcmt_panda_status.kIdle:
+        assert found.fault is Fault.IDLE
+    else:
+        assert found.fault is Fault.STOPPED
+        assert f"robot_mode is {mode} (" in found.reason
+
+
+@pytest.mark.parametrize("name", _ARRAYS)
+def test_a_status_with_a_number_that_is_none_is_refused(name: str) -> None:
+    ear = Ear()
+    ear.hear(status().encode())
+    message = status(8, HOME + 0.01)
+    setattr(message, name, [0.0] * 6 + [np.nan])
+    received, seen = ear.hear(message.encode())
+    assert received.arrival.fault is Fault.NOT_FINITE
+    np.testing.assert_array_equal(seen, HOME)
+
+
+def test_repeated_and_late_messages_are_dropped_and_counted() -> None:
+    ear = Ear(late=0.02)
+    first, second, third = (
+        status(t, HOME + 1e-3 * t / 5000).encode() for t in (5000, 10000, 15000)
+    )
+    for raw in (first, third, third, second, first):
+        received, seen = ear.hear(raw)
+    assert received.arrival.dropped == 3
+    assert received.arrival.count == 2
+    assert received.arrival.fault is Fault.NONE
+    assert received.message.utime == 15000
+    np.testing.assert_array_equal(seen, HOME + 3e-3)
+
+
+def test_a_clock_set_back_for_good_is_told_with_its_step() -> None:
+    ear = Ear(late=0.02)
+    ear.hear(status(5_000_000).encode())
+    received, _ = ear.hear(status(4_000_000, HOME + 0.01).encode())
+    assert received.arrival.fault is Fault.TIME_BACK
+    assert "went back by 1.000 s, expected 0.02 s at most" in received.arrival.reason
+    assert received.message.utime == 5_000_000
+
+
 def test_the_tail_of_a_status_is_its_mode_and_its_robot_s_time() -> None:
     message = status()
     message.control_mode = 3
@@ -164,8 +212,8 @@ def test_points_arrive_as_they_were_sent(count: int, moving: bool) -> None:
     sent = [rng.normal(size=(count, 3)) for _ in range(1 + moving)]
     message = lcmt_point_cloud.decode(encode_points(1.5, *sent).encode())
     assert message.utime == 1_500_000
-    assert check_points(count)(message) is Fault.NONE
-    assert check_points(count + 1)(message) is Fault.WRONG_SIZE
+    assert check_points(count)(message).fault is Fault.NONE
+    assert check_points(count + 1)(message).fault is Fault.WRONG_SIZE
     points = decode_points(message)
     assert points is not None
     np.testing.assert_allclose(points, np.hstack(sent), rtol=1e-6, atol=1e-6)
@@ -178,7 +226,8 @@ def test_points_of_another_kind_are_refused() -> None:
     message = encode_points(0.0, np.zeros((4, 3)))
     message.fields[0].datatype = 8
     assert decode_points(message) is None
-    assert check_points(4)(encode_points(0.0, np.full((4, 3), np.inf))) is Fault.NOT_FINITE
+    infinite = encode_points(0.0, np.full((4, 3), np.inf))
+    assert check_points(4)(infinite).fault is Fault.NOT_FINITE
 
 
 def test_points_go_from_sender_to_receiver() -> None:
@@ -209,7 +258,7 @@ def test_an_outbox_spoils_what_it_sends_while_a_fault_is_on(kind: str, expected:
     points = builder.AddSystem(ConstantVectorSource(np.arange(6.0)))
     builder.Connect(points.get_output_port(), sender.get_input_port())
 
-    def spoil(message: Any) -> None:
+    def spoil(message: Any, first: Any, number: int) -> None:
         message.data = np.full(6, np.nan, dtype="<f4").tobytes()
 
     box = builder.AddSystem(
@@ -242,13 +291,14 @@ def test_an_outbox_spoils_what_it_sends_while_a_fault_is_on(kind: str, expected:
     during = send(0.2)
     assert len(during) == expected
     for raw in during:
-        message, fault = decoder(raw)
+        taken = decoder(raw)
+        assert taken.finding is not None
         if kind == "malformed":
-            assert fault is Fault.MALFORMED
+            assert taken.finding.fault is Fault.MALFORMED
         elif kind == "nan":
-            assert fault is Fault.NOT_FINITE
+            assert taken.finding.fault is Fault.NOT_FINITE
         else:
-            assert message.utime < 0
+            assert taken.message.utime < 0
     after = send(0.6)
     assert len(after) == 5
-    assert all(decoder(raw)[1] is Fault.NONE for raw in after)
+    assert all(decoder(raw).usable for raw in after)

@@ -15,6 +15,7 @@ from drake_dress.diagrams.scenario.schema import (
 )
 from drake_dress.errors import UserError
 from drake_dress.models.human import motions
+from drake_dress.models.supervision.injection import sources_of
 
 
 def check_controller(source: str, controller: Controller) -> None:
@@ -126,6 +127,13 @@ def check_cameras(source: str, scenario: Scenario) -> None:
                 source,
                 f"lab.faults[{i}].source",
                 f"is {fault.source!r}, expected {' or '.join(sources)}",
+            )
+        own = sources_of(fault.kind)
+        if own and fault.source not in own:
+            raise UserError(
+                source,
+                f"lab.faults[{i}].source",
+                f"is {fault.source!r}, expected {' or '.join(own)} with kind {fault.kind}",
             )
 
 

@@ -346,6 +346,34 @@ class Arms:
 
 
 @dataclass
+class Beliefs:
+    """What messages of hardware may say to be believed; arms hold at what goes beyond it."""
+
+    # Of an arm's status:
+    joint_leap: float = 0.05  # of a joint between messages beyond its speed limit, rad
+    torque_share: float = 2.0  # of a joint's torque limit that may push it from outside
+    # Of the person, against the scenario's measures and joints:
+    point_error: float = 0.03  # of a point, m; trackers of bodies are good to 1 to 3 cm
+    limb_share: float = 0.15  # by which a real limb may differ from the measures
+    shoulder_distance: float = 0.25  # of the shoulders' middle from where it is described, m
+    turn_deg: float = 100.0  # of the shoulders about the vertical
+    joint_room_deg: float = 10.0  # that a supple person's joints may go beyond the limits
+    person_speed: float = 3.0  # of a point, m/s; a hand that is drawn back in alarm
+    # for which a point that changed with each message may stay the same to the last bit, s; a real
+    # tracker has noise; 0 does not judge it
+    frozen_time: float = 0.5
+    # Of the garment, against the controller's mesh and the grippers:
+    node_noise: float = 0.01  # standard deviation on each axis, m; depth cameras have 0.5 to 1 cm
+    strain: float = 0.25  # of an edge; coats stretch by 10 % in the hand, 20 % at most
+    least_edge: float = 0.6  # share of their length at rest, root mean square; folds shorten edges
+    grasp_distance: float = 0.12  # of the held nodes' middle from their gripper, m
+    garment_speed: float = 3.0  # of a node between messages, m/s; a hem that swings does 1.7
+    garment_velocity: float = 10.0  # of a node as it is reported, m/s: speed and its noise
+    velocity_error: float = 0.5  # of reported velocities against motion, m/s
+    frozen_travel: float = 0.02  # of a gripper while the garment stays the same, m; 0: not judged
+
+
+@dataclass
 class Hardware:
     """Of a station of kind hardware, and of the lab that `drake-dress sim-station` plays."""
 
@@ -358,7 +386,8 @@ class Hardware:
     camera_channel: str = "CAMERA"  # _NAME is appended
     status_rate: float = 200.0  # of the lab, Hz
     estimate_rate: float = 50.0  # of the lab, Hz
-    stale_status: float = 0.05  # age at which arms hold, s
+    # Age at which arms hold, s. What is older than the newest message by no more is dropped.
+    stale_status: float = 0.05
     stale_estimate: float = 0.2  # the same
     stale_camera: float = 0.5  # the same
     settle_time: float = 0.2  # for which all must be well before arms go on, s
@@ -366,6 +395,7 @@ class Hardware:
     wait: float = 10.0  # for the first messages, s
     start_distance: float = 0.02  # of a gripper from where the run begins, at most, m
     start_angle: float = 0.1  # of a joint, rad
+    beliefs: Beliefs = field(default_factory=Beliefs)
 
 
 @dataclass
@@ -412,6 +442,9 @@ class Lab:
     wait: float = 300.0  # for the first command, s
     rest: float = 3.0  # after the last command, before the lab closes, s
     push: float = 60.0  # of a fault of kind push, N
+    # standard deviation of the person's reported points on each axis, m: no tracker repeats itself
+    # to the last bit, as a dummy that stands still would
+    person_noise: float = 1e-4
 
 
 @dataclass

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drake_dress.models.supervision.watch import FATAL, Fault
+from drake_dress.models.supervision.fault import FATAL, Fault
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,12 @@ def supervise(
     return SupervisionState(tuple(gathered), tuple(since), sound, permitted, ended_by)
 
 
-def told(source: str, fault: Fault) -> str:
-    """Returns a line about what is wrong with a source."""
-    words = [
-        name.lower().replace("_", " ") for name, f in Fault.__members__.items() if f and f & fault
-    ]
-    return f"{source}: {', '.join(words)}"
+def told(source: str, fault: Fault, reason: str = "") -> str:
+    """Returns a line about what is wrong with a source: what was refused and why, if known."""
+    return f"{source}: {reason} ({words(fault)})" if reason else f"{source}: {words(fault)}"
+
+
+def words(fault: Fault) -> str:
+    """Returns the names of faults."""
+    names = [name for name, f in Fault.__members__.items() if f and f & fault]
+    return ", ".join(names).lower().replace("_", " ")

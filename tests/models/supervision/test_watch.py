@@ -94,3 +94,46 @@ def test_a_source_whose_clock_is_slow_or_set_elsewhere_is_believed(
         assert not state.fault & ~Fault.STALE
         # stamps that far from 0 have steps of their own
         assert state.fault is Fault.NONE or abs(stamp) > 1e5
+
+
+def test_a_late_message_changes_nothing_and_ends_nothing() -> None:
+    state = watch(heard(), Arrival(2, 3.01), 10.01, SETTINGS)
+    late = watch(state, Arrival(3, 2.99), 10.012, SETTINGS)
+    assert late.fault is Fault.NONE
+    assert (late.stamp, late.heard) == (3.01, 10.01)
+    assert watch(late, Arrival(4, 3.015), 10.015, SETTINGS).stamp == 3.015
+
+
+def test_stamps_that_nobody_fills_in_are_told_as_that_and_not_as_silence() -> None:
+    state = heard(10.0, 0.0)
+    for k in range(1, 20):
+        state = watch(state, Arrival(1, 0.0, dropped=k), 10.0 + k * PERIOD, SETTINGS)
+    assert state.fault is Fault.UNSTAMPED
+    assert state.reason == "utime is never filled in: it is 0 in each message"
+    assert not watch(state, Arrival(2, 0.1, dropped=19), 10.1, SETTINGS).fault
+
+
+def test_a_clock_that_stands_still_is_told_with_its_stamp() -> None:
+    state = heard()
+    for k in range(1, 20):
+        state = watch(state, Arrival(1, 3.0, dropped=k), 10.0 + k * PERIOD, SETTINGS)
+    assert state.fault is Fault.STALE
+    assert state.reason == "messages come, and utime stands still at 3.000 s"
+
+
+def test_the_reason_of_what_is_fatal_stays() -> None:
+    state = watch(heard(), Arrival(2, 1.0), 10.005, SETTINGS)
+    first = state.reason
+    assert "went back by 2.000 s" in first
+    state = watch(state, Arrival(3, 1.005, Fault.IMPOSSIBLE, "left hand"), 10.01, SETTINGS)
+    assert state.fault & Fault.TIME_BACK
+    assert state.reason == first
+
+
+def test_a_reason_goes_with_its_fault() -> None:
+    state = watch(heard(), Arrival(2, 3.01, Fault.IMPOSSIBLE, "left hand"), 10.01, SETTINGS)
+    assert (state.fault, state.reason) == (Fault.IMPOSSIBLE, "left hand")
+    state = watch(state, Arrival(2, 3.01, Fault.IMPOSSIBLE, "left hand"), 10.1, SETTINGS)
+    assert state.reason == "left hand"
+    state = watch(state, Arrival(3, 3.1), 10.1, SETTINGS)
+    assert (state.fault, state.reason) == (Fault.NONE, "")
