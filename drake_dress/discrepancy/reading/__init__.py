@@ -27,7 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drake_dress.discrepancy.reading.assembling import recording_of
+from drake_dress.discrepancy.reading.assembling import all_notes, recording_of
 from drake_dress.discrepancy.reading.csv_file import read_csv
 from drake_dress.discrepancy.reading.hdf5 import read_hdf5
 from drake_dress.discrepancy.reading.npz import read_npz
@@ -36,7 +36,7 @@ from drake_dress.discrepancy.recording import Recording
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import GarmentMesh
 
-__all__ = ["read_recordings"]
+__all__ = ["all_notes", "read_recordings"]
 
 _READERS: dict[str, Callable[[Path], list[RawRecording]]] = {
     ".h5": read_hdf5,
