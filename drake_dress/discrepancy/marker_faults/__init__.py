@@ -30,13 +30,14 @@ def without_substitutes(
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) in any unit of length, NaN where not seen.
+        marker: (T,m,3) in any unit of length, NaN where not seen; infinity may stand for that too.
         gripper: (T,2,3) in any unit of length: a garment that is not moved may stand still.
         names: of the markers.
     """
+    infinite = np.asarray(np.isinf(marker).any(axis=2))
+    notes = told(names, infinite, "is infinite: taken as not seen")
     seen = np.asarray(np.isfinite(marker).all(axis=2))
     marker = np.where(seen[:, :, None], marker, np.nan)
-    notes = []
     for what, bad in substitutes(marker):
         notes += told(names, bad, f"{what}: taken as not seen")
         marker = np.where(bad[:, :, None], np.nan, marker)
@@ -67,7 +68,7 @@ def without_faults(
     jumps = find_jumps(time, marker, noise)
     for group, bad in exchanged(time, marker, places, jumps):
         listed = " and ".join(names[k] for k in group)
-        notes += told((listed,), bad[:, None], "exchange places: both taken as not seen", "markers")
+        notes += told((listed,), bad[:, None], "exchange places: taken as not seen", "markers")
         both = np.zeros(marker.shape[:2], dtype=np.bool_)
         both[:, group] = bad[:, None]
         marker = np.where(both[:, :, None], np.nan, marker)

@@ -127,10 +127,8 @@ def _taken(
         wanted = ", ".join("any" if s is None else str(s) for s in shape)
         raise UserError(raw.source, key, f"has shape {value.shape}, expected ({wanted})")
     bad = np.isinf(value) if gaps else ~np.isfinite(value)
-    if gaps and dataset == MARKERS:
-        # infinity is one of the values that stand for a marker that was lost
-        return np.where(bad, np.nan, value)
-    if bad.any():
+    # infinity is one of the values that stand for a marker that was lost
+    if bad.any() and dataset != MARKERS:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         raise UserError(raw.source, key, f"is {value[where]} at {where}, expected finite numbers")
     return value

@@ -122,6 +122,6 @@ def _decoded(path: Path) -> str:
         return content.decode(coding)
     except UnicodeDecodeError:
         if coding != "utf-8-sig":
-            raise UserError(source, "", f"is not text in {coding}, expected UTF-8") from None
+            raise UserError(source, "", "is not text, expected CSV in UTF-8") from None
     # names and numbers are ASCII, so what other bytes mean does not matter
     return content.decode("latin-1")

@@ -24,8 +24,8 @@ from drake_dress.errors import UserError
 
 # What h5py raises where a file is damaged: the library's errors, and Python's on what it decodes.
 _DAMAGED = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
-# Groups lie in each other no deeper than this, and a file holds no more names: links may turn back.
-_DEEPEST, _MOST_NAMES = 6, 20_000
+# A file holds no more names than this.
+_MOST_NAMES = 20_000
 # Attributes that name the points of a dataset.
 _NAMES = ("names", "marker_name", "labels")
 _FRAMES = {"garment/marker_rest_position": "garment", "garment/rest_position": "garment"}
@@ -48,7 +48,7 @@ def read_hdf5(path: Path) -> list[RawRecording]:
 
 def _content(source: str, file: h5py.File) -> Iterator[tuple[str, h5py.Dataset | None]]:
     """Yields each dataset by its path; None for a link that leads nowhere."""
-    seen = 0
+    seen, entered = 0, {_identity(file)}
     waiting: list[tuple[str, h5py.Group]] = [("", file)]
     while waiting:
         prefix, group = waiting.pop(0)
@@ -62,10 +62,11 @@ def _content(source: str, file: h5py.File) -> Iterator[tuple[str, h5py.Dataset |
                 yield prefix + name, None
                 continue
             if isinstance(found, h5py.Group):
-                if prefix.count("/") < _DEEPEST:
-                    waiting.append((f"{prefix}{name}/", found))
                 if prefix + name in UNITS:
                     raise UserError(source, prefix + name, "is a group, expected a dataset")
+                if _identity(found) not in entered:
+                    entered.add(_identity(found))
+                    waiting.append((f"{prefix}{name}/", found))
             elif isinstance(found, h5py.Dataset):
                 yield prefix + name, found
 
@@ -131,7 +132,24 @@ def _read(source: str, key: str, data: h5py.Dataset) -> np.ndarray:
         if data.shape is None:
             raise UserError(source, key, "holds nothing, expected numbers")
         check_content(source, key, data.dtype, data.shape)
+        plan = data.id.get_create_plist()
+        filters = [plan.get_filter(k) for k in range(plan.get_nfilters())]
+        for number, _, _, name in filters:
+            if not h5py.h5z.filter_avail(number):
+                called = name.decode("ascii", "replace") or "unknown"
+                raise UserError(
+                    source,
+                    key,
+                    f"is compressed by a filter that is not installed ({called}, number {number}), "
+                    "expected gzip, lzf or none",
+                )
         return np.asarray(data[()])
+
+
+def _identity(group: h5py.Group) -> tuple[int, int]:
+    """Returns what tells a group apart under whatever name; groups may hold each other."""
+    info = h5py.h5o.get_info(group.id)
+    return info.fileno, info.addr
 
 
 def _attributes(source: str, key: str, data: h5py.HLObject) -> dict[str, Any]:

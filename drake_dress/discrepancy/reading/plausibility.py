@@ -174,6 +174,8 @@ def check_grippers(
     raw: RawRecording, time: FloatArray, gripper: FloatArray, start: Start | None, mesh: GarmentMesh
 ) -> None:
     """Raises UserError where grippers (T,2,3), m, are not where the garment is held, or jump."""
+    if start is not None and start.fits:
+        _check_sides(raw, time, gripper, start, mesh)
     for k, side in enumerate(SIDES):
         key = raw.key(f"gripper/{side}/position")
         far = float(np.abs(gripper[:, k]).max())
@@ -209,13 +211,17 @@ def check_grippers(
                     f"up to {_AWAY:g}",
                 )
         _check_jumps(raw.source, key, time, gripper[:, k], "")
-    if start is None or not start.fits:
-        return
+
+
+def _check_sides(
+    raw: RawRecording, time: FloatArray, gripper: FloatArray, start: Start, mesh: GarmentMesh
+) -> None:
+    """Raises UserError where each gripper is where the other one should be."""
     grasp = np.stack([mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES])
     held = grasp @ start.rotation.T + start.translation
     at = at_start(time, gripper)
     given, exchanged = (float(np.linalg.norm(held - p, axis=1).max()) for p in (at, at[::-1]))
-    if given > 0.1 and exchanged < 0.4 * given:
+    if given > 0.1 and exchanged < min(0.4 * given, _OFF_GRASP):
         raise UserError(
             raw.source,
             raw.key("gripper"),

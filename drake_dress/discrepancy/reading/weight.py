@@ -74,9 +74,7 @@ def check_forces(
     # a garment that begins on the person hangs from the grippers later, or the other way round
     bearing = [t for t, size in zip(totals, sizes, strict=True) if least <= size <= most]
     if not bearing:
-        unit = next(
-            (name for per, name in _UNITS if least <= sizes[0] / per <= most and not _near(per)), ""
-        )
+        unit = _unit(sizes[0], float(np.sqrt(least * most)), _FACTOR)
         hint = f"; is it in {unit}?" if unit else ""
         if not unit and sizes[0] > most:
             hint = "; was the sensor tared without the garment?"
@@ -118,9 +116,11 @@ def _densities(surface_density: float | None) -> tuple[float, float]:
     return surface_density / _FACTOR, surface_density * _FACTOR
 
 
-def _near(per: float) -> bool:
-    """Returns whether a unit is so near to a newton that the weight cannot tell it."""
-    return 1.0 / _FACTOR < per < _FACTOR
+def _unit(size: float, weight: float, factor: float) -> str:
+    """Returns the unit in which a force of that size is nearest to the weight; none if none is."""
+    off = {name: abs(np.log(max(size, 1e-9) / per / weight)) for per, name in _UNITS}
+    name = min(off, key=lambda n: off[n])
+    return name if off[name] < np.log(factor) else ""
 
 
 def _mean(force: FloatArray) -> FloatArray:
