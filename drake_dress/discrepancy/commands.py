@@ -18,7 +18,7 @@ from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.generate import Sensors, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, RANDOM, draw_hidden
 from drake_dress.discrepancy.motions import MOTIONS, USUAL
-from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.discrepancy.reading import all_notes, read_recordings
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml, write_json, write_text
 from drake_dress.discrepancy.sentences import headline
@@ -53,7 +53,10 @@ def explain_files(
     scenario = load_scenario(scenario_file, overrides)
     base = Path(scenario_file).parent
     mesh = build_garment(scenario.garment, scenario.plant.spacing, base)
-    recordings = read_recordings(files, mesh)
+    recordings = read_recordings(files, mesh, scenario.plant.material.surface_density)
+    notes = all_notes(recordings)
+    for note in notes:
+        print(f"note: {note}")
     with _progress() as (stage, tick):
         stage("settling")
         with Experiment(scenario, base, recordings, workers=workers) as experiment:
@@ -71,12 +74,13 @@ def explain_files(
             stage("running on its own")
             alone = windows(experiment, found, tick)
             advice = suggest(found, scenario, base, stage)
-            page = report_page(found, experiment, off, alone, advice, resolved_yaml(scenario))
+            yaml_of_scenario = resolved_yaml(scenario)
+            page = report_page(found, experiment, off, alone, advice, yaml_of_scenario, notes)
             yaml_text = extended_yaml(scenario, experiment, found)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "extended.yaml", yaml_text)
     write_text(out / "report.html", page)
-    write_json(out / "explanation.json", as_json(found, off, alone, advice))
+    write_json(out / "explanation.json", as_json(found, off, alone, advice, notes))
     print(headline(found))
     print(f"report, explanation and extended scenario: {out}")
     return found

@@ -28,6 +28,7 @@ class Recording:
         joint_position: (T,6,3) shoulder, elbow, hand of left, then of right, m; None likewise.
         marker_noise: standard deviation of a coordinate, m.
         force_noise: of a component, N.
+        notes: what of the file was not used, or not taken as it stands.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Recording:
     joint_position: FloatArray | None = None
     marker_noise: float = 1e-3
     force_noise: float = 0.05
+    notes: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:

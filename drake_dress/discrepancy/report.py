@@ -29,6 +29,7 @@ def report_page(
     alone: Windows,
     suggestion: str | None,
     scenario_text: str,
+    notes: Sequence[str] = (),
 ) -> str:
     """Returns the page.
 
@@ -39,6 +40,7 @@ def report_page(
         alone: how it does on its own.
         suggestion: what to record next.
         scenario_text: resolved YAML of the scenario.
+        notes: what of the data was not used, or not taken as it stands.
     """
     x = explanation
     good = x.verdict in ("nothing", "named") and x.doubted is None
@@ -48,6 +50,7 @@ def report_page(
         f"<p>{html.escape(_gain(x))}</p></header>",
         "<h2>Causes</h2>" + _causes(x) if x.causes else "",
         f"<h2>What to record next</h2><p>{html.escape(suggestion)}</p>" if suggestion else "",
+        _notes(notes),
         "<h2>Residuals on held-out data</h2>",
         _sizes(x),
         _chart("Over time", "RMS over the markers.", len(experiment.recordings), residuals.course),
@@ -91,6 +94,13 @@ def report_page(
         f"<pre>{html.escape(scenario_text)}</pre></details>",
     ]
     return html_page("What the simulation gets wrong", [p for p in parts if p])
+
+
+def _notes(notes: Sequence[str]) -> str:
+    if not notes:
+        return ""
+    lines = "".join(f"<li>{html.escape(note)}</li>" for note in notes)
+    return f"<h2>What the data hold beside measurements</h2><ul>{lines}</ul>"
 
 
 def _gain(x: Explanation) -> str:

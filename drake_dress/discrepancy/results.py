@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,13 @@ from drake_dress.discrepancy.windows import Windows
 
 
 def as_json(
-    explanation: Explanation, spots: list[Spot], alone: Windows, suggestion: str | None
+    explanation: Explanation,
+    spots: list[Spot],
+    alone: Windows,
+    suggestion: str | None,
+    notes: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Returns the content of explanation.json."""
+    """Returns the content of explanation.json; `notes` tell what of the data was not used."""
     x = explanation
     causes = []
     for c in x.causes:
@@ -68,6 +73,7 @@ def as_json(
         },
         "loss": x.loss,
         "where": [vars(s) for s in worst(spots)],
+        "notes": list(notes),
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drake_dress.discrepancy.explanation import DISCRETISATION, Cause, Explanation
+from drake_dress.discrepancy.explanation import DISCRETISATION, LEFT, Cause, Explanation
 
 _PLAIN = {
     "discretisation": "the simulation's own step and mesh",
@@ -53,8 +53,9 @@ def headline(explanation: Explanation) -> str:
     """Returns the verdict as one sentence."""
     x = explanation
     if x.verdict == "nothing":
+        least = x.loss.get("extended", 1.0) <= LEFT
         return (
-            "The simulation explains the data to its noise: "
+            f"The simulation explains the data to its noise{'' if least else ' and its numerics'}: "
             f"{1e3 * x.before[0]:.1f} mm are left, {1e3 * x.noise[0]:.1f} mm are noise, "
             f"{1e3 * x.numerics:.1f} mm the simulation's own numerics."
         )

@@ -139,6 +139,7 @@ def whiten(
     samples: Sequence[npt.NDArray[np.int64]],
     scenario: Sequence[Told],
     refined: Sequence[Told],
+    share: float = NUMERICS_SHARE,
 ) -> Whitening:
     """Returns the whitening of what was measured.
 
@@ -147,8 +148,9 @@ def whiten(
         samples: indices that are compared, of each.
         scenario: what the scenario's simulation says.
         refined: what the refined one says.
+        share: of the difference between both that the refined one may still be off.
     """
-    numerics = _numerics(recordings, samples, scenario, refined)
+    numerics = _numerics(recordings, samples, scenario, refined, share)
     filters, data = [], []
     rows: dict[str, list[npt.NDArray]] = {
         k: [] for k in ("recording", "time", "force", "marker", "sensor")
@@ -188,6 +190,7 @@ def _numerics(
     samples: Sequence[npt.NDArray[np.int64]],
     scenario: Sequence[Told],
     refined: Sequence[Told],
+    share: float,
 ) -> list[FloatArray]:
     """Returns (S,C) for each recording: standard deviation of the numerics' error."""
     own: list[tuple[FloatArray, FloatArray]] = []
@@ -214,7 +217,7 @@ def _numerics(
         for (free, touched), variance in zip(pooled, variances, strict=True):
             others = np.where(fine.contact > 0.0, touched, free)[:, None]
             mixed = _OWN * variance + (1.0 - _OWN) * others
-            columns.append(np.repeat(NUMERICS_SHARE * np.sqrt(mixed), 3, axis=1))
+            columns.append(np.repeat(share * np.sqrt(mixed), 3, axis=1))
         found.append(np.concatenate(columns, axis=1))
     return found
 

@@ -13,16 +13,39 @@ ASTRAY = 2
 DECOY = 1e4
 
 
+def lasting(rng, memory=20):
+    """Returns errors of variance 1 that stay for so many samples."""
+    shape = (COUNT, SAMPLES, MARKERS, 3)
+    decay = np.exp(-1.0 / memory)
+    found, fresh = np.empty(shape), rng.standard_normal(shape)
+    found[:, 0] = fresh[:, 0]
+    for t in range(1, SAMPLES):
+        found[:, t] = decay * found[:, t - 1] + np.sqrt(1.0 - decay**2) * fresh[:, t]
+    return found
+
+
 class MadeUp:
     """Simulations that move markers in proportion to what cloth weighs more.
 
     From a weight on, the coarsest one folds the cloth of one recording another way. Finer ones are
     `steeper` by that factor. Stretch stiffness is a decoy: it does what weight does and a little
     that was seen besides, but what refining changes with it is larger than all of that. Effects
-    act `during` those samples only, by steady offsets, while cloth touches the person.
+    act `during` those samples only, by steady offsets, while cloth touches the person. Refining the
+    scenario changes markers by `numerics`, m; what was measured is off the refined one by `off`, m.
+    Both stay for about 0.4 s.
     """
 
-    def __init__(self, rng, folds_from=0.02, steeper=1.0, besides=0.0, during=slice(None)):
+    def __init__(
+        self,
+        rng,
+        folds_from=0.02,
+        steeper=1.0,
+        besides=0.0,
+        during=slice(None),
+        truth=TRUTH,
+        numerics=0.0,
+        off=0.0,
+    ):
         time = np.arange(SAMPLES) * 0.02
         self.told_at = []
         self._folds_from, self._steeper = folds_from, steeper
@@ -40,10 +63,14 @@ class MadeUp:
             if during != slice(None):
                 slope[:] = slope[:, :1] * self._touching[:, None, None]
         self._finer = rng.normal(0.0, 0.2e-3, (2, COUNT, SAMPLES, MARKERS, 3))
+        if numerics:
+            self._finer[0] = numerics * lasting(rng)
         path = np.zeros((SAMPLES, 2, 3))
         self.recordings = []
         for i in range(COUNT):
-            seen = self._marker("refined", i, TRUTH / steeper, 0.0)
+            seen = self._marker("refined", i, truth / steeper, 0.0)
+            if off:
+                seen = seen + off * lasting(rng)[i]
             seen = seen + TRUTH * self._besides[i]
             seen = seen + rng.normal(0.0, NOISE, (SAMPLES, MARKERS, 3))
             self.recordings.append(

@@ -1,0 +1,118 @@
+"""Markers that take each other's places: labels that were exchanged."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.marker_faults.tracks import Jump
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# A marker takes another's place if it is so much nearer to that than to its own.
+_NEARER = 0.4
+# Labels are exchanged all along if distances to other markers fit so much better the other way
+# round, and are off by at least so much as they are, m; only neighbours are so near, m.
+_FITS, _OFF, _NEAR = 0.4, 0.05, 0.6
+_NEIGHBOURS, _INSTANTS = 8, 25
+
+
+def exchanged(
+    time: FloatArray, marker: FloatArray, places: FloatArray | None, jumps: list[Jump]
+) -> list[tuple[tuple[int, ...], BoolArray]]:
+    """Returns groups of markers that exchanged their labels, and (T,) when.
+
+    Args:
+        time: (T,) s.
+        marker: (T,m,3) m, NaN where not seen.
+        places: (m,3) on the rest shape, m; None where they are not known.
+        jumps: of the markers.
+    """
+    found: list[tuple[tuple[int, ...], BoolArray]] = []
+    turns: dict[tuple[int, ...], list[int]] = {}
+    for group, at in _cycles(marker, jumps):
+        turns.setdefault(group, []).append(at)
+    for group, samples in turns.items():
+        state = np.zeros(len(time), dtype=np.int64)
+        for t in samples:
+            state[t:] += 1
+        bad: BoolArray = np.asarray(state % 2 == 1)
+        if places is not None and len(group) == 2 and _fits_exchanged(marker[~bad], places, *group):
+            bad = ~bad
+        found.append((group, bad))
+    if places is None:
+        return found
+    known = {k for group, _ in found for k in group}
+    every = np.ones(len(time), dtype=np.bool_)
+    for i, j in _suspects(marker, places):
+        if i not in known and j not in known and _fits_exchanged(marker, places, i, j):
+            known |= {i, j}
+            found.append(((i, j), every))
+    return found
+
+
+def _cycles(marker: FloatArray, jumps: list[Jump]) -> list[tuple[tuple[int, ...], int]]:
+    """Returns groups of markers that jump to each other's places, and the sample they do it at."""
+    to: dict[int, int] = {}
+    for n, jump in enumerate(jumps):
+        at = marker[jump.after, jump.marker]
+        own = float(np.linalg.norm(at - jump.expected))
+        best, whose = _NEARER * own, None
+        for m, other in enumerate(jumps):
+            overlap = other.before < jump.after and jump.before < other.after
+            if other.marker == jump.marker or not overlap:
+                continue
+            off = float(np.linalg.norm(at - other.expected))
+            if off < min(best, 2.0 * max(jump.allowed, other.allowed)):
+                best, whose = off, m
+        if whose is not None:
+            to[n] = whose
+    found: list[tuple[tuple[int, ...], int]] = []
+    done = set[int]()
+    for n in to:
+        chain = [n]
+        while chain[-1] in to and to[chain[-1]] not in chain:
+            chain.append(to[chain[-1]])
+        if to.get(chain[-1]) == n and len(chain) > 1 and not done & set(chain):
+            done |= set(chain)
+            group = tuple(sorted(jumps[c].marker for c in chain))
+            found.append((group, min(jumps[c].before for c in chain) + 1))
+    return found
+
+
+def _fits_exchanged(marker: FloatArray, places: FloatArray, i: int, j: int) -> bool:
+    """Returns whether distances to other markers say that i and j are each other."""
+    near = np.minimum(*(np.linalg.norm(places - places[k], axis=1) for k in (i, j)))
+    near[[i, j]] = np.inf
+    others = np.argsort(near)[: min(_NEIGHBOURS, len(places) - 2)]
+    same, other = (
+        0.5 * (_off(marker, places, i, a, others) + _off(marker, places, j, b, others))
+        for a, b in ((i, j), (j, i))
+    )
+    return same > _OFF and other < _FITS * same
+
+
+def _off(
+    marker: FloatArray, places: FloatArray, k: int, place: int, others: npt.NDArray[np.int64]
+) -> float:
+    """Returns how far a marker's distances to others are off those of a place at rest, mean, m."""
+    seen = np.flatnonzero(np.isfinite(marker[:, k]).all(axis=1))
+    if not len(seen):
+        return 0.0
+    x = marker[seen[np.linspace(0, len(seen) - 1, _INSTANTS).astype(int)]]
+    now = np.linalg.norm(x[:, others] - x[:, k : k + 1], axis=2)
+    off = np.abs(now - np.linalg.norm(places[others] - places[place], axis=1))
+    return float(np.mean(off[np.isfinite(off)])) if np.isfinite(off).any() else 0.0
+
+
+def _suspects(marker: FloatArray, places: FloatArray) -> list[tuple[int, int]]:
+    """Returns pairs of near markers that both are off their places."""
+    distance = np.linalg.norm(places[:, None] - places[None], axis=2)
+    count = min(_NEIGHBOURS, len(places) - 2) + 1
+    off = [
+        k
+        for k in range(len(places))
+        if _off(marker, places, k, k, np.argsort(distance[k])[1:count]) > 0.5 * _OFF
+    ]
+    return [(i, j) for n, i in enumerate(off) for j in off[n + 1 :] if distance[i, j] < _NEAR]

@@ -1,0 +1,49 @@
+"""Says in a line which marker has a fault, and at which samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+BoolArray = npt.NDArray[np.bool_]
+
+# Stretches of samples that a line lists; names of markers with the same stretches.
+_LISTED, _NAMED = 4, 8
+
+
+def told(names: Sequence[str], bad: BoolArray, what: str, kind: str = "marker") -> list[str]:
+    """Returns a line for each marker with a fault; those with the same samples share one.
+
+    Args:
+        names: of the markers (m,).
+        bad: (T,m) where each has the fault.
+        what: is wrong, and what is done.
+        kind: what the names are names of.
+    """
+    groups: dict[bytes, list[int]] = {}
+    for k in np.flatnonzero(bad.any(axis=0)):
+        groups.setdefault(bad[:, k].tobytes(), []).append(int(k))
+    lines = []
+    for members in groups.values():
+        listed = ", ".join(names[k] for k in members[:_NAMED])
+        if len(members) > _NAMED:
+            listed += f" and {len(members) - _NAMED} more"
+        plural = "s" if len(members) > 1 else ""
+        lines.append(f"{kind}{plural} {listed} at {_samples(bad[:, members[0]])}: {what}")
+    return lines
+
+
+def _samples(bad: BoolArray) -> str:
+    """Returns the stretches of samples where `bad` (T,) holds, such as "samples 3–7, 12"."""
+    edge = np.diff(np.concatenate([[0], bad.astype(np.int8), [0]]))
+    begins, ends = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1) - 1
+    parts = [
+        f"{b}" if b == e else f"{b}–{e}"
+        for b, e in zip(begins[:_LISTED], ends[:_LISTED], strict=True)
+    ]
+    more = f" and {len(begins) - _LISTED} more" if len(begins) > _LISTED else ""
+    count = int(bad.sum())
+    word = "sample" if count == 1 else "samples"
+    return f"{word} {', '.join(parts)}{more}" + (f" ({count})" if len(begins) > 1 else "")

@@ -1,0 +1,111 @@
+"""Reads measured logs in CSV: a column for each number, markers' places in a second file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.reading.csv_table import column, numbers, read_table
+from drake_dress.discrepancy.reading.labels import label_of, order_of
+from drake_dress.discrepancy.reading.raw import (
+    JOINTS,
+    MARKERS,
+    PLACES,
+    RawRecording,
+    misspelt,
+    unused_note,
+)
+from drake_dress.errors import UserError
+from drake_dress.models.sides import SIDES
+from drake_dress.report.log_schema import JOINT_NAMES
+
+_VECTORS = [f"gripper/{side}/{q}" for side in SIDES for q in ("position", "force")]
+
+
+def read_csv(path: Path) -> list[RawRecording]:
+    """Returns the one recording of a CSV file.
+
+    Raises:
+        UserError: the file, or the one with the markers' places, cannot be used.
+    """
+    source = str(path)
+    header, rows, lines = read_table(path)
+    used: set[str] = set()
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    labels: dict[str, tuple[str, ...]] = {}
+
+    def take(names: list[str]) -> npt.NDArray[np.float64]:
+        used.update(names)
+        there = [header.index(n) for n in names if n in header]
+        found = numbers(source, header, rows, lines, there)
+        for name in names:
+            column(source, header, name)
+        return found
+
+    if "time" in header:
+        arrays["time"] = take(["time"])[:, 0]
+    for name in _VECTORS:
+        columns = [f"{name}/{axis}" for axis in "xyz"]
+        if any(c in header for c in columns):
+            arrays[name] = take(columns)
+    for name in (MARKERS, JOINTS):
+        points = _points(source, name, header)
+        if points:
+            columns = [f"{name}/{written}/{axis}" for written in points.values() for axis in "xyz"]
+            arrays[name] = take(columns).reshape(len(rows), len(points), 3)
+            labels[name] = tuple(points)
+    # numbers of joints are their order in the layout
+    joints = labels.get(JOINTS)
+    if joints and all(label.isdigit() for label in joints):
+        order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints)
+        labels[JOINTS] = JOINT_NAMES
+        arrays[JOINTS] = arrays[JOINTS][:, order]
+    beside = path.with_suffix(".markers.csv")
+    if beside.is_file() and MARKERS in arrays:
+        arrays[PLACES] = _places(beside, labels[MARKERS])
+    elif MARKERS in arrays:
+        raise UserError(str(beside), "", "no such file, expected columns marker, x, y, z")
+    unused = [h for h in header if h and h not in used]
+    stems = tuple(dict.fromkeys(h.rsplit("/", 1)[0] if "/" in h else h for h in unused))
+    return [RawRecording(source, "", "", arrays, {}, labels, stems, tuple(unused_note(unused)))]
+
+
+def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
+    """Returns the labels of a dataset's points, numbers in their order, and how each is written."""
+    depth = name.count("/") + 1
+    points: dict[str, str] = {}
+    for h in header:
+        parts = h.split("/")
+        if len(parts) != depth + 2 or not h.startswith(f"{name}/") or parts[-1] not in "xyz":
+            continue
+        written = parts[depth]
+        label = label_of(written)
+        if points.setdefault(label, written) != written:
+            raise UserError(
+                source, h, f"is marker {label} as is {points[label]!r}, expected it once"
+            )
+    if all(label.isdigit() for label in points):
+        points = dict(sorted(points.items(), key=lambda p: int(p[0])))
+    return points
+
+
+def _places(path: Path, wanted: tuple[str, ...]) -> npt.NDArray[np.float64]:
+    """Returns (m,3) where the markers sit, in the order of the labels wanted, m."""
+    source = str(path)
+    header, rows, lines = read_table(path)
+    for name in ("marker", "x", "y", "z"):
+        if name not in header:
+            near = misspelt(name, header)
+            hint = f"; is {near} meant?" if near else f", found {', '.join(header)[:60]}"
+            raise UserError(source, name, f"column is missing{hint}")
+    axes = [header.index(axis) for axis in "xyz"]
+    given = [label_of(row[header.index("marker")]) for row in rows]
+    places = numbers(source, header, rows, lines, axes)
+    order = order_of(source, wanted, given)
+    for label, i in zip(wanted, order, strict=True):
+        if not np.isfinite(places[i]).all():
+            raise UserError(source, f"marker {label}", "has no place, expected finite x, y, z")
+    return places[order]

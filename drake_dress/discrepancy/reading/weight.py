@@ -1,0 +1,136 @@
+"""Holds gripper forces against the garment's weight: unit, sign and the direction of gravity."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.reading.plausibility import at_start, axis_name
+from drake_dress.discrepancy.reading.raw import RawRecording
+from drake_dress.errors import UserError
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES
+
+FloatArray = npt.NDArray[np.float64]
+
+_GRAVITY = 9.81
+# Mass of any fabric, kg/m²: voile to a lined winter coat.
+_LIGHTEST, _HEAVIEST = 0.04, 2.5
+# By how much a garment may be lighter or heavier than the scenario has it.
+_FACTOR = 3.5
+# Cosine within which the force at rest points down (or up): a world frame that is not level, and
+# wind, turn it by a few degrees.
+_DOWN = 0.7
+# Forces of a person or of arms that hold a garment stay below this, N.
+_MOST = 1000.0
+# Force of one newton in other units.
+_UNITS = (
+    (1e3, "millinewtons"),
+    (101.97, "grams-force"),
+    (0.10197, "kilograms-force"),
+    (0.2248, "pounds-force"),
+    (3.597, "ounces-force"),
+    (1e5, "dynes"),
+)
+
+
+def check_forces(
+    raw: RawRecording,
+    time: FloatArray,
+    force: FloatArray,
+    mesh: GarmentMesh,
+    surface_density: float | None,
+) -> None:
+    """Raises UserError where forces (T,2,3) are not those of the garment on the grippers, in N.
+
+    While a garment hangs, both grippers together bear its weight.
+
+    Args:
+        raw: the recording.
+        time: (T,) s.
+        force: N, NaN where not measured.
+        mesh: the scenario's garment.
+        surface_density: of it, kg/m²; None for any.
+    """
+    keys = [raw.key(f"gripper/{side}/force") for side in SIDES]
+    both = raw.key("gripper/*/force")
+    begin, whole = at_start(time, force), _mean(force)
+    if not np.isfinite(begin).all():
+        return
+    weights = [_GRAVITY * _area(mesh) * d for d in _densities(surface_density)]
+    least, most = weights[0], weights[-1]
+    about = f"{least:.2g} to {most:.2g} N"
+    totals = [begin.sum(axis=0), whole.sum(axis=0)]
+    sizes = [float(np.linalg.norm(t)) for t in totals]
+    for k, other in ((0, 1), (1, 0)):
+        # one up, one down, and together no weight
+        if begin[k, 2] > 0.25 * least and begin[other, 2] < -0.25 * least and sizes[0] < least:
+            raise UserError(
+                raw.source,
+                keys[k],
+                f"points up, {begin[k, 2]:.3g} N, where the other gripper's points down: the sign "
+                "is reversed, expected the force of the garment on the gripper",
+            )
+    # a garment that begins on the person hangs from the grippers later, or the other way round
+    bearing = [t for t, size in zip(totals, sizes, strict=True) if least <= size <= most]
+    if not bearing:
+        unit = _unit(sizes[0], float(np.sqrt(least * most)), _FACTOR)
+        hint = f"; is it in {unit}?" if unit else ""
+        if not unit and sizes[0] > most:
+            hint = "; was the sensor tared without the garment?"
+        raise UserError(
+            raw.source,
+            both,
+            f"is {sizes[0]:.3g} N in all while the garment hangs, expected newtons, its weight, "
+            f"{about}{hint}",
+        )
+    down = [-float(t[2] / np.linalg.norm(t)) for t in bearing]
+    if max(down) < -_DOWN:
+        raise UserError(
+            raw.source,
+            both,
+            f"points up, {bearing[0][2]:.3g} N in all: the sign is reversed, expected the force of "
+            "the garment on the gripper, down (-z)",
+        )
+    if max(down) < _DOWN:
+        raise UserError(
+            raw.source,
+            both,
+            f"points along {axis_name(bearing[0])} while the garment hangs, expected down (-z) in "
+            "the world's frame, z up",
+        )
+    for k, key in enumerate(keys):
+        largest = float(np.nanmax(np.abs(force[:, k])))
+        if largest > _MOST:
+            at = int(np.nanargmax(np.abs(force[:, k]).max(axis=1)))
+            raise UserError(
+                raw.source,
+                key,
+                f"is {largest:.4g} N at sample {at}, expected newtons, up to {_MOST:g}",
+            )
+
+
+def _densities(surface_density: float | None) -> tuple[float, float]:
+    if surface_density is None:
+        return _LIGHTEST, _HEAVIEST
+    return surface_density / _FACTOR, surface_density * _FACTOR
+
+
+def _unit(size: float, weight: float, factor: float) -> str:
+    """Returns the unit in which a force of that size is nearest to the weight; none if none is."""
+    off = {name: abs(np.log(max(size, 1e-9) / per / weight)) for per, name in _UNITS}
+    name = min(off, key=lambda n: off[n])
+    return name if off[name] < np.log(factor) else ""
+
+
+def _mean(force: FloatArray) -> FloatArray:
+    """Returns (2,3) the mean of what was measured, N."""
+    there = np.isfinite(force)
+    total: FloatArray = np.where(there, force, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    return total
+
+
+def _area(mesh: GarmentMesh) -> float:
+    """Returns the area of all triangles, m²."""
+    a, b, c = (mesh.rest_position[mesh.faces[:, k]] for k in range(3))
+    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())

@@ -1,0 +1,34 @@
+"""How far points of a garment can be from each other: the way along the cloth."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from drake_dress.models.garment.mesh import GarmentMesh
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def reach_between(mesh: GarmentMesh, places: FloatArray) -> FloatArray:
+    """Returns (m,m) the length of the way along the mesh's edges between points, m.
+
+    A way along edges is no shorter than the shortest one on the surface, so cloth that does not
+    stretch never parts two points farther.
+
+    Args:
+        mesh: the garment.
+        places: (m,3) of its rest shape, m; each is taken to the nearest node.
+    """
+    x, faces = mesh.rest_position, mesh.faces
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    length = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
+    graph = coo_array((length, edges.T), shape=(len(x), len(x))).tocsr()
+    off, node = cKDTree(x).query(places)
+    way = dijkstra(graph, directed=False, indices=node)[:, node]
+    found: FloatArray = np.where(np.eye(len(places), dtype=bool), 0.0, way + off[:, None] + off)
+    return found
