@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.inputs import measurements
 from benchmarks.inputs.meshes import draw_mesh
+from benchmarks.inputs.messages import draw_message
 from benchmarks.inputs.scenarios import draw_scenario
 from benchmarks.inputs.trials import Expect, Outcome, Result, Trial, carry_out
 
@@ -19,6 +20,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
     "scenario": draw_scenario,
     "mesh": draw_mesh,
     "measured": measurements.draw_measurement,
+    "message": draw_message,
 }
 # For a process to start and compile what it needs, s.
 _STARTING = 300.0
