@@ -35,8 +35,8 @@ LASTING, AFTER = 0.8, 1.0
 LASTING_CAMERA = 1.5
 # A fault that lasts longer ends the run, s.
 PATIENCE = 3.0
-# Age at which a status is stale, s.
-STALE = 0.05
+# Age at which a status and an estimate are stale, s.
+STALE = {"stale_status": 0.05, "stale_estimate": 0.2}
 # A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
 KEPT_UP = 0.9
 # A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
@@ -111,7 +111,7 @@ def _dropped(told: str | None) -> Reaction:
 
 _LOST = "at (0, 0, 0), as a lost point written as zero"
 _DROPPED = "a repeated or late message is dropped"
-# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 2 cm.
+# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 1 cm.
 _FROZEN, _FROZEN_GARMENT, _LASTING_FROZEN = 0.5 + _HOLD, 1.0, 1.6
 # What cannot be, and what comes out of order.
 BELIEFS = {
@@ -200,7 +200,7 @@ def inject(
             f"duration={start + lasting + AFTER + 1.0}",
             # which goes by this machine's clock
             f"station.hardware.patience={PATIENCE / rate}",
-            *([f"station.hardware.stale_status={STALE / rate}"] if kind in OUT_OF_ORDER else []),
+            *(_patient(rate) if kind in OUT_OF_ORDER else []),
             *overrides,
         ],
         lab,
@@ -224,6 +224,11 @@ def inject(
     if outcome.lab_status != 1:
         wrong.append(f"lab ended with {outcome.lab_status}, expected 1")
     return {"source": source, "start": start, "rate": rate, "within": stated.within, **found}
+
+
+def _patient(rate: float) -> list[str]:
+    """Returns settings by which what goes by this machine's clock waits as long of a slower one."""
+    return [f"station.hardware.{key}={age / rate}" for key, age in STALE.items()]
 
 
 def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path) -> dict[str, Any]:
@@ -267,7 +272,7 @@ def untold(events: Sequence[str], stated: Reaction) -> list[str]:
     if stated.told is not None and not any(stated.told in line for line in lines):
         wrong.append(f"does not tell {stated.told!r}")
     if stated.within is None and "arms hold" in lines:
-        wrong.append(f"arms hold: {'; '.join(lines)}")
+        wrong.append(f"arms hold after {lines[max(0, lines.index('arms hold') - 1)]!r}")
     if stated.within is not None and "arms hold" not in lines:
         wrong.append("arms do not hold")
     if stated.within is not None and stated.ends is None and "arms may move" not in lines:
