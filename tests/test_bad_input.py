@@ -45,6 +45,14 @@ BAD_YAML = {
         "lab: {faults: [{kind: earthquake}]}",
         ["lab.faults[0].kind", "earthquake", "bus_lost"],
     ),
+    "fault of another source": (
+        "lab: {faults: [{kind: person_mm, source: garment}]}",
+        ["lab.faults[0].source", "garment", "expected person with kind person_mm"],
+    ),
+    "bound of a belief": (
+        "station: {hardware: {beliefs: {point_error: 0.5}}}",
+        ["station.hardware.beliefs.point_error", "0.001 to 0.1"],
+    ),
     "fault of an unknown source": (
         "lab: {faults: [{source: camera_front}]}",
         ["lab.faults[0].source", "camera_front", "left_arm"],

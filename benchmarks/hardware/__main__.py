@@ -76,7 +76,9 @@ def _cases(
             for part, of_group in groups.items()
         },
     }
-    return [c for part in PARTS if part in parts for c in of_part.get(part, [Case(part)])]
+    chosen = [c for part in PARTS if part in parts for c in of_part.get(part, [Case(part)])]
+    # a kind that is named may be of two parts
+    return list(dict.fromkeys(chosen))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -35,6 +35,8 @@ LASTING, AFTER = 0.8, 1.0
 LASTING_CAMERA = 1.5
 # A fault that lasts longer ends the run, s.
 PATIENCE = 3.0
+# Age at which a status and an estimate are stale, s.
+STALE = {"stale_status": 0.05, "stale_estimate": 0.2}
 # A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
 KEPT_UP = 0.9
 # A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
@@ -109,7 +111,7 @@ def _dropped(told: str | None) -> Reaction:
 
 _LOST = "at (0, 0, 0), as a lost point written as zero"
 _DROPPED = "a repeated or late message is dropped"
-# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 2 cm.
+# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 1 cm.
 _FROZEN, _FROZEN_GARMENT, _LASTING_FROZEN = 0.5 + _HOLD, 1.0, 1.6
 # What cannot be, and what comes out of order.
 BELIEFS = {
@@ -140,11 +142,15 @@ BELIEFS = {
     "joint_leap": Reaction(_ARMS, _HOLD, "speed limit", told="joint 1 moved 0.3"),
     "utime_zero": Reaction(_ALL, _HOLD, None, told="utime is 0 after"),
     "second_sender": Reaction(_ALL, _HOLD, "time back", told="a second sender on the channel"),
+}
+# What must not hold arms: here nothing may be stale for want of what was dropped.
+OUT_OF_ORDER = {
     "reordered": _dropped(_DROPPED),
     "duplicated": _dropped(_DROPPED),
     # by less than a period, so that of an estimate nothing is late
     "set_back": _dropped(None),
 }
+BELIEFS |= OUT_OF_ORDER
 REACTIONS = FAULTS | BELIEFS
 
 
@@ -194,6 +200,7 @@ def inject(
             f"duration={start + lasting + AFTER + 1.0}",
             # which goes by this machine's clock
             f"station.hardware.patience={PATIENCE / rate}",
+            *(_patient(rate) if kind in OUT_OF_ORDER else []),
             *overrides,
         ],
         lab,
@@ -219,6 +226,11 @@ def inject(
     return {"source": source, "start": start, "rate": rate, "within": stated.within, **found}
 
 
+def _patient(rate: float) -> list[str]:
+    """Returns settings by which what goes by this machine's clock waits as long of a slower one."""
+    return [f"station.hardware.{key}={age / rate}" for key, age in STALE.items()]
+
+
 def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path) -> dict[str, Any]:
     wrong: list[str] = []
     held: float | None = None
@@ -234,7 +246,7 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
         with RunLog.open(kept / "run.h5") as log:
             ended = log.ended_by
             if kind in BELIEFS:
-                wrong += _untold(log.events, stated)
+                wrong += untold(log.events, stated)
             # what was flushed a second before it was killed is there
             if log.time[-1] < start - 1.5:
                 wrong.append(f"run's log ends at {log.time[-1]:.2f} s")
@@ -250,7 +262,7 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
     return {"held_after": held, **share, "ended": ended, "wrong": wrong}
 
 
-def _untold(events: Sequence[str], stated: Reaction) -> list[str]:
+def untold(events: Sequence[str], stated: Reaction) -> list[str]:
     """Returns what the lines of a run's log lack, or have too much, from when arms may move on."""
     lines = [line.split(" ", 1)[1] for line in events]
     if "arms may move" not in lines:
@@ -260,7 +272,7 @@ def _untold(events: Sequence[str], stated: Reaction) -> list[str]:
     if stated.told is not None and not any(stated.told in line for line in lines):
         wrong.append(f"does not tell {stated.told!r}")
     if stated.within is None and "arms hold" in lines:
-        wrong.append(f"arms hold: {'; '.join(lines)}")
+        wrong.append(f"arms hold after {lines[max(0, lines.index('arms hold') - 1)]!r}")
     if stated.within is not None and "arms hold" not in lines:
         wrong.append("arms do not hold")
     if stated.within is not None and stated.ends is None and "arms may move" not in lines:

@@ -11,9 +11,11 @@ import pytest
 
 from benchmarks.hardware import __main__ as bench
 from benchmarks.hardware.__main__ import main
-from benchmarks.hardware.faults import REACTIONS, inject
+from benchmarks.hardware.faults import BELIEFS, FAULTS, REACTIONS, inject, untold
 from benchmarks.hardware.parts import Case, Conditions, growth, run
 from benchmarks.hardware.two_processes import Plan, available, memory_of, play
+from drake_dress.models.supervision.injection import KINDS
+from drake_dress.models.supervision.wrong_points import WRONG_POINTS
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
 
@@ -164,6 +166,52 @@ def test_what_was_measured_is_kept_and_told(
     assert ["nan", "1.00", "1 of 2", "0.250", "0.200", "0.500", "0.100"] in rows
     assert ["push", "1.00", "2 of 2", "–", "–", "0.500", "0.100"] in rows
     assert ["nan-0001", "held after 0.30 s"] in rows
+
+
+def test_what_cannot_be_believed_is_a_part_of_its_own(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def noted(
+        case: Case, conditions: Conditions, out: Path, overrides: list[str]
+    ) -> dict[str, Any]:
+        asked.append(case.kind)
+        return {"case": asdict(case), "problem": "not tried"}
+
+    monkeypatch.setattr(bench, "run", noted)
+    monkeypatch.setattr(bench, "available", lambda: True)
+    main(["--only", "beliefs", "--seeds", "0"])
+    assert asked == list(BELIEFS)
+    # what the lab plays of estimates is all among them
+    assert set(WRONG_POINTS) <= set(asked) <= set(KINDS)
+    assert len([k for k in asked if BELIEFS[k].within is not None]) >= 12
+    asked.clear()
+    main(["--only", "faults,beliefs", "--kinds", "person_mm", "--seeds", "0"])
+    assert asked == ["person_mm"]
+    asked.clear()
+    main(["--only", "faults", "--seeds", "0"])
+    assert asked == list(FAULTS)
+
+
+@pytest.mark.parametrize(
+    ("events", "kind", "wrong"),
+    [
+        (["person: coordinates are in mm: …", "arms hold", "arms may move"], "person_mm", []),
+        (["person: coordinates are in mm: …", "arms hold"], "person_mm", ["do not move on"]),
+        (["person: not finite", "arms hold", "arms may move"], "person_mm", ["does not tell"]),
+        ([], "person_mm", ["does not tell", "do not hold", "do not move on"]),
+        (["person: a repeated or late message is dropped"], "reordered", []),
+        (["a repeated or late message is dropped", "arms hold"], "reordered", ["arms hold"]),
+    ],
+)
+def test_a_log_that_tells_too_little_or_holds_is_wrong(
+    events: list[str], kind: str, wrong: list[str]
+) -> None:
+    lines = [f"{0.1 * k:.3f} {line}" for k, line in enumerate(["arms may move", *events])]
+    found = untold(lines, BELIEFS[kind])
+    assert len(found) == len(wrong)
+    assert all(w in f for w, f in zip(wrong, found, strict=True))
 
 
 def test_what_waits_by_the_wall_clock_takes_less_of_a_slower_one() -> None:

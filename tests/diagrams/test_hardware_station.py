@@ -202,6 +202,10 @@ def test_without_faults_arms_follow_over_the_bus() -> None:
         ("malformed", "person", None),
         ("nan", "left_arm", None),
         ("nan", "garment", None),
+        ("person_hand_zero", "person", None),
+        ("garment_mirrored", "garment", None),
+        ("mode_unknown", "right_arm", None),
+        ("joint_leap", "left_arm", "left arm: speed limit"),
         ("bus_lost", "", None),
         ("arm_lost", "right_arm", None),
         ("time_back", "left_arm", "left arm: time back"),
@@ -320,3 +324,32 @@ def test_silence_is_told_with_its_channels() -> None:
         StationSilentError, match=r"PANDA_STATUS_LEFT came malformed.*PERSON_ESTIMATE is silent"
     ):
         listen(p, lcm, stopped=speak)
+
+
+def test_messages_out_of_order_hold_nothing_and_are_counted() -> None:
+    of = {
+        "left_arm": "reordered",
+        "right_arm": "duplicated",
+        "garment": "set_back",
+        "person": "reordered",
+    }
+    pair = Pair(*(LabFault(kind, source, 0.4, 0.8) for source, kind in of.items()))
+    rows = pair.run(1.4)
+    permitted = np.array([r["permission"][0] for r in rows])
+    since = np.array([r["since"][0] for r in rows])
+    assert (permitted[since > 0.3] == 1.0).all()
+    assert pair.conclusion() is None
+    dropped = pair.station.watch.dropped
+    assert dropped["left_arm"] > 20 and dropped["right_arm"] > 20 and dropped["person"] > 5
+    # of an estimate that comes every 20 ms, a clock set back by 8 ms makes none late
+    assert dropped["garment"] == 0
+
+
+def test_what_is_refused_is_told_in_the_events() -> None:
+    pair = Pair(LabFault("person_limb", "person", 0.4, 0.3))
+    pair.run(1.2)
+    lines = [line for _, line in pair.station.watch.events]
+    refused = next(i for i, line in enumerate(lines) if "forearm" in line)
+    assert lines[refused] == "person: left forearm 0.96 m, expected 0.21 to 0.43 m (impossible)"
+    assert lines[refused + 1] == "arms hold"
+    assert lines[-2:] == ["person: sound", "arms may move"]

@@ -370,7 +370,7 @@ class Beliefs:
     garment_speed: float = 3.0  # of a node between messages, m/s; a hem that swings does 1.7
     garment_velocity: float = 10.0  # of a node as it is reported, m/s: speed and its noise
     velocity_error: float = 0.5  # of reported velocities against motion, m/s
-    frozen_travel: float = 0.02  # of a gripper while the garment stays the same, m; 0: not judged
+    frozen_travel: float = 0.01  # of a gripper while the garment stays the same, m; 0: not judged
 
 
 @dataclass

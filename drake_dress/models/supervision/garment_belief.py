@@ -44,7 +44,7 @@ class GarmentBounds:
     speed: float = 3.0
     velocity: float = 10.0
     velocity_error: float = 0.5
-    frozen_travel: float = 0.02
+    frozen_travel: float = 0.01
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,8 @@ class SupervisionState:
     """What is remembered.
 
     Attributes:
-        faults: of each source, gathered since it was sound last.
-        since: when each source's fault began, s; None where it is sound.
+        faults: of each source, gathered since arms were permitted to move last.
+        since: when its first fault since then was, s; None where it had none.
         sound: since when all are sound, s; None while one is not.
         permitted: whether arms may move.
         ended_by: the source whose fault ends the run; None while it goes on.
@@ -61,26 +61,24 @@ def supervise(
 
     Before all have been sound once, nothing is permitted, and patience runs from time 0.
     """
+    sound = None
+    if not any(faults):
+        sound = now if state.sound is None else state.sound
+    settled = sound is not None and now - sound >= patience.settle_time - 1e-9
     since: list[float | None] = []
     gathered: list[Fault] = []
     ended_by = state.ended_by
     for i, fault in enumerate(faults):
-        if not fault:
-            since.append(None)
-            gathered.append(Fault.NONE)
-            continue
-        began = state.since[i]
-        began = now if began is None else began
-        all_of_it = state.faults[i] | fault
+        # of a source that comes and goes, patience runs on while it holds arms
+        began = None if settled else state.since[i]
+        all_of_it = Fault.NONE if settled else state.faults[i] | fault
+        if fault and began is None:
+            began = now
         since.append(began)
         gathered.append(all_of_it)
         allowed = patience.fatal if all_of_it & FATAL else patience.fault
-        if ended_by is None and now - began >= allowed:
+        if ended_by is None and fault and began is not None and now - began >= allowed:
             ended_by = i
-    sound = None
-    if all(x is None for x in since):
-        sound = now if state.sound is None else state.sound
-    settled = sound is not None and now - sound >= patience.settle_time - 1e-9
     permitted = ended_by is None and sound is not None and (state.permitted or settled)
     return SupervisionState(tuple(gathered), tuple(since), sound, permitted, ended_by)
 

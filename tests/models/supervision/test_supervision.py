@@ -50,6 +50,25 @@ def test_any_fault_holds_at_once_and_passes() -> None:
     assert state.faults == SOUND
 
 
+def test_a_source_that_comes_and_goes_ends_a_run_as_well() -> None:
+    state, now = permitted()
+    for _ in range(29):
+        state, now = after(state, (Fault.NONE, Fault.LEAP), now, 0.02)
+        state, now = after(state, SOUND, now, 0.08)
+        assert state.ended_by is None and not state.permitted
+    state, now = after(state, (Fault.NONE, Fault.LEAP), now, 0.15)
+    assert state.ended_by == 1
+
+
+def test_a_fault_of_long_ago_does_not_take_from_patience() -> None:
+    state, now = permitted()
+    state, now = after(state, STALE, now, 2.9)
+    state, now = after(state, SOUND, now, 0.25)
+    assert state.permitted
+    state, now = after(state, STALE, now, 2.9)
+    assert state.ended_by is None
+
+
 @pytest.mark.parametrize(("fault", "time"), [(Fault.STALE, 3.0), (Fault.TIME_BACK, 0.3)])
 def test_a_run_ends_when_patience_does(fault: Fault, time: float) -> None:
     state, now = permitted()
