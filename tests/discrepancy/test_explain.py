@@ -63,14 +63,17 @@ def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
         heavy.labs["scenario"].person(()),
     )
     alone = windows(heavy, found)
-    content = json.loads(json.dumps(as_json(found, off, alone, None), allow_nan=False))
+    content = json.loads(
+        json.dumps(as_json(found, off, alone, None, ["sway: <note>"]), allow_nan=False)
+    )
     assert content["verdict"] == "named"
     assert content["causes"][0]["parameters"]["added"]["unit"] == "kg/m²"
     assert len(content["candidates"]) == len({c["effect"] for c in content["candidates"]})
     # forces tell weight best
     assert content["where"][0]["kind"] == "signal"
     assert content["where"][0]["name"].startswith("force")
-    page = report_page(found, heavy, off, alone, None, text)
+    page = report_page(found, heavy, off, alone, None, text, ["sway: <note>"])
+    assert content["notes"] == ["sway: <note>"] and "sway: &lt;note&gt;" in page
     assert "weight of the cloth" in page and page.count("data:image/svg+xml") >= 4
 
 

@@ -54,20 +54,18 @@ def exchanged(
 
 def _cycles(marker: FloatArray, jumps: list[Jump]) -> list[tuple[tuple[int, ...], int]]:
     """Returns groups of markers that jump to each other's places, and the sample they do it at."""
+    if not jumps:
+        return []
+    whose = np.array([j.marker for j in jumps])
+    before, after = (np.array([getattr(j, n) for j in jumps]) for n in ("before", "after"))
+    expected, allowed = np.stack([j.expected for j in jumps]), np.array([j.allowed for j in jumps])
     to: dict[int, int] = {}
     for n, jump in enumerate(jumps):
-        at = marker[jump.after, jump.marker]
-        own = float(np.linalg.norm(at - jump.expected))
-        best, whose = _NEARER * own, None
-        for m, other in enumerate(jumps):
-            overlap = other.before < jump.after and jump.before < other.after
-            if other.marker == jump.marker or not overlap:
-                continue
-            off = float(np.linalg.norm(at - other.expected))
-            if off < min(best, 2.0 * max(jump.allowed, other.allowed)):
-                best, whose = off, m
-        if whose is not None:
-            to[n] = whose
+        off = np.linalg.norm(expected - marker[jump.after, jump.marker], axis=1)
+        most = np.minimum(_NEARER * off[n], 2.0 * np.maximum(allowed, jump.allowed))
+        fits = (whose != jump.marker) & (before < jump.after) & (jump.before < after) & (off < most)
+        if fits.any():
+            to[n] = int(np.argmin(np.where(fits, off, np.inf)))
     found: list[tuple[tuple[int, ...], int]] = []
     done = set[int]()
     for n in to:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -84,13 +86,14 @@ def _accidental(marker: FloatArray) -> float:
     second = np.abs(marker[2:] - 2.0 * marker[1:-1] + marker[:-2])
     second = second[np.isfinite(second)]
     noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
-    if noise == 0.0:
-        return 1.0
     values = np.unique(marker[np.isfinite(marker)])
     steps = np.diff(values)
     digit = float(np.min(steps[steps > 1e-12 * np.abs(values).max()], initial=np.inf))
-    # two draws of N(0, σ²) are rounded to the same value of a grid of width q: q / (2 √π σ)
-    return min(1.0, digit / (2.0 * np.sqrt(np.pi) * noise)) ** 3
+    if digit > noise:
+        # what is stored hides the noise: a garment at rest repeats for long
+        return 1.0
+    # N(0, σ²) is rounded to the same value of a grid of width q at most so often
+    return math.erf(digit / (2.0 * np.sqrt(2.0) * noise)) ** 3
 
 
 def _shared(marker: FloatArray, seen: BoolArray) -> BoolArray:

@@ -60,7 +60,7 @@ def read_csv(path: Path) -> list[RawRecording]:
     # numbers of joints are their order in the layout
     joints = labels.get(JOINTS)
     if joints and all(label.isdigit() for label in joints):
-        order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints)
+        order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints, "joint")
         labels[JOINTS] = JOINT_NAMES
         arrays[JOINTS] = arrays[JOINTS][:, order]
     beside = path.with_suffix(".markers.csv")
@@ -85,7 +85,7 @@ def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
         label = label_of(written)
         if points.setdefault(label, written) != written:
             raise UserError(
-                source, h, f"is marker {label} as is {points[label]!r}, expected it once"
+                source, h, f"is point {label} as is {points[label]!r}, expected it once"
             )
     if all(label.isdigit() for label in points):
         points = dict(sorted(points.items(), key=lambda p: int(p[0])))

@@ -30,13 +30,13 @@ def read_table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
         UserError: the file is not such a table, or a column stands twice.
     """
     source = str(path)
-    text = _decoded(path)
+    text = _decoded(path).replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise UserError(source, f"line {line}", "holds a NUL character, expected text")
     first, _, rest = text.partition("\n")
     begins = 1
-    if re.fullmatch(r"sep=.\r?", first.strip("\ufeff")):
+    if re.fullmatch(r"sep=.", first):
         divider, text, begins = first[4], rest, 2
     else:
         divider = max(";,\t", key=first.count)

@@ -21,13 +21,16 @@ def label_of(text: str) -> str:
     return str(int(number)) if number.is_integer() else text
 
 
-def order_of(source: str, wanted: Sequence[str], given: Sequence[str]) -> list[int]:
+def order_of(
+    source: str, wanted: Sequence[str], given: Sequence[str], kind: str = "marker"
+) -> list[int]:
     """Returns for each wanted label where it stands among the given ones.
 
     Args:
         source: file of the given labels, for messages.
         wanted: labels, each once.
         given: labels, to be the same ones in any order.
+        kind: what they are labels of, for messages.
 
     Raises:
         UserError: a label is missing, stands twice, is empty, or is not wanted.
@@ -36,15 +39,15 @@ def order_of(source: str, wanted: Sequence[str], given: Sequence[str]) -> list[i
     count = Counter(given)
     for label in given:
         if not label:
-            raise UserError(source, "marker", f"one is empty, {expected}")
+            raise UserError(source, kind, f"one is empty, {expected}")
         if count[label] > 1:
-            raise UserError(source, f"marker {label}", f"stands {count[label]} times, {expected}")
+            raise UserError(source, f"{kind} {label}", f"stands {count[label]} times, {expected}")
     for label in wanted:
         if label not in count:
-            raise UserError(source, f"marker {label}", f"is missing, {expected}")
+            raise UserError(source, f"{kind} {label}", f"is missing, {expected}")
     for label in given:
         if label not in set(wanted):
-            raise UserError(source, f"marker {label}", f"is one too many, {expected}")
+            raise UserError(source, f"{kind} {label}", f"is one too many, {expected}")
     place = {label: i for i, label in enumerate(given)}
     return [place[label] for label in wanted]
 

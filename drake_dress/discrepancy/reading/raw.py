@@ -83,7 +83,8 @@ class RawRecording:
 def misspelt(name: str, found: Sequence[str]) -> str | None:
     """Returns which of the names found may stand for `name`; None where none is like it."""
     for other in found:
-        if other.lower().endswith(name.lower()) or name.endswith(f"/{other.lower()}"):
+        low = other.lower()
+        if low.startswith(name) or low.endswith(name) or name.endswith(f"/{low}"):
             return other
     near = difflib.get_close_matches(name, found, n=1, cutoff=0.8)
     return near[0] if near else None
