@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,9 @@ from drake_dress.models.sides import SIDES
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
+
+# Gives a node or face its name in messages, such as the one it has in a file.
+Named = Callable[[int], str]
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
@@ -104,13 +108,31 @@ def check_positions(position: FloatArray, source: str = "mesh") -> None:
         )
 
 
-def check_manifold(faces: npt.NDArray[np.integer], n: int, source: str = "mesh") -> None:
+def plain_node(i: int) -> str:
+    """Returns the name of a node of a mesh that comes from no file."""
+    return f"node {i}"
+
+
+def plain_face(i: int) -> str:
+    """Returns the name of a face of a mesh that comes from no file."""
+    return f"face {i}"
+
+
+def check_manifold(
+    faces: npt.NDArray[np.integer],
+    n: int,
+    source: str = "mesh",
+    node: Named = plain_node,
+    face: Named = plain_face,
+) -> None:
     """Checks that faces form one connected, consistently oriented manifold with boundary.
 
     Args:
         faces: (F,3) node indices.
         n: number of nodes.
         source: file or name put in front of the message.
+        node: names nodes in messages.
+        face: names faces in messages.
 
     Raises:
         UserError: no faces, an index out of range, a face that names a node twice, a face given
@@ -132,28 +154,35 @@ def check_manifold(faces: npt.NDArray[np.integer], n: int, source: str = "mesh")
         raise UserError(
             source,
             "faces",
-            f"{len(twice)} are degenerate (name a node twice), the first is face {twice[0]}",
+            f"{len(twice)} are degenerate (name a node twice), the first is {face(twice[0])}",
         )
-    if len(np.unique(np.sort(faces, axis=1), axis=0)) < len(faces):
-        raise UserError(source, "faces", "a triangle is given twice, expected each once")
-    _check_edges(faces, n, source)
+    _check_repeated(faces, source, face)
+    _check_edges(faces, n, source, node)
     used = np.zeros(n, dtype=bool)
     used[faces] = True
     if not used.all():
         raise UserError(
             source,
             "nodes",
-            f"{np.count_nonzero(~used)} belong to no face, the first is {np.argmin(used)}",
+            f"{np.count_nonzero(~used)} belong to no face, the first is "
+            f"{node(int(np.argmin(used)))}",
         )
-    count = _component_count(faces, n)
+    count = int(components(faces, n).max()) + 1
     if count > 1:
         raise UserError(
             source, "faces", f"the mesh falls into {count} separate parts, expected one"
         )
-    _check_fans(faces, n, source)
+    _check_fans(faces, n, source, node)
 
 
-def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -> None:
+def check_loop(
+    loop: IntArray,
+    faces: IntArray,
+    n: int,
+    source: str,
+    key: str,
+    node: Named = plain_node,
+) -> None:
     """Checks that nodes form a closed chain of edges of the mesh.
 
     Args:
@@ -162,6 +191,7 @@ def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -
         n: number of nodes.
         source: file or name put in front of the message.
         key: of the loop in the source, for the message.
+        node: names nodes in messages.
 
     Raises:
         UserError: indices out of range or repeated, fewer than three, or no edge joins neighbours.
@@ -177,16 +207,35 @@ def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -
         raise UserError(
             source,
             key,
-            f"is not a closed chain of mesh edges: no edge joins nodes {loop[at]} and "
-            f"{loop[(at + 1) % len(loop)]}",
+            f"is not a closed chain of mesh edges: no edge joins {node(loop[at])} and "
+            f"{node(loop[(at + 1) % len(loop)])}",
         )
 
 
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
     """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
     n = int(faces.max()) + 1
-    key = np.unique(np.sort(_half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
+    key = np.unique(np.sort(half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
     return np.stack([key // n, key % n], axis=1).astype(np.int32)
+
+
+def components(faces: npt.NDArray[np.integer], n: int) -> IntArray:
+    """Returns (n,) the number of the connected part that each node belongs to, from 0."""
+    half = half_edges(faces)
+    graph = coo_array((np.ones(len(half)), (half[:, 0], half[:, 1])), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)
+
+
+def border_edges(faces: npt.NDArray[np.integer], n: int) -> npt.NDArray[np.int64]:
+    """Returns (b,2) half-edges of faces that no half-edge of another face runs against.
+
+    Args:
+        faces: (F,3) node indices.
+        n: number of nodes.
+    """
+    half = half_edges(faces).astype(np.int64)
+    inner = np.isin(half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0])
+    return np.asarray(half[~inner])
 
 
 def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
@@ -201,9 +250,7 @@ def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
     Raises:
         UserError: boundaries meet in a node, so that they cannot be told apart.
     """
-    half = _half_edges(faces).astype(np.int64)
-    n = int(faces.max()) + 1
-    border = half[~np.isin(half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0])]
+    border = border_edges(faces, int(faces.max()) + 1)
     if len(np.unique(border[:, 0])) < len(border):
         raise UserError("mesh", "faces", "boundaries meet in a node (the mesh is not manifold)")
     following = dict(zip(border[:, 0].tolist(), border[:, 1].tolist(), strict=True))
@@ -240,12 +287,27 @@ def edge_lengths(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatA
     return np.asarray(np.linalg.norm(chord, axis=1), dtype=np.float64)
 
 
-def _half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
+def half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
+    """Returns (3F,2) the sides of all faces, each from node to node as its face turns."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
-def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
-    half = _half_edges(faces).astype(np.int64)
+def _check_repeated(faces: npt.NDArray[np.integer], source: str, face: Named) -> None:
+    _, first, which, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    if len(first) < len(faces):
+        again = int(np.setdiff1d(np.arange(len(faces)), first)[0])
+        raise UserError(
+            source,
+            "faces",
+            f"a triangle is given twice: {face(int(first[which.reshape(-1)[again]]))} and "
+            f"{face(again)}; {np.count_nonzero(count > 1)} of {len(first)} are, expected each once",
+        )
+
+
+def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str, node: Named) -> None:
+    half = half_edges(faces).astype(np.int64)
     edge, count = np.unique(np.sort(half, axis=1) @ np.array([n, 1]), return_counts=True)
     if count.max() > 2:
         first = int(edge[np.argmax(count > 2)])
@@ -253,7 +315,7 @@ def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
             source,
             "faces",
             f"not manifold: {np.count_nonzero(count > 2)} edges belong to more than two faces, "
-            f"the first joins nodes {first // n} and {first % n}",
+            f"the first joins {node(first // n)} and {node(first % n)}",
         )
     directed, count = np.unique(half @ np.array([n, 1]), return_counts=True)
     if count.max() > 1:
@@ -262,20 +324,14 @@ def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
             source,
             "faces",
             f"{np.count_nonzero(count > 1)} pairs of neighbours are oriented against each other, "
-            f"the first at nodes {first // n} and {first % n}",
+            f"the first at {node(first // n)} and {node(first % n)}",
         )
 
 
-def _component_count(faces: npt.NDArray[np.integer], n: int) -> int:
-    half = _half_edges(faces)
-    graph = coo_array((np.ones(len(half)), (half[:, 0], half[:, 1])), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
-
-
-def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
+def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str, node: Named) -> None:
     """At each node of a manifold the faces form one fan: they hang together by their edges."""
     count = len(faces)
-    half = _half_edges(faces).astype(np.int64)
+    half = half_edges(faces).astype(np.int64)
     corner = np.arange(3 * count).reshape(3, count)  # corner k of face f is entry (k, f)
     tail, head = corner.ravel(), np.roll(corner, -1, axis=0).ravel()
     forward, backward = half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0]
@@ -285,14 +341,14 @@ def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(3 * count, 3 * count))
     fans, label = connected_components(graph, directed=False)
     if fans > n:
-        node = np.empty(fans, dtype=np.int64)
-        node[label] = faces.T.ravel()
-        pinched = np.flatnonzero(np.bincount(node, minlength=n) > 1)
+        of_fan = np.empty(fans, dtype=np.int64)
+        of_fan[label] = faces.T.ravel()
+        pinched = np.flatnonzero(np.bincount(of_fan, minlength=n) > 1)
         raise UserError(
             source,
             "faces",
             f"not manifold: at {len(pinched)} nodes two sheets only touch, "
-            f"the first is node {pinched[0]}",
+            f"the first is {node(int(pinched[0]))}",
         )
 
 
