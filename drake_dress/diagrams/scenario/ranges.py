@@ -3,6 +3,8 @@
 import re
 
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.garment.axes import AXES
+from drake_dress.models.garment.load import WELD_RANGE
 from drake_dress.models.supervision.injection import KINDS
 
 # What the lab reports of, beside its cameras.
@@ -12,6 +14,7 @@ CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": ("m", "cm", "mm"),
+    "garment.mesh.up": tuple(AXES),
     "person.posture": ("standing", "sitting"),
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{
@@ -59,6 +62,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "lab.faults.start": (0.0, 1e4),
     "lab.faults.duration": (0.0, 1e4),
     "coat.scale": (0.7, 1.4),
+    "mesh.weld": WELD_RANGE,
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
     "material.bending_stiffness": (0.0, 1.0),

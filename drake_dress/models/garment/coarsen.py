@@ -9,11 +9,17 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
-from math import dist, hypot
+from math import dist, hypot, sqrt
 
 import numpy as np
 
-from drake_dress.models.garment.mesh import FloatArray, IntArray, boundary_loops, unique_edges
+from drake_dress.models.garment.mesh import (
+    FloatArray,
+    IntArray,
+    boundary_loops,
+    face_areas,
+    unique_edges,
+)
 
 LONGEST = 1.5  # no merging makes an edge longer than this by the spacing
 _SHORTEST = 0.75  # edges are merged up to this part of the spacing: the mean comes near 1
@@ -62,6 +68,7 @@ class _Merging:
         self.x: list[Point] = [(x, y, z) for x, y, z in position.tolist()]
         self.face: list[tuple[int, int, int] | None] = [(a, b, c) for a, b, c in faces.tolist()]
         self.spacing = spacing
+        self.area = float(face_areas(position, faces).sum())
         self.parent = list(range(len(position)))
         self.around: list[set[int]] = [set() for _ in range(len(position))]
         for f, triangle in enumerate(faces.tolist()):
@@ -80,17 +87,20 @@ class _Merging:
 
     def run(self, progress: Callable[[float], None]) -> tuple[FloatArray, IntArray, IntArray]:
         heapq.heapify(self.queue)
-        total, steps = max(len(self.queue), 1), 0
+        steps, merged = 0, 0
+        # nodes that go: about all beyond one for each cell of a lattice at the spacing
+        expected = len(self.x) - self.area / (sqrt(0.75) * self.spacing**2)
         while self.queue:
             steps += 1
             if steps % _TOLD_EVERY == 0:
-                progress(max(0.0, 1.0 - len(self.queue) / total))
+                progress(min(merged / max(expected, 1.0), 1.0))
             length, a, b = heapq.heappop(self.queue)
             if self.parent[a] != a or self.parent[b] != b:
                 continue
             if length != dist(self.x[a], self.x[b]):
                 continue  # a node has moved since; the edge is in the queue again
             if self._merge(a, b):
+                merged += 1
                 for other in self._neighbours(a):
                     self._propose(a, other, push=True)
         return self._result()

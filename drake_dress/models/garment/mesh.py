@@ -215,7 +215,8 @@ def check_loop(
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
     """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
     n = int(faces.max()) + 1
-    key = np.unique(np.sort(half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
+    key = np.sort(np.sort(half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
+    key = key[np.concatenate([[True], key[1:] > key[:-1]])]  # np.unique hashes: three times slower
     return np.stack([key // n, key % n], axis=1).astype(np.int32)
 
 

@@ -22,7 +22,7 @@ _LARGEST_AREA = 2.5  # area by the square of the diagonal: three layers of a gar
 # the ratio of its edges to those that its neighbours share.
 _FAR = 0.03
 _SPIKE_ANGLE = 2.5
-_SPIKE_RATIO = 6.0
+_SPIKE_RATIO = 4.0
 
 _CAUSES = "are node numbers shifted by a missing line, or a coordinate damaged?"
 

@@ -14,8 +14,8 @@ from drake_dress.models.garment.files.raw import RawMesh
 from drake_dress.models.garment.files.stl import read_stl
 
 EXTENSIONS = (".obj", ".ply", ".stl")
-# A scan of a garment has some 100,000 triangles; the largest read here takes about a minute.
-MOST_TRIANGLES = 400_000
+# A scan of a garment has some 100,000. The most take about a minute to read and to thin.
+MOST_TRIANGLES = 200_000
 _MOST_BYTES = 400 * 10**6
 
 
