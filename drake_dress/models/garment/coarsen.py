@@ -13,13 +13,8 @@ from math import dist, hypot, sqrt
 
 import numpy as np
 
-from drake_dress.models.garment.mesh import (
-    FloatArray,
-    IntArray,
-    boundary_loops,
-    face_areas,
-    unique_edges,
-)
+from drake_dress.models.garment.edges import boundary_loops, unique_edges
+from drake_dress.models.garment.mesh import FloatArray, IntArray, face_areas
 
 LONGEST = 1.5  # no merging makes an edge longer than this by the spacing
 _SHORTEST = 0.75  # edges are merged up to this part of the spacing: the mean comes near 1

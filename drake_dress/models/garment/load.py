@@ -12,6 +12,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.garment.axes import AXES, turned
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
+from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
 from drake_dress.models.garment.mesh import (
     LOOP_NAMES,
@@ -20,7 +21,6 @@ from drake_dress.models.garment.mesh import (
     GarmentMesh,
     IntArray,
     check_loop,
-    check_manifold,
 )
 from drake_dress.models.garment.parts import (
     check_one_part,
@@ -172,6 +172,7 @@ def load_garment(
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
 
+@np.errstate(all="ignore")  # damaged numbers are told by the checks, not by numpy
 def read_garment(
     path: str | Path, options: MeshOptions, progress: Progress = _silent
 ) -> WholeGarment:

@@ -12,8 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from drake_dress.models.garment.edges import border_edges, half_edges
 from drake_dress.models.garment.files.raw import FloatArray, IndexArray, RawMesh
-from drake_dress.models.garment.mesh import border_edges, half_edges
 
 # Nodes nearer than this by the size of the mesh were one before their digits were cut.
 _ROUNDING = 1e-7

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.edges import IntArray, unique_edges
+from drake_dress.models.garment.manifold import Named, check_manifold, plain_node
 from drake_dress.models.sides import SIDES
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
 
-# Gives a node or face its name in messages, such as the one it has in a file.
-Named = Callable[[int], str]
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
@@ -108,73 +104,6 @@ def check_positions(position: FloatArray, source: str = "mesh") -> None:
         )
 
 
-def plain_node(i: int) -> str:
-    """Returns the name of a node of a mesh that comes from no file."""
-    return f"node {i}"
-
-
-def plain_face(i: int) -> str:
-    """Returns the name of a face of a mesh that comes from no file."""
-    return f"face {i}"
-
-
-def check_manifold(
-    faces: npt.NDArray[np.integer],
-    n: int,
-    source: str = "mesh",
-    node: Named = plain_node,
-    face: Named = plain_face,
-) -> None:
-    """Checks that faces form one connected, consistently oriented manifold with boundary.
-
-    Args:
-        faces: (F,3) node indices.
-        n: number of nodes.
-        source: file or name put in front of the message.
-        node: names nodes in messages.
-        face: names faces in messages.
-
-    Raises:
-        UserError: no faces, an index out of range, a face that names a node twice, a face given
-            twice, an edge of more than two faces, neighbours oriented against each other, nodes
-            of no face, several components, or a node where two sheets only touch.
-    """
-    if faces.size == 0:
-        raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
-    if faces.ndim != 2 or faces.shape[1] != 3:
-        raise UserError(source, "faces", f"have shape {faces.shape}, expected (F, 3)")
-    if faces.min() < 0 or faces.max() >= n:
-        raise UserError(
-            source,
-            "faces",
-            f"node indices reach from {faces.min()} to {faces.max()}, expected 0 to {n - 1}",
-        )
-    twice = np.flatnonzero((faces == np.roll(faces, 1, axis=1)).any(axis=1))
-    if len(twice):
-        raise UserError(
-            source,
-            "faces",
-            f"{len(twice)} are degenerate (name a node twice), the first is {face(twice[0])}",
-        )
-    _check_repeated(faces, source, face)
-    _check_edges(faces, n, source, node)
-    used = np.zeros(n, dtype=bool)
-    used[faces] = True
-    if not used.all():
-        raise UserError(
-            source,
-            "nodes",
-            f"{np.count_nonzero(~used)} belong to no face, the first is "
-            f"{node(int(np.argmin(used)))}",
-        )
-    count = int(components(faces, n).max()) + 1
-    if count > 1:
-        raise UserError(
-            source, "faces", f"the mesh falls into {count} separate parts, expected one"
-        )
-    _check_fans(faces, n, source, node)
-
-
 def check_loop(
     loop: IntArray,
     faces: IntArray,
@@ -212,63 +141,6 @@ def check_loop(
         )
 
 
-def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
-    """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
-    n = int(faces.max()) + 1
-    key = np.sort(np.sort(half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
-    key = key[np.concatenate([[True], key[1:] > key[:-1]])]  # np.unique hashes: three times slower
-    return np.stack([key // n, key % n], axis=1).astype(np.int32)
-
-
-def components(faces: npt.NDArray[np.integer], n: int) -> IntArray:
-    """Returns (n,) the number of the connected part that each node belongs to, from 0."""
-    half = half_edges(faces)
-    graph = coo_array((np.ones(len(half)), (half[:, 0], half[:, 1])), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)
-
-
-def border_edges(faces: npt.NDArray[np.integer], n: int) -> npt.NDArray[np.int64]:
-    """Returns (b,2) half-edges of faces that no half-edge of another face runs against.
-
-    Args:
-        faces: (F,3) node indices.
-        n: number of nodes.
-    """
-    half = half_edges(faces).astype(np.int64)
-    inner = np.isin(half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0])
-    return np.asarray(half[~inner])
-
-
-def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
-    """Returns each boundary as node indices in order, the longest first.
-
-    The order is that of the faces' own half-edges: the garment lies to the left of the walk.
-    Each loop begins at its smallest index.
-
-    Args:
-        faces: (F,3) node indices of a manifold.
-
-    Raises:
-        UserError: boundaries meet in a node, so that they cannot be told apart.
-    """
-    border = border_edges(faces, int(faces.max()) + 1)
-    if len(np.unique(border[:, 0])) < len(border):
-        raise UserError("mesh", "faces", "boundaries meet in a node (the mesh is not manifold)")
-    following = dict(zip(border[:, 0].tolist(), border[:, 1].tolist(), strict=True))
-    loops: list[IntArray] = []
-    while following:
-        start = min(following)
-        loop = [start]
-        node = following.pop(start)
-        while node != start:
-            loop.append(node)
-            if node not in following:
-                raise UserError("mesh", "faces", f"the boundary ends at node {node}")
-            node = following.pop(node)
-        loops.append(np.array(loop, dtype=np.int32))
-    return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
-
-
 def face_areas(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatArray:
     """Returns (F,) areas, m²."""
     a, b, c = (position[faces[:, k]] for k in range(3))
@@ -286,71 +158,6 @@ def edge_lengths(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatA
     edges = unique_edges(faces)
     chord = position[edges[:, 0]] - position[edges[:, 1]]
     return np.asarray(np.linalg.norm(chord, axis=1), dtype=np.float64)
-
-
-def half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
-    """Returns (3F,2) the sides of all faces, each from node to node as its face turns."""
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-
-
-def _check_repeated(faces: npt.NDArray[np.integer], source: str, face: Named) -> None:
-    _, first, which, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
-    if len(first) < len(faces):
-        again = int(np.setdiff1d(np.arange(len(faces)), first)[0])
-        raise UserError(
-            source,
-            "faces",
-            f"a triangle is given twice: {face(int(first[which.reshape(-1)[again]]))} and "
-            f"{face(again)}; {np.count_nonzero(count > 1)} of {len(first)} are, expected each once",
-        )
-
-
-def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str, node: Named) -> None:
-    half = half_edges(faces).astype(np.int64)
-    edge, count = np.unique(np.sort(half, axis=1) @ np.array([n, 1]), return_counts=True)
-    if count.max() > 2:
-        first = int(edge[np.argmax(count > 2)])
-        raise UserError(
-            source,
-            "faces",
-            f"not manifold: {np.count_nonzero(count > 2)} edges belong to more than two faces, "
-            f"the first joins {node(first // n)} and {node(first % n)}",
-        )
-    directed, count = np.unique(half @ np.array([n, 1]), return_counts=True)
-    if count.max() > 1:
-        first = int(directed[np.argmax(count > 1)])
-        raise UserError(
-            source,
-            "faces",
-            f"{np.count_nonzero(count > 1)} pairs of neighbours are oriented against each other, "
-            f"the first at {node(first // n)} and {node(first % n)}",
-        )
-
-
-def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str, node: Named) -> None:
-    """At each node of a manifold the faces form one fan: they hang together by their edges."""
-    count = len(faces)
-    half = half_edges(faces).astype(np.int64)
-    corner = np.arange(3 * count).reshape(3, count)  # corner k of face f is entry (k, f)
-    tail, head = corner.ravel(), np.roll(corner, -1, axis=0).ravel()
-    forward, backward = half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0]
-    _, here, there = np.intersect1d(forward, backward, assume_unique=True, return_indices=True)
-    rows = np.concatenate([tail[here], head[here]])
-    columns = np.concatenate([head[there], tail[there]])
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(3 * count, 3 * count))
-    fans, label = connected_components(graph, directed=False)
-    if fans > n:
-        of_fan = np.empty(fans, dtype=np.int64)
-        of_fan[label] = faces.T.ravel()
-        pinched = np.flatnonzero(np.bincount(of_fan, minlength=n) > 1)
-        raise UserError(
-            source,
-            "faces",
-            f"not manifold: at {len(pinched)} nodes two sheets only touch, "
-            f"the first is {node(int(pinched[0]))}",
-        )
 
 
 def _check_loops(loops: dict[str, IntArray], faces: IntArray, n: int, source: str) -> None:

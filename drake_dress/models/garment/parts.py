@@ -9,9 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.edges import components
 from drake_dress.models.garment.files.raw import MaskArray, RawMesh, place
 from drake_dress.models.garment.merge import gap_between, seams_sewn
-from drake_dress.models.garment.mesh import components, face_areas
+from drake_dress.models.garment.mesh import face_areas
 
 _SIZE = re.compile(r"<\s*(\d+\.?\d*|\.\d+)\s*(m|cm|mm)?")
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, None: 1.0}

@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.edges import border_edges, unique_edges
 from drake_dress.models.garment.files.raw import FloatArray, RawMesh
-from drake_dress.models.garment.mesh import IntArray, border_edges, face_areas, unique_edges
+from drake_dress.models.garment.mesh import IntArray, face_areas
 
 _LONGEST = 0.35  # edge by the diagonal of the bounding box
 _LARGEST_AREA = 2.5  # area by the square of the diagonal: three layers of a garment

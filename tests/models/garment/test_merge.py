@@ -3,9 +3,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.files import RawMesh
+from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
-from drake_dress.models.garment.mesh import boundary_loops, check_manifold
 
 JACKET = make_coat(COATS["jacket"], 0.06)
 X = JACKET.rest_position

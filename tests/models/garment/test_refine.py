@@ -5,14 +5,9 @@ from hypothesis import strategies as st
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
-from drake_dress.models.garment.mesh import (
-    boundary_loops,
-    check_loop,
-    check_manifold,
-    edge_lengths,
-    face_areas,
-    loop_length,
-)
+from drake_dress.models.garment.edges import boundary_loops
+from drake_dress.models.garment.manifold import check_manifold
+from drake_dress.models.garment.mesh import check_loop, edge_lengths, face_areas, loop_length
 from drake_dress.models.garment.refine import refine
 from drake_dress.models.garment.simplify import to_spacing
 

@@ -68,11 +68,15 @@ def _count_rows(header: str, size: int, source: str) -> int:
     """Returns how many rows the header tells of, none of which takes less than a byte."""
     total = 0
     for name, count in _ELEMENT.findall(header):
-        if not re.fullmatch(r"\d{1,18}", count) or int(count) > size:
+        if not re.fullmatch(r"\d{1,18}", count):
+            raise UserError(
+                source, f"element {name}", f"{count[:40]!r} rows, expected a whole number"
+            )
+        if int(count) > size:
             raise UserError(
                 source,
                 f"element {name}",
-                f"the header counts {count[:40]} rows, more than the file holds (is it cut off?)",
+                f"the header counts {count} rows, more than the file holds (is it cut off?)",
             )
         total += int(count)
     return total

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.errors import UserError
+
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.int64]
 MaskArray = npt.NDArray[np.bool_]
@@ -16,8 +18,9 @@ def place(point: FloatArray) -> str:
     """Returns a point, m, as messages write it; nothing if it is not finite."""
     if not np.isfinite(point).all():
         return ""
-    x, y, z = np.round(point, 2) + 0.0  # turns -0 into 0
-    return f" at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+    near = np.abs(point) < 1000.0
+    words = [f"{x:.2f}" if small else f"{x:.3g}" for x, small in zip(point, near, strict=True)]
+    return f" at ({', '.join(words).replace('-0.00', '0.00')}) m"
 
 
 @dataclass(frozen=True)
@@ -91,10 +94,19 @@ class RawMesh:
         """Returns the mesh with each node replaced by node `root[node]`.
 
         Faces that collapse and nodes of no face are dropped. A node keeps the place of its root.
+
+        Raises:
+            UserError: no face is left.
         """
         faces = root[self.faces]
         became = np.where(self.became < 0, -1, root[self.became])
         flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        if flat.all():
+            raise UserError(
+                self.source,
+                "faces",
+                f"all {len(faces)} have corners at the same place, expected a surface",
+            )
         return replace(self, faces=faces, became=became).only(~flat)
 
     def node(self, i: int | np.integer) -> str:

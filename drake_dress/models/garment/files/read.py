@@ -16,6 +16,7 @@ from drake_dress.models.garment.files.stl import read_stl
 EXTENSIONS = (".obj", ".ply", ".stl")
 # A scan of a garment has some 100,000. The most take about a minute to read and to thin.
 MOST_TRIANGLES = 200_000
+_LARGEST = 1e9  # coordinate in any unit: squares of larger ones overflow, and no garment has them
 _MOST_BYTES = 400 * 10**6
 
 
@@ -44,13 +45,13 @@ def read_mesh(path: Path) -> RawMesh:
             "faces",
             f"{len(mesh.faces):,} triangles, expected at most {MOST_TRIANGLES:,}: thin it first",
         )
-    bad = np.flatnonzero(~np.isfinite(mesh.position).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(mesh.position) < _LARGEST).all(axis=1))
     if len(bad):
         raise UserError(
             source,
             "nodes",
-            f"{len(bad)} of {len(mesh.position)} hold NaN or infinity, the first is "
-            f"{mesh.node(bad[0])}",
+            f"{len(bad)} of {len(mesh.position)} hold NaN, infinity or numbers beyond "
+            f"{_LARGEST:g}, the first is {mesh.node(bad[0])}",
         )
     return mesh
 
