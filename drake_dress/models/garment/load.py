@@ -225,12 +225,12 @@ def _check_size(raw: RawMesh, unit: str) -> None:
         better = [
             name for name, factor in UNITS.items() if low <= diagonal * factor / UNITS[unit] <= high
         ]
-        hint = f"; with {better[0]} it would fit" if better else ""
+        hint = f"with {better[0]} it would fit" if better else "no unit fits: scale the file"
         raise UserError(
             raw.source,
             "unit",
             f"in {unit} the garment's bounding box has a diagonal of {diagonal:.3g} m, expected "
-            f"{low} to {high} m (wrong unit?){hint}",
+            f"{low} to {high} m (wrong unit?); {hint}",
         )
 
 

@@ -14,7 +14,7 @@ from drake_dress.models.garment.files.raw import RawMesh
 from drake_dress.models.garment.files.stl import read_stl
 
 EXTENSIONS = (".obj", ".ply", ".stl")
-# A scan of a garment has some 100,000. The most take about a minute to read and to thin.
+# A scan of a garment has some 100,000. The most take about half a minute to read and to thin.
 MOST_TRIANGLES = 200_000
 _LARGEST = 1e9  # coordinate in any unit: squares of larger ones overflow, and no garment has them
 _MOST_BYTES = 400 * 10**6
