@@ -15,7 +15,7 @@ import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.files.polygons import triangulated
-from drake_dress.models.garment.files.raw import RawMesh
+from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.text import Numbers, decoded, lines_of
 
 # Statements that change nothing about the surface: texture, normals, materials, smoothing, lines,
@@ -63,7 +63,7 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
             polygon_line.append(line)
             polygon_part.append(part)
             if len(polygons) > most_faces:
-                raise UserError(source, "", f"has over {most_faces:,} faces, expected fewer")
+                raise too_many(source, most_faces)
         elif keyword in ("o", "g"):
             if keyword == "o":
                 name = " ".join(words)

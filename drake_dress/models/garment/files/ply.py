@@ -14,7 +14,7 @@ from plyfile import PlyData, PlyElement, PlyParseError
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.files.polygons import triangulated
-from drake_dress.models.garment.files.raw import IndexArray, RawMesh
+from drake_dress.models.garment.files.raw import IndexArray, RawMesh, too_many
 
 _LIST_NAMES = ("vertex_indices", "vertex_index")
 _END = re.compile(rb"^end_header[ \t]*(\r\n|\n|\r)", re.MULTILINE)
@@ -22,15 +22,16 @@ _ELEMENT = re.compile(r"^element[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 _MOST_HEADER = 100_000  # bytes
 
 
-def read_ply(data: bytes, source: str) -> RawMesh:
+def read_ply(data: bytes, source: str, most_faces: int) -> RawMesh:
     """Returns the mesh of a PLY file, text or binary; polygons are cut into triangles.
 
     Args:
         data: content of the file.
         source: its name, for messages.
+        most_faces: number of polygons beyond which nothing is read.
 
     Raises:
-        UserError: the file is cut off or longer than its header tells, or holds no triangles.
+        UserError: there are too many faces, the file is cut off or longer than its header tells, or holds no triangles.
     """
     header, body = _split(data, source)
     text = bool(re.search(r"^format[ \t]+ascii", header, re.MULTILINE))
@@ -38,7 +39,7 @@ def read_ply(data: bytes, source: str) -> RawMesh:
         # blank lines between rows mean nothing
         rows = [row for row in re.split(rb"\r\n|\n|\r", body) if row.strip()]
         body = b"\n".join([*rows, b""])
-    count = _count_rows(header, len(body), source)
+    count = _count_rows(header, len(body), source, most_faces)
     if text and len(rows) > count:
         raise _too_long(source)
     # a buffer that its reader may close would not tell where reading ended
@@ -64,7 +65,7 @@ def _split(data: bytes, source: str) -> tuple[str, bytes]:
     return header, data[end.end() :]
 
 
-def _count_rows(header: str, size: int, source: str) -> int:
+def _count_rows(header: str, size: int, source: str, most_faces: int) -> int:
     """Returns how many rows the header tells of, none of which takes less than a byte."""
     total = 0
     for name, count in _ELEMENT.findall(header):
@@ -78,6 +79,8 @@ def _count_rows(header: str, size: int, source: str) -> int:
                 f"element {name}",
                 f"the header counts {count} rows, more than the file holds (is it cut off?)",
             )
+        if name == "face" and int(count) > most_faces:
+            raise too_many(source, most_faces)
         total += int(count)
     return total
 

@@ -14,6 +14,11 @@ IndexArray = npt.NDArray[np.int64]
 MaskArray = npt.NDArray[np.bool_]
 
 
+def too_many(source: str, most: int) -> UserError:
+    """Returns the refusal of a file with more faces than are read."""
+    return UserError(source, "faces", f"has over {most:,} faces, expected fewer: thin it first")
+
+
 def place(point: FloatArray) -> str:
     """Returns a point, m, as messages write it; nothing if it is not finite."""
     if not np.isfinite(point).all():

@@ -10,14 +10,14 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.garment.files.obj import read_obj
 from drake_dress.models.garment.files.ply import read_ply
-from drake_dress.models.garment.files.raw import RawMesh
+from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.stl import read_stl
 
 EXTENSIONS = (".obj", ".ply", ".stl")
 # A scan of a garment has some 100,000. The most take about half a minute to read and to thin.
 MOST_TRIANGLES = 200_000
 _LARGEST = 1e9  # coordinate in any unit: squares of larger ones overflow, and no garment has them
-_MOST_BYTES = 400 * 10**6
+_MOST_BYTES = 200 * 10**6
 
 
 def read_mesh(path: Path) -> RawMesh:
@@ -34,17 +34,13 @@ def read_mesh(path: Path) -> RawMesh:
         if path.suffix.lower() == ".obj":
             mesh = read_obj(data, source, MOST_TRIANGLES)
         elif path.suffix.lower() == ".ply":
-            mesh = read_ply(data, source)
+            mesh = read_ply(data, source, MOST_TRIANGLES)
         else:
-            mesh = read_stl(data, source)
+            mesh = read_stl(data, source, MOST_TRIANGLES)
     if len(mesh.faces) == 0:
         raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
     if len(mesh.faces) > MOST_TRIANGLES:
-        raise UserError(
-            source,
-            "faces",
-            f"{len(mesh.faces):,} triangles, expected at most {MOST_TRIANGLES:,}: thin it first",
-        )
+        raise too_many(source, MOST_TRIANGLES)
     bad = np.flatnonzero(~(np.abs(mesh.position) < _LARGEST).all(axis=1))
     if len(bad):
         raise UserError(

@@ -11,22 +11,23 @@ import struct
 import numpy as np
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.files.raw import RawMesh
+from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.text import Numbers, decoded, lines_of
 
 _HEADER, _COUNT, _TRIANGLE = 80, 4, 50  # bytes
 _RECORD = np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(data: bytes, source: str) -> RawMesh:
+def read_stl(data: bytes, source: str, most_faces: int) -> RawMesh:
     """Returns the mesh of an STL file; each triangle has three nodes of its own.
 
     Args:
         data: content of the file.
         source: its name, for messages.
+        most_faces: number of triangles beyond which reading ends.
 
     Raises:
-        UserError: the file is cut off, counts other triangles than it holds, or a line cannot be
+        UserError: there are too many triangles, the file is cut off, counts other triangles than it holds, or a line cannot be
             read.
     """
     start = _HEADER + _COUNT
@@ -36,7 +37,7 @@ def read_stl(data: bytes, source: str) -> RawMesh:
             return _binary(data, source)
     text = data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")
     if text[:5].lower() == b"solid" and b"\0" not in text or 0 in data[1:4]:
-        return _text(decoded(data, source), source)
+        return _text(decoded(data, source), source, most_faces)
     if len(data) < start:
         raise UserError(source, "", f"{len(data)} bytes are too few for an STL file")
     held = (len(data) - start) / _TRIANGLE
@@ -54,7 +55,7 @@ def _binary(data: bytes, source: str) -> RawMesh:
     return RawMesh.of(source, position, np.arange(len(position)).reshape(-1, 3))
 
 
-def _text(text: str, source: str) -> RawMesh:
+def _text(text: str, source: str, most_faces: int) -> RawMesh:
     numbers = Numbers(source)
     nodes: list[list[float]] = []
     node_line: list[int] = []
@@ -78,6 +79,8 @@ def _text(text: str, source: str) -> RawMesh:
                     source, f"line {line}", f"a triangle with {corners} corners, expected 3"
                 )
             face_line.append(line)
+            if len(face_line) > most_faces:
+                raise too_many(source, most_faces)
             face_part.append(len(names) - 1)
             corners = 0
         elif keyword == "solid":

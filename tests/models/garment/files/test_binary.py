@@ -9,12 +9,20 @@ from hypothesis import strategies as st
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
-from drake_dress.models.garment.files.ply import read_ply
-from drake_dress.models.garment.files.stl import read_stl
+from drake_dress.models.garment.files import ply as ply_file
+from drake_dress.models.garment.files import stl as stl_file
 
 JACKET = make_coat(COATS["jacket"], 0.06)
 X = JACKET.rest_position.astype(np.float32).astype(np.float64)
 FACES = JACKET.faces
+
+
+def read_ply(data, source, most_faces=10**6):
+    return ply_file.read_ply(data, source, most_faces)
+
+
+def read_stl(data, source, most_faces=10**6):
+    return stl_file.read_stl(data, source, most_faces)
 
 
 def refused(reader, data, reason):
@@ -111,6 +119,16 @@ def test_a_damaged_stl_is_refused():
     refused(read_stl, text.replace("vertex 0", "vertex nan", 1).encode(), "line .* 'nan")
     lines = text.split("\n")
     refused(read_stl, "\n".join(lines[:3] + lines[4:]).encode(), "line 7: a triangle with 2")
+
+
+def test_too_many_triangles_are_refused_before_they_are_read():
+    for reader, data in (
+        (ply_file.read_ply, ply("ascii")),
+        (ply_file.read_ply, ply("binary_little_endian")),
+        (stl_file.read_stl, text_stl().encode()),
+    ):
+        with pytest.raises(UserError, match="over 700 faces"):
+            reader(data, "coat", 700)
 
 
 @settings(max_examples=60, deadline=None)
