@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import fields, replace
 from pathlib import Path
 
 from drake_dress.diagrams.scenario import schema
+from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
 from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.load import MeshOptions, Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 
 _SCALED = (
@@ -20,10 +23,15 @@ _SCALED = (
     "neck_width",
     "front_opening",
 )
+_MOST_KEPT = 4  # files that are kept in memory
+_kept: OrderedDict[tuple[object, ...], WholeGarment] = OrderedDict()
 
 
 def build_garment(garment: schema.Garment, spacing: float, base: Path) -> GarmentMesh:
     """Returns the garment meshed at `spacing`, m.
+
+    A mesh file is read and checked once, however often and at whatever spacing it is asked for,
+    as long as it does not change.
 
     Args:
         garment: pattern or mesh file.
@@ -34,16 +42,9 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         UserError: measures contradict each other, or the file cannot be used.
     """
     if garment.mesh is not None:
-        from drake_dress.models.garment.load import load_garment
-
-        m = garment.mesh
-        return load_garment(
-            base / m.file,
-            unit=m.unit,
-            spacing=spacing,
-            loops=m.loops or None,
-            grasp=m.grasp or None,
-        )
+        with ShownWhenSlow(garment.mesh.file) as progress:
+            whole = _read_once(base / garment.mesh.file, garment.mesh, progress)
+            return whole.at_spacing(spacing, progress)
     coat = garment.coat
     parameters = COATS[coat.preset]
     parameters = replace(
@@ -57,3 +58,36 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
     if coat.grasp == "seam":
         parameters = replace(parameters, grasp_count=0)
     return make_coat(replace(parameters, **given), spacing, source="garment.coat")
+
+
+def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarment:
+    key = _identity(path, mesh)
+    if key is not None and key in _kept:
+        _kept.move_to_end(key)
+        return _kept[key]
+    whole = read_garment(
+        path,
+        MeshOptions(
+            unit=mesh.unit,
+            up=mesh.up,
+            weld=mesh.weld,
+            leave_out=tuple(mesh.leave_out),
+            loops=mesh.loops,
+            grasp=mesh.grasp,
+        ),
+        progress,
+    )
+    if key is not None:
+        _kept[key] = whole
+        while len(_kept) > _MOST_KEPT:
+            _kept.popitem(last=False)
+    return whole
+
+
+def _identity(path: Path, mesh: schema.Mesh) -> tuple[object, ...] | None:
+    """Returns what changes if the file or how it is read does; None where there is no file."""
+    try:
+        state = path.stat()
+    except (OSError, ValueError):
+        return None
+    return (str(path), state.st_ino, state.st_mtime_ns, state.st_size, repr(mesh))

@@ -3,6 +3,8 @@
 import re
 
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.garment.axes import AXES
+from drake_dress.models.garment.load import WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
@@ -14,6 +16,7 @@ CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": ("m", "cm", "mm"),
+    "garment.mesh.up": tuple(AXES),
     "person.posture": ("standing", "sitting"),
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{
@@ -96,6 +99,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     },
     **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
     **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
+    "mesh.weld": WELD_RANGE,
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
     "material.bending_stiffness": (0.0, 1.0),

@@ -33,6 +33,12 @@ class Mesh:
 
     file: str = ""  # OBJ, PLY or STL, relative to the scenario
     unit: str = "m"  # of its coordinates
+    # Axis of the file that points up. With z the garment faces +x, with y +z, with x +y; a minus
+    # sign turns it upside down.
+    up: str = "z"
+    weld: float = 0.0  # distance across which edges of seams are sewn, m; 0: equal nodes alone
+    # Names of objects or groups, or sizes such as "<0.05 m" of parts that are connected.
+    leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int]] = field(default_factory=dict)  # nodes in order, by loop name
     grasp: dict[str, list[int]] = field(default_factory=dict)  # nodes held, by side
 

@@ -2,36 +2,142 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
-import trimesh
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.axes import AXES, turned
+from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
+from drake_dress.models.garment.label import labelled, with_openings
+from drake_dress.models.garment.manifold import check_manifold
+from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
 from drake_dress.models.garment.mesh import (
     LOOP_NAMES,
-    REGION_NAMES,
     SIDES,
     FloatArray,
     GarmentMesh,
     IntArray,
     check_loop,
-    check_manifold,
-    check_positions,
 )
-from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
+from drake_dress.models.garment.parts import (
+    check_one_part,
+    sizes_of,
+    without_named,
+    without_small,
+)
+from drake_dress.models.garment.plausible import check_plausible
 from drake_dress.models.garment.simplify import to_spacing
 
+__all__ = ["EXTENSIONS", "UNITS", "MeshOptions", "WholeGarment", "load_garment", "read_garment"]
+
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-EXTENSIONS = (".obj", ".ply", ".stl")
 DIAGONAL_RANGE = (0.5, 3.0)  # of a garment's bounding box, m
 SPACING_RANGE = (0.005, 0.1)  # m
+WELD_RANGE = (0.0, 0.02)  # m
 
-_MERGE = 1e-7  # nodes nearer than this by the size of the mesh are one
-_GRASP_COUNT = 10  # nodes per gripper, where none are named
-_GRASP_INSET = 0.035  # from the shoulder tip toward the neck, m
+# Is told what is being done, and which share of it is.
+Progress = Callable[[str, float], None]
+
+
+def _silent(_stage: str, _share: float) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """How a file is to be read.
+
+    Attributes:
+        unit: of its coordinates, `m`, `cm` or `mm`.
+        up: axis of the file that points up; see `axes.AXES` for where the garment faces then.
+        weld: distance across which edges of seams are joined, m; 0 joins equal nodes alone.
+        leave_out: names of objects or groups, or sizes such as `<0.05 m` of connected parts.
+        loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
+            those not named are looked for (see `openings`). In an STL, which lists a node once
+            per triangle, any of the copies may be named.
+        grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
+            nodes nearest to a point 3.5 cm inward of the armhole's highest node.
+    """
+
+    unit: str = "m"
+    up: str = "z"
+    weld: float = 0.0
+    leave_out: Sequence[str] = ()
+    loops: Mapping[str, Sequence[int]] | None = None
+    grasp: Mapping[str, Sequence[int]] | None = None
+
+    def check(self, source: str) -> None:
+        """Raises UserError if an option is unknown or out of range."""
+        for key, word, known in (("unit", self.unit, UNITS), ("up", self.up, AXES)):
+            if word not in known:
+                raise UserError(source, key, f"is {word!r}, expected one of {', '.join(known)}")
+        low, high = WELD_RANGE
+        if not low <= self.weld <= high:
+            raise UserError(source, "weld", f"is {self.weld} m, expected {low:g} to {high} m")
+        for key, given, allowed in (
+            ("loops", self.loops, LOOP_NAMES),
+            ("grasp", self.grasp, SIDES),
+        ):
+            for name in given or {}:
+                if name not in allowed:
+                    raise UserError(
+                        source, f"{key}.{name}", f"unknown, expected {', '.join(allowed)}"
+                    )
+
+
+@dataclass(frozen=True)
+class WholeGarment:
+    """A garment as its file has it: sound, and with its openings known.
+
+    Attributes:
+        source: the file, for messages.
+        position: (n,3), m, facing +x, the left at +y, z up.
+        faces: (F,3), counter-clockwise seen from outside.
+        loops: nodes around each opening of `LOOP_NAMES`.
+        grasp: nodes of those grippers whose nodes are named.
+    """
+
+    source: str
+    position: FloatArray
+    faces: IntArray
+    loops: dict[str, IntArray]
+    grasp: dict[str, IntArray]
+
+    def mesh(self) -> GarmentMesh:
+        """Returns the labelled mesh as fine as the file has it."""
+        return labelled(self.position, self.faces, self.loops, self.grasp)
+
+    def at_spacing(self, spacing: float, progress: Progress = _silent) -> GarmentMesh:
+        """Returns the labelled mesh with a mean edge of about `spacing`, m.
+
+        Raises:
+            UserError: the spacing is out of range, or the mesh cannot be brought to it.
+        """
+        low, high = SPACING_RANGE
+        if not low <= spacing <= high:
+            raise UserError(self.source, "spacing", f"is {spacing} m, expected {low} to {high} m")
+        names = list(self.loops)
+        try:
+            position, faces, chains, became = to_spacing(
+                self.position,
+                self.faces,
+                [self.loops[name] for name in names],
+                spacing,
+                lambda share: progress("bringing the garment to its spacing", share),
+            )
+            loops = dict(zip(names, chains, strict=True))
+            grasp = {side: np.unique(became[nodes]) for side, nodes in self.grasp.items()}
+            check_manifold(faces, len(position))
+            mesh = labelled(position, faces, loops, grasp)
+            mesh.validate()
+        except UserError as error:
+            raise UserError(
+                self.source, "spacing", f"is {spacing} m, at which {error.message}"
+            ) from error
+        return mesh
 
 
 def load_garment(
@@ -39,159 +145,96 @@ def load_garment(
     *,
     unit: str,
     spacing: float | None = None,
+    up: str = "z",
+    weld: float = 0.0,
+    leave_out: Sequence[str] = (),
     loops: Mapping[str, Sequence[int]] | None = None,
     grasp: Mapping[str, Sequence[int]] | None = None,
+    progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
 
-    The file shows the garment facing +x, its left at +y, z up, with the sleeves sideways; it is
-    moved so that the origin is the midpoint between the highest nodes of the armholes. Duplicate
-    nodes are merged, nodes of no face dropped, and faces turned outward if all point inward.
-
     Args:
         path: of the file.
-        unit: of its coordinates, `m`, `cm` or `mm`.
+        unit: see `MeshOptions`, as for `up` and what follows it.
         spacing: wanted mean edge length, m; None keeps the mesh as it is.
-        loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
-            those not named are looked for (see `openings`). In an STL, which lists a node once
-            per triangle, any of the copies may be named.
-        grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
-            nodes nearest to a point 3.5 cm inward of the armhole's highest node.
+        up: axis of the file.
+        weld: distance across which seams are sewn, m.
+        leave_out: names, or sizes such as `<0.05 m`.
+        loops: nodes around openings.
+        grasp: nodes held.
+        progress: is told what is being done, and which share of it is.
 
     Raises:
-        UserError: in one line what cannot be used: the file, its format or unit, an empty,
-            non-finite or non-manifold mesh, loops that are absent or not closed, wrong indices.
+        UserError: see `read_garment` and `WholeGarment.at_spacing`.
+    """
+    whole = read_garment(path, MeshOptions(unit, up, weld, leave_out, loops, grasp), progress)
+    return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
+
+
+@np.errstate(all="ignore")  # damaged numbers are told by the checks, not by numpy
+def read_garment(
+    path: str | Path, options: MeshOptions, progress: Progress = _silent
+) -> WholeGarment:
+    """Returns the garment of an OBJ, PLY or STL file, checked.
+
+    The file shows the garment with its sleeves sideways. Nodes at the same place are merged, nodes
+    of no face dropped, and faces turned outward if all point inward.
+
+    Raises:
+        UserError: in one line what cannot be used: the file, its format or an option, a mesh that
+            is empty, not finite, not plausible, not manifold or in parts, loops that are absent or
+            not closed, wrong indices. Nodes are named as the file counts them, from 0, with lines.
     """
     source = str(path)
-    factor = _check_arguments(source, unit, spacing, loops, grasp)
-    raw, triangles = _read(Path(path))
-    check_positions(raw, source)
-    raw = raw * factor
-    _check_size(raw, triangles, unit, source)
-    position, faces, became = _merged(raw, triangles)
-    check_manifold(faces, len(position), source)
-    faces = _outward(position, faces)
+    options.check(source)
+    progress("reading the garment", 0.0)
+    raw = without_named(read_mesh(Path(path)), options.leave_out)
+    progress("checking the garment", 0.3)
+    raw = duplicates_merged(raw.scaled(UNITS[options.unit]))
+    # first what holds in any unit, so that a wild node is not taken for a wrong unit
+    check_plausible(raw)
+    _check_size(raw, options.unit)
+    raw = seams_sewn(raw, options.weld)
+    for size in sizes_of(options.leave_out, source):
+        raw = without_small(raw, size)
+    check_one_part(raw)
+    node, face = raw.node, raw.face
+    check_manifold(raw.faces, len(raw.position), source, node, face)
+    faces = _outward(raw.position, raw.faces).astype(np.int32)
 
-    named = {
-        name: _mapped(nodes, became, source, f"loops.{name}")
-        for name, nodes in (loops or {}).items()
+    loops = {
+        name: _mapped(raw, nodes, f"loops.{name}") for name, nodes in (options.loops or {}).items()
     }
-    held = {
-        side: _mapped(nodes, became, source, f"grasp.{side}")
-        for side, nodes in (grasp or {}).items()
+    grasp = {
+        side: _mapped(raw, nodes, f"grasp.{side}") for side, nodes in (options.grasp or {}).items()
     }
-    for name, loop in named.items():
-        check_loop(loop, faces, len(position), source, f"loops.{name}")
-    if not all(f"{side}_cuff" in named for side in SIDES):
-        named = {**find_cuffs(position, faces, source), **named}
-    for side in SIDES:
-        name = f"{side}_armhole"
-        if name not in named:
-            named[name] = find_armhole(position, faces, named[f"{side}_cuff"], source, name)
-    # checked before the mesh is thinned, so that a message names what the user gave
-    _labelled(position, faces, named, held).validate(source)
-    if spacing is not None:
-        names = list(named)
-        position, faces, chains, merged = to_spacing(
-            position, faces, [named[name] for name in names], spacing
-        )
-        named = dict(zip(names, chains, strict=True))
-        held = {side: np.unique(merged[nodes]) for side, nodes in held.items()}
-        check_manifold(faces, len(position), source)
-    mesh = _labelled(position, faces, named, held)
-    mesh.validate(source)
-    return mesh
+    for name, loop in loops.items():
+        check_loop(loop, faces, len(raw.position), source, f"loops.{name}", node)
+    progress("looking for the garment's openings", 0.5)
+    loops = with_openings(raw.position, faces, loops, options.up, source)
+    whole = WholeGarment(source, turned(raw.position, options.up), faces, loops, grasp)
+    whole.mesh().validate(source)
+    return whole
 
 
-def _check_arguments(
-    source: str,
-    unit: str,
-    spacing: float | None,
-    loops: Mapping[str, Sequence[int]] | None,
-    grasp: Mapping[str, Sequence[int]] | None,
-) -> float:
-    if unit not in UNITS:
-        raise UserError(source, "unit", f"is {unit!r}, expected one of {', '.join(UNITS)}")
-    low, high = SPACING_RANGE
-    if spacing is not None and not low <= spacing <= high:
-        raise UserError(source, "spacing", f"is {spacing} m, expected {low} to {high} m")
-    for key, given, known in (("loops", loops, LOOP_NAMES), ("grasp", grasp, SIDES)):
-        for name in given or {}:
-            if name not in known:
-                raise UserError(source, f"{key}.{name}", f"unknown, expected {', '.join(known)}")
-    return UNITS[unit]
-
-
-def _read(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    source = str(path)
-    if path.suffix.lower() not in EXTENSIONS:
-        raise UserError(
-            source, "", f"unknown format {path.suffix!r}, expected {', '.join(EXTENSIONS)}"
-        )
-    if not path.is_file():
-        raise UserError(source, "", "no such file, expected a triangle mesh")
-    if path.stat().st_size == 0:
-        raise UserError(source, "", "the file is empty, expected a triangle mesh")
-    try:
-        mesh = trimesh.load(
-            path, process=False, force="mesh", maintain_order=True, group_material=False
-        )
-    # an OBJ in no plain encoding: trimesh looks for an optional package that guesses it
-    except ImportError as error:
-        raise UserError(source, "", "is not text, expected an OBJ in UTF-8") from error
-    # trimesh's readers raise whatever their parsing stumbles on
-    except Exception as error:  # noqa: BLE001
-        reason = str(error) or type(error).__name__
-        raise UserError(source, "", f"cannot be read as {path.suffix[1:]}: {reason}") from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
-    position = np.array(mesh.vertices, dtype=np.float64)
-    faces = np.array(mesh.faces, dtype=np.int64)
-    if faces.min() < 0 or faces.max() >= len(position):
-        raise UserError(
-            source,
-            "faces",
-            f"node indices reach from {faces.min()} to {faces.max()}, expected 0 to "
-            f"{len(position) - 1}",
-        )
-    return position, faces
-
-
-def _check_size(position: FloatArray, faces: npt.NDArray[np.int64], unit: str, source: str) -> None:
-    used = position[np.unique(faces)]
-    diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))
+def _check_size(raw: RawMesh, unit: str) -> None:
+    diagonal = float(np.linalg.norm(np.ptp(raw.position, axis=0)))
     low, high = DIAGONAL_RANGE
     if not low <= diagonal <= high:
         better = [
             name for name, factor in UNITS.items() if low <= diagonal * factor / UNITS[unit] <= high
         ]
-        hint = f"; with {better[0]} it would fit" if better else ""
+        hint = f"with {better[0]} it would fit" if better else "no unit fits: scale the file"
         raise UserError(
-            source,
+            raw.source,
             "unit",
             f"in {unit} the garment's bounding box has a diagonal of {diagonal:.3g} m, expected "
-            f"{low} to {high} m (wrong unit?){hint}",
+            f"{low} to {high} m (wrong unit?); {hint}",
         )
 
 
-def _merged(
-    position: FloatArray, faces: npt.NDArray[np.int64]
-) -> tuple[FloatArray, IntArray, npt.NDArray[np.int64]]:
-    """Merges nodes at the same place and drops unused ones; -1 stands for a dropped node."""
-    cell = np.round(position / (_MERGE * np.ptp(position, axis=0).max())).astype(np.int64)
-    _, first, group = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-    faces = group.reshape(-1)[faces]
-    # faces that merging has closed up: seams of zero width
-    flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    faces = faces[~flat]
-    used = np.unique(faces)
-    used = used[np.argsort(first[used])]  # in the file's order
-    new = np.full(len(first), -1)
-    new[used] = np.arange(len(used))
-    return position[first[used]], new[faces].astype(np.int32), new[group.reshape(-1)]
-
-
-def _outward(position: FloatArray, faces: IntArray) -> IntArray:
+def _outward(position: FloatArray, faces: np.ndarray) -> np.ndarray:
     a, b, c = (position[faces[:, k]] for k in range(3))
     area = np.cross(b - a, c - a)
     center = np.average((a + b + c) / 3, axis=0, weights=np.linalg.norm(area, axis=1) + 1e-15)
@@ -200,40 +243,19 @@ def _outward(position: FloatArray, faces: IntArray) -> IntArray:
     return faces
 
 
-def _mapped(nodes: Sequence[int], became: npt.NDArray[np.int64], source: str, key: str) -> IntArray:
+def _mapped(raw: RawMesh, nodes: Sequence[int], key: str) -> IntArray:
+    """Returns the nodes that nodes of the file have become."""
     given = np.asarray(nodes)
     if given.ndim != 1 or given.size == 0 or not np.issubdtype(given.dtype, np.integer):
-        raise UserError(source, key, "expected a list of node indices (whole numbers)")
-    if given.min() < 0 or given.max() >= len(became):
+        raise UserError(raw.source, key, "expected a list of node indices (whole numbers)")
+    if given.min() < 0 or given.max() >= len(raw.became):
         raise UserError(
-            source,
+            raw.source,
             key,
             f"node indices reach from {given.min()} to {given.max()}, expected 0 to "
-            f"{len(became) - 1}",
+            f"{len(raw.became) - 1}",
         )
-    mapped = became[given]
+    mapped = raw.became[given]
     if mapped.min() < 0:
-        raise UserError(source, key, f"node {given[np.argmin(mapped)]} belongs to no face")
+        raise UserError(raw.source, key, f"node {given[np.argmin(mapped)]} belongs to no face")
     return mapped.astype(np.int32)
-
-
-def _labelled(
-    position: FloatArray,
-    faces: IntArray,
-    loops: Mapping[str, IntArray],
-    grasp: Mapping[str, IntArray],
-) -> GarmentMesh:
-    """Names the regions and grasp patches and moves the origin between the shoulder tips."""
-    named = {name: ordered(position, loops[name]) for name in LOOP_NAMES}
-    region = np.zeros(len(position), dtype=np.int8)
-    for side in SIDES:
-        sleeve = beyond(faces, len(position), named[f"{side}_armhole"], named[f"{side}_cuff"])
-        region[sleeve] = REGION_NAMES.index(f"{side}_sleeve")
-    tips = np.stack([position[named[f"{side}_armhole"][0]] for side in SIDES])
-    inward = (tips[::-1] - tips) / max(float(np.linalg.norm(tips[0] - tips[1])), 1e-9)
-    held = dict(grasp)
-    for k, side in enumerate(SIDES):
-        if side not in held:
-            far = np.linalg.norm(position - (tips[k] + _GRASP_INSET * inward[k]), axis=1)
-            held[side] = np.argsort(far, kind="stable")[:_GRASP_COUNT].astype(np.int32)
-    return GarmentMesh(position - tips.mean(axis=0), faces, named, held, region)

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.edges import IntArray, unique_edges
+from drake_dress.models.garment.manifold import Named, check_manifold, plain_node
 from drake_dress.models.sides import SIDES
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
+
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
@@ -104,56 +104,14 @@ def check_positions(position: FloatArray, source: str = "mesh") -> None:
         )
 
 
-def check_manifold(faces: npt.NDArray[np.integer], n: int, source: str = "mesh") -> None:
-    """Checks that faces form one connected, consistently oriented manifold with boundary.
-
-    Args:
-        faces: (F,3) node indices.
-        n: number of nodes.
-        source: file or name put in front of the message.
-
-    Raises:
-        UserError: no faces, an index out of range, a face that names a node twice, a face given
-            twice, an edge of more than two faces, neighbours oriented against each other, nodes
-            of no face, several components, or a node where two sheets only touch.
-    """
-    if faces.size == 0:
-        raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
-    if faces.ndim != 2 or faces.shape[1] != 3:
-        raise UserError(source, "faces", f"have shape {faces.shape}, expected (F, 3)")
-    if faces.min() < 0 or faces.max() >= n:
-        raise UserError(
-            source,
-            "faces",
-            f"node indices reach from {faces.min()} to {faces.max()}, expected 0 to {n - 1}",
-        )
-    twice = np.flatnonzero((faces == np.roll(faces, 1, axis=1)).any(axis=1))
-    if len(twice):
-        raise UserError(
-            source,
-            "faces",
-            f"{len(twice)} are degenerate (name a node twice), the first is face {twice[0]}",
-        )
-    if len(np.unique(np.sort(faces, axis=1), axis=0)) < len(faces):
-        raise UserError(source, "faces", "a triangle is given twice, expected each once")
-    _check_edges(faces, n, source)
-    used = np.zeros(n, dtype=bool)
-    used[faces] = True
-    if not used.all():
-        raise UserError(
-            source,
-            "nodes",
-            f"{np.count_nonzero(~used)} belong to no face, the first is {np.argmin(used)}",
-        )
-    count = _component_count(faces, n)
-    if count > 1:
-        raise UserError(
-            source, "faces", f"the mesh falls into {count} separate parts, expected one"
-        )
-    _check_fans(faces, n, source)
-
-
-def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -> None:
+def check_loop(
+    loop: IntArray,
+    faces: IntArray,
+    n: int,
+    source: str,
+    key: str,
+    node: Named = plain_node,
+) -> None:
     """Checks that nodes form a closed chain of edges of the mesh.
 
     Args:
@@ -162,6 +120,7 @@ def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -
         n: number of nodes.
         source: file or name put in front of the message.
         key: of the loop in the source, for the message.
+        node: names nodes in messages.
 
     Raises:
         UserError: indices out of range or repeated, fewer than three, or no edge joins neighbours.
@@ -177,48 +136,9 @@ def check_loop(loop: IntArray, faces: IntArray, n: int, source: str, key: str) -
         raise UserError(
             source,
             key,
-            f"is not a closed chain of mesh edges: no edge joins nodes {loop[at]} and "
-            f"{loop[(at + 1) % len(loop)]}",
+            f"is not a closed chain of mesh edges: no edge joins {node(loop[at])} and "
+            f"{node(loop[(at + 1) % len(loop)])}",
         )
-
-
-def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
-    """Returns (E,2) node indices of every edge once, the smaller first, in lexical order."""
-    n = int(faces.max()) + 1
-    key = np.unique(np.sort(_half_edges(faces).astype(np.int64), axis=1) @ np.array([n, 1]))
-    return np.stack([key // n, key % n], axis=1).astype(np.int32)
-
-
-def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
-    """Returns each boundary as node indices in order, the longest first.
-
-    The order is that of the faces' own half-edges: the garment lies to the left of the walk.
-    Each loop begins at its smallest index.
-
-    Args:
-        faces: (F,3) node indices of a manifold.
-
-    Raises:
-        UserError: boundaries meet in a node, so that they cannot be told apart.
-    """
-    half = _half_edges(faces).astype(np.int64)
-    n = int(faces.max()) + 1
-    border = half[~np.isin(half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0])]
-    if len(np.unique(border[:, 0])) < len(border):
-        raise UserError("mesh", "faces", "boundaries meet in a node (the mesh is not manifold)")
-    following = dict(zip(border[:, 0].tolist(), border[:, 1].tolist(), strict=True))
-    loops: list[IntArray] = []
-    while following:
-        start = min(following)
-        loop = [start]
-        node = following.pop(start)
-        while node != start:
-            loop.append(node)
-            if node not in following:
-                raise UserError("mesh", "faces", f"the boundary ends at node {node}")
-            node = following.pop(node)
-        loops.append(np.array(loop, dtype=np.int32))
-    return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
 
 
 def face_areas(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatArray:
@@ -238,62 +158,6 @@ def edge_lengths(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatA
     edges = unique_edges(faces)
     chord = position[edges[:, 0]] - position[edges[:, 1]]
     return np.asarray(np.linalg.norm(chord, axis=1), dtype=np.float64)
-
-
-def _half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-
-
-def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
-    half = _half_edges(faces).astype(np.int64)
-    edge, count = np.unique(np.sort(half, axis=1) @ np.array([n, 1]), return_counts=True)
-    if count.max() > 2:
-        first = int(edge[np.argmax(count > 2)])
-        raise UserError(
-            source,
-            "faces",
-            f"not manifold: {np.count_nonzero(count > 2)} edges belong to more than two faces, "
-            f"the first joins nodes {first // n} and {first % n}",
-        )
-    directed, count = np.unique(half @ np.array([n, 1]), return_counts=True)
-    if count.max() > 1:
-        first = int(directed[np.argmax(count > 1)])
-        raise UserError(
-            source,
-            "faces",
-            f"{np.count_nonzero(count > 1)} pairs of neighbours are oriented against each other, "
-            f"the first at nodes {first // n} and {first % n}",
-        )
-
-
-def _component_count(faces: npt.NDArray[np.integer], n: int) -> int:
-    half = _half_edges(faces)
-    graph = coo_array((np.ones(len(half)), (half[:, 0], half[:, 1])), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
-
-
-def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str) -> None:
-    """At each node of a manifold the faces form one fan: they hang together by their edges."""
-    count = len(faces)
-    half = _half_edges(faces).astype(np.int64)
-    corner = np.arange(3 * count).reshape(3, count)  # corner k of face f is entry (k, f)
-    tail, head = corner.ravel(), np.roll(corner, -1, axis=0).ravel()
-    forward, backward = half[:, 0] * n + half[:, 1], half[:, 1] * n + half[:, 0]
-    _, here, there = np.intersect1d(forward, backward, assume_unique=True, return_indices=True)
-    rows = np.concatenate([tail[here], head[here]])
-    columns = np.concatenate([head[there], tail[there]])
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(3 * count, 3 * count))
-    fans, label = connected_components(graph, directed=False)
-    if fans > n:
-        node = np.empty(fans, dtype=np.int64)
-        node[label] = faces.T.ravel()
-        pinched = np.flatnonzero(np.bincount(node, minlength=n) > 1)
-        raise UserError(
-            source,
-            "faces",
-            f"not manifold: at {len(pinched)} nodes two sheets only touch, "
-            f"the first is node {pinched[0]}",
-        )
 
 
 def _check_loops(loops: dict[str, IntArray], faces: IntArray, n: int, source: str) -> None:

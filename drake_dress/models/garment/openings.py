@@ -18,13 +18,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.mesh import (
-    FloatArray,
-    IntArray,
-    boundary_loops,
-    loop_length,
-    unique_edges,
-)
+from drake_dress.models.garment.edges import boundary_loops, unique_edges
+from drake_dress.models.garment.mesh import FloatArray, IntArray, loop_length
 
 _CUFF_GIRTH = (0.1, 0.8)  # m
 _STEP = 0.005  # between cuts, m

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
-from drake_dress.models.garment.mesh import boundary_loops, edge_lengths, loop_length
+from drake_dress.models.garment.edges import boundary_loops
+from drake_dress.models.garment.mesh import edge_lengths, loop_length
 
 SPACINGS = (0.01, 0.02, 0.03, 0.045, 0.06)
 MODELS = {"default": CoatParameters(), **COATS}

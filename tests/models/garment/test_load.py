@@ -6,8 +6,9 @@ import trimesh
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.load import load_garment
-from drake_dress.models.garment.mesh import boundary_loops, edge_lengths, loop_length
+from drake_dress.models.garment.mesh import edge_lengths, loop_length
 
 
 @pytest.fixture(scope="module")

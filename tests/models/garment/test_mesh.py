@@ -3,14 +3,9 @@ import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import CoatParameters, make_coat
-from drake_dress.models.garment.mesh import (
-    GarmentMesh,
-    boundary_loops,
-    check_manifold,
-    edge_lengths,
-    loop_length,
-    unique_edges,
-)
+from drake_dress.models.garment.edges import boundary_loops, unique_edges
+from drake_dress.models.garment.manifold import check_manifold
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, loop_length
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 

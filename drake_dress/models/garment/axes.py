@@ -1,0 +1,28 @@
+"""Axes of a garment's file, and of the garment."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+# Rows are forward, left and up of the garment in the file's axes. A garment with z up faces +x, one
+# with y up faces +z (as garment programs write it), one with x up faces +y; a minus sign turns it
+# upside down about the way it faces.
+AXES: dict[str, npt.NDArray[np.float64]] = {
+    "z": np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+    "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "-z": np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]),
+    "-y": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "-x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]),
+}
+
+
+def turned(position: npt.NDArray[np.float64], up: str) -> npt.NDArray[np.float64]:
+    """Returns (n,3) positions with +x forward, +y left and +z up.
+
+    Args:
+        position: (n,3) in the file's axes.
+        up: the file's axis that points up, a key of `AXES`.
+    """
+    return np.asarray(position @ AXES[up].T)

@@ -1,0 +1,173 @@
+"""Reads the polygons of a Wavefront OBJ file.
+
+The readers of mesh libraries lose some of the format's dialects (byte order marks, tabs, comments
+at line ends, relative indices that stand between nodes, Latin-1 names), and name no line where
+they fail. This reader takes nodes, polygons, objects and groups, passes over everything else that
+the format defines for polygons, and refuses the rest with its line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from drake_dress.errors import UserError
+from drake_dress.models.garment.files.polygons import triangulated
+from drake_dress.models.garment.files.raw import RawMesh, too_many
+from drake_dress.models.garment.files.text import Numbers, decoded, lines_of
+
+# Statements that change nothing about the surface: texture, normals, materials, smoothing, lines,
+# points, display. Names (`o`, `g`) are read for `leave_out`.
+_PASSED = frozenset(
+    "vt vn vp l p s mg mtllib usemtl maplib usemap bevel c_interp d_interp lod shadow_obj "
+    "trace_obj call csh".split()
+)
+_CURVED = frozenset(
+    "cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con ctech stech "
+    "bsp bzp cdc cdp res".split()
+)
+# A name or path may end in a backslash, which continues no line there.
+_NAMED = frozenset(("o", "g", "mtllib", "usemtl", "maplib", "usemap"))
+_MOST_CORNERS = 1000  # of one polygon
+_INDEX = re.compile(r"([+-]?\d{1,18})(?:/[+-]?\d*){0,2}", re.ASCII)
+
+
+def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
+    """Returns the mesh of an OBJ file; polygons are cut into triangles.
+
+    Args:
+        data: content of the file.
+        source: its name, for messages.
+        most_faces: number of polygons beyond which reading ends.
+
+    Raises:
+        UserError: a line cannot be read, names nodes that the file lacks, or there are too many.
+    """
+    numbers = Numbers(source)
+    nodes: list[list[float]] = []
+    node_line: list[int] = []
+    polygons: list[list[int]] = []
+    polygon_line: list[int] = []
+    polygon_part: list[int] = []
+    parts: dict[tuple[str, ...], int] = {(): 0}
+    name, part = "", 0
+    groups: tuple[str, ...] = ()
+    for line, keyword, words in _statements(decoded(data, source)):
+        if keyword == "v":
+            nodes.append(_node(numbers, words, line, source))
+            node_line.append(line)
+        elif keyword in ("f", "fo"):
+            polygons.append(_corners(words, len(nodes), line, source))
+            polygon_line.append(line)
+            polygon_part.append(part)
+            if len(polygons) > most_faces:
+                raise too_many(source, most_faces)
+        elif keyword in ("o", "g"):
+            if keyword == "o":
+                name = " ".join(words)
+            else:
+                # several words are several groups, or a name with spaces: either may be asked for
+                groups = tuple(dict.fromkeys((*words, " ".join(words))))
+            part = parts.setdefault(tuple(filter(None, (name, *groups))), len(parts))
+        elif keyword in _CURVED:
+            raise UserError(
+                source, f"line {line}", f"{keyword!r} is a curved surface, expected polygons"
+            )
+        elif keyword not in _PASSED:
+            raise UserError(
+                source, f"line {line}", f"{keyword[:40]!r} is no statement of the OBJ format"
+            )
+    _check_range(polygons, polygon_line, len(nodes), source)
+    position = np.array(nodes, dtype=np.float64).reshape(-1, 3)
+    faces, owner = triangulated(position, polygons)
+    return RawMesh.of(
+        source,
+        position,
+        faces,
+        face_part=np.array(polygon_part, dtype=np.int64)[owner],
+        part_names=tuple(parts),
+        node_line=np.array(node_line, dtype=np.int64),
+        face_line=np.array(polygon_line, dtype=np.int64)[owner],
+    )
+
+
+def _statements(text: str) -> Iterator[tuple[int, str, list[str]]]:
+    """Yields line, keyword and words of each statement; no comments, continued lines joined."""
+    lines = iter(enumerate(lines_of(text), start=1))
+    for line, content in lines:
+        words = content.partition("#")[0].split()
+        if not words:
+            continue
+        keyword = words[0].lower()
+        if keyword in _NAMED:
+            # in a name, "#" begins a comment only after a space
+            words = re.split(r"(?:^|\s)#", content, maxsplit=1)[0].split()
+        else:
+            while words and words[-1].endswith("\\"):
+                words[-1] = words[-1].rstrip("\\")
+                _, content = next(lines, (0, ""))
+                words += content.partition("#")[0].split()
+        yield line, keyword, [word for word in words[1:] if word]
+
+
+def _node(numbers: Numbers, words: list[str], line: int, source: str) -> list[float]:
+    """Returns x, y, z; after them may stand a weight, a colour, or both."""
+    if len(words) not in (3, 4, 6, 7, 8):
+        raise UserError(
+            source,
+            f"line {line}",
+            f"a node of {len(words)} numbers, expected x y z, perhaps with weight or colour",
+        )
+    values = numbers.read(words, line)
+    if len(values) == 4 and values[3] != 1.0:
+        raise UserError(
+            source, f"line {line}", f"the node has weight {values[3]:g}, expected 1 for polygons"
+        )
+    return values[:3]
+
+
+def _corners(words: list[str], count: int, line: int, source: str) -> list[int]:
+    """Returns the nodes of a polygon, counted from 0; the file counts from 1, or back from -1."""
+    corners = []
+    for word in words:
+        match = _INDEX.fullmatch(word)
+        if match is None:
+            raise UserError(
+                source,
+                f"line {line}",
+                f"{word[:40]!r} is no corner of a face, expected NODE/TEXTURE/NORMAL",
+            )
+        index = int(match[1])
+        if index < -count:
+            raise UserError(
+                source,
+                f"line {line}",
+                f"names node {index}, but only {count} nodes stand before this line",
+            )
+        corners.append(index - 1 if index > 0 else count + index if index < 0 else -1)
+    if not 3 <= len(corners) <= _MOST_CORNERS:
+        raise UserError(
+            source,
+            f"line {line}",
+            f"a face with {len(corners)} corners, expected 3 to {_MOST_CORNERS}",
+        )
+    return corners
+
+
+def _check_range(polygons: list[list[int]], lines: list[int], count: int, source: str) -> None:
+    lowest = min((min(corners) for corners in polygons), default=0)
+    highest = max((max(corners) for corners in polygons), default=-1)
+    for corners, line in zip(polygons, lines, strict=True):
+        if lowest < 0 and min(corners) < 0:
+            hint = " (does the file count from 0? add 1 to all)" if highest < count - 1 else ""
+            raise UserError(
+                source, f"line {line}", f"names node 0, but OBJ counts nodes from 1{hint}"
+            )
+        if lowest >= 0 and max(corners) >= count:
+            raise UserError(
+                source,
+                f"line {line}",
+                f"names node {max(corners) + 1}, but the file has {count} nodes",
+            )

@@ -1,0 +1,128 @@
+"""A mesh as its file gives it, with the file's own numbers of nodes and lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.errors import UserError
+
+FloatArray = npt.NDArray[np.float64]
+IndexArray = npt.NDArray[np.int64]
+MaskArray = npt.NDArray[np.bool_]
+
+
+def too_many(source: str, most: int) -> UserError:
+    """Returns the refusal of a file with more faces than are read."""
+    return UserError(source, "faces", f"has over {most:,} faces, expected fewer: thin it first")
+
+
+def place(point: FloatArray) -> str:
+    """Returns a point, m, as messages write it; nothing if it is not finite."""
+    if not np.isfinite(point).all():
+        return ""
+    near = np.abs(point) < 1000.0
+    words = [f"{x:.2f}" if small else f"{x:.3g}" for x, small in zip(point, near, strict=True)]
+    return f" at ({', '.join(words).replace('-0.00', '0.00')}) m"
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Triangles of a file, and where each node and face comes from.
+
+    Nodes may be merged and left out; `file_node` and `became` keep the relation to the file.
+
+    Attributes:
+        source: the file, for messages.
+        position: (n,3).
+        faces: (F,3) indices into `position`.
+        face_part: (F,) index into `part_names`.
+        part_names: names of the object and groups that each part of the file belongs to.
+        file_node: (n,) the file's first node that each node comes from, counted from 0.
+        became: (m,) the node that each node of the file has become, -1 for none.
+        node_line: (m,) line of each node of the file, counted from 1; None in binary files.
+        face_line: (F,) line of each face; None in binary files.
+    """
+
+    source: str
+    position: FloatArray
+    faces: IndexArray
+    face_part: IndexArray
+    part_names: tuple[tuple[str, ...], ...]
+    file_node: IndexArray
+    became: IndexArray
+    node_line: IndexArray | None = None
+    face_line: IndexArray | None = None
+
+    @staticmethod
+    def of(
+        source: str,
+        position: FloatArray,
+        faces: IndexArray,
+        *,
+        face_part: IndexArray | None = None,
+        part_names: tuple[tuple[str, ...], ...] = ((),),
+        node_line: IndexArray | None = None,
+        face_line: IndexArray | None = None,
+    ) -> RawMesh:
+        """Returns a mesh whose nodes are those of the file."""
+        every = np.arange(len(position))
+        if face_part is None:
+            face_part = np.zeros(len(faces), dtype=np.int64)
+        return RawMesh(
+            source, position, faces, face_part, part_names, every, every, node_line, face_line
+        )
+
+    def scaled(self, factor: float) -> RawMesh:
+        """Returns the mesh with all coordinates multiplied."""
+        return replace(self, position=self.position * factor)
+
+    def only(self, keep: MaskArray) -> RawMesh:
+        """Returns the mesh with the (F,) faces marked `keep`, without the nodes of no face."""
+        faces = self.faces[keep]
+        used = np.unique(faces)
+        new = np.full(len(self.position), -1, dtype=np.int64)
+        new[used] = np.arange(len(used))
+        return replace(
+            self,
+            position=self.position[used],
+            faces=new[faces],
+            face_part=self.face_part[keep],
+            face_line=None if self.face_line is None else self.face_line[keep],
+            file_node=self.file_node[used],
+            became=np.where(self.became < 0, -1, new[self.became]),
+        )
+
+    def joined(self, root: IndexArray) -> RawMesh:
+        """Returns the mesh with each node replaced by node `root[node]`.
+
+        Faces that collapse and nodes of no face are dropped. A node keeps the place of its root.
+
+        Raises:
+            UserError: no face is left.
+        """
+        faces = root[self.faces]
+        became = np.where(self.became < 0, -1, root[self.became])
+        flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        if flat.all():
+            raise UserError(
+                self.source,
+                "faces",
+                f"all {len(faces)} have corners at the same place, expected a surface",
+            )
+        return replace(self, faces=faces, became=became).only(~flat)
+
+    def node(self, i: int | np.integer) -> str:
+        """Returns a node as the file knows it, and its place: `node 12 (line 13) at (0, 0, 1) m`.
+
+        The mesh is in m, or its coordinates are not finite.
+        """
+        number = int(self.file_node[i])
+        line = "" if self.node_line is None else f" (line {self.node_line[number]})"
+        return f"node {number}{line}{place(self.position[i])}"
+
+    def face(self, i: int | np.integer) -> str:
+        """Returns a face as the file knows it: by its line, or else by its number."""
+        return f"face {int(i)}" if self.face_line is None else f"line {self.face_line[i]}"

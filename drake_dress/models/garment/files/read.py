@@ -1,0 +1,75 @@
+"""Reads a mesh file by its extension, within stated limits of size."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from drake_dress.errors import UserError
+from drake_dress.models.garment.files.obj import read_obj
+from drake_dress.models.garment.files.ply import read_ply
+from drake_dress.models.garment.files.raw import RawMesh, too_many
+from drake_dress.models.garment.files.stl import read_stl
+
+EXTENSIONS = (".obj", ".ply", ".stl")
+# A scan of a garment has some 100,000. The most take about half a minute to read and to thin.
+MOST_TRIANGLES = 200_000
+_LARGEST = 1e9  # coordinate in any unit: squares of larger ones overflow, and no garment has them
+_MOST_BYTES = 200 * 10**6
+
+
+def read_mesh(path: Path) -> RawMesh:
+    """Returns the triangles of an OBJ, PLY or STL file.
+
+    Raises:
+        UserError: the file is absent, unreadable, too large, not of its format, or without
+            triangles; or a coordinate is not finite.
+    """
+    source = str(path)
+    data = _content(path)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # numpy's words on damaged numbers: checked below
+        if path.suffix.lower() == ".obj":
+            mesh = read_obj(data, source, MOST_TRIANGLES)
+        elif path.suffix.lower() == ".ply":
+            mesh = read_ply(data, source, MOST_TRIANGLES)
+        else:
+            mesh = read_stl(data, source, MOST_TRIANGLES)
+    if len(mesh.faces) == 0:
+        raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
+    if len(mesh.faces) > MOST_TRIANGLES:
+        raise too_many(source, MOST_TRIANGLES)
+    bad = np.flatnonzero(~(np.abs(mesh.position) < _LARGEST).all(axis=1))
+    if len(bad):
+        raise UserError(
+            source,
+            "nodes",
+            f"{len(bad)} of {len(mesh.position)} hold NaN, infinity or numbers beyond "
+            f"{_LARGEST:g}, the first is {mesh.node(bad[0])}",
+        )
+    return mesh
+
+
+def _content(path: Path) -> bytes:
+    source = str(path)
+    if path.suffix.lower() not in EXTENSIONS:
+        raise UserError(
+            source, "", f"unknown format {path.suffix!r}, expected {', '.join(EXTENSIONS)}"
+        )
+    try:
+        if not path.is_file():
+            raise UserError(source, "", "no such file, expected a triangle mesh")
+        size = path.stat().st_size
+        if size == 0:
+            raise UserError(source, "", "the file is empty, expected a triangle mesh")
+        if size > _MOST_BYTES:
+            raise UserError(
+                source,
+                "",
+                f"has {size / 1e6:,.0f} MB, expected at most {_MOST_BYTES / 1e6:.0f} MB",
+            )
+        return path.read_bytes()
+    except OSError as error:
+        raise UserError(source, "", f"cannot be read: {error.strerror}") from error

@@ -1,0 +1,138 @@
+"""Names the parts of a garment: openings, sleeves, and what the grippers hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from drake_dress.errors import UserError
+from drake_dress.models.garment.axes import AXES, turned
+from drake_dress.models.garment.mesh import (
+    LOOP_NAMES,
+    REGION_NAMES,
+    SIDES,
+    FloatArray,
+    GarmentMesh,
+    IntArray,
+)
+from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
+
+_GRASP_COUNT = 10  # nodes per gripper, where none are named
+_GRASP_INSET = 0.035  # from the shoulder tip toward the neck, m
+# Where the body's middle lies from that of the armholes, m: less tells nothing of what is up. A
+# coat's lies 0.2 m below or more.
+_TELLING = 0.06
+
+
+def with_openings(
+    position: FloatArray,
+    faces: IntArray,
+    named: Mapping[str, IntArray],
+    up: str,
+    source: str,
+) -> dict[str, IntArray]:
+    """Returns the loops that are named, and those that are not, found.
+
+    Args:
+        position: (n,3), m, in the axes of the file.
+        faces: (F,3) of a manifold.
+        named: loops by their names in `LOOP_NAMES`.
+        up: the axis of the file that is up, a key of `AXES`.
+        source: file put in front of messages.
+
+    Raises:
+        UserError: a loop is not found, or another axis than `up` is up.
+    """
+    try:
+        return _hanging(turned(position, up), faces, named, source)
+    except UserError as error:
+        for other in AXES:
+            if other == up:
+                continue
+            try:
+                _hanging(turned(position, other), faces, named, source)
+            except UserError:
+                continue
+            raise UserError(
+                source, error.key, f"{error.message}; with garment.mesh.up: {other} it would fit"
+            ) from error
+        raise
+
+
+def labelled(
+    position: FloatArray,
+    faces: IntArray,
+    loops: Mapping[str, IntArray],
+    grasp: Mapping[str, IntArray],
+) -> GarmentMesh:
+    """Returns the mesh with its regions named and its origin between the shoulder tips.
+
+    Args:
+        position: (n,3), m, in the canonical rest pose, at any place.
+        faces: (F,3) of a manifold.
+        loops: nodes around each opening of `LOOP_NAMES`.
+        grasp: nodes that a gripper holds; those of no gripper here are the ten nodes nearest to a
+            point 3.5 cm inward of the shoulder tip.
+    """
+    named = {name: ordered(position, loops[name]) for name in LOOP_NAMES}
+    region = np.zeros(len(position), dtype=np.int8)
+    for side in SIDES:
+        sleeve = beyond(faces, len(position), named[f"{side}_armhole"], named[f"{side}_cuff"])
+        region[sleeve] = REGION_NAMES.index(f"{side}_sleeve")
+    tips = np.stack([position[named[f"{side}_armhole"][0]] for side in SIDES])
+    inward = (tips[::-1] - tips) / max(float(np.linalg.norm(tips[0] - tips[1])), 1e-9)
+    held = dict(grasp)
+    for k, side in enumerate(SIDES):
+        if side not in held:
+            far = np.linalg.norm(position - (tips[k] + _GRASP_INSET * inward[k]), axis=1)
+            held[side] = np.argsort(far, kind="stable")[:_GRASP_COUNT].astype(np.int32)
+    return GarmentMesh(position - tips.mean(axis=0), faces, named, held, region)
+
+
+def _hanging(
+    position: FloatArray, faces: IntArray, named: Mapping[str, IntArray], source: str
+) -> dict[str, IntArray]:
+    loops = dict(named)
+    if not all(f"{side}_cuff" in loops for side in SIDES):
+        loops = {**find_cuffs(position, faces, source), **loops}
+    for side in SIDES:
+        name = f"{side}_armhole"
+        if name not in loops:
+            loops[name] = find_armhole(position, faces, loops[f"{side}_cuff"], source, name)
+    _check_hangs(position, faces, loops, source)
+    return loops
+
+
+def _check_hangs(
+    position: FloatArray, faces: IntArray, loops: Mapping[str, IntArray], source: str
+) -> None:
+    """Checks that the body hangs below the armholes."""
+    body = np.ones(len(position), dtype=bool)
+    for side in SIDES:
+        body &= ~beyond(faces, len(position), loops[f"{side}_armhole"], loops[f"{side}_cuff"])
+    corners = position[faces[body[faces].all(axis=1)]]
+    if len(corners) == 0:
+        return
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    middle = np.average(corners.mean(axis=1), axis=0, weights=area + 1e-15)
+    armholes = np.mean([position[loops[f"{side}_armhole"]].mean(axis=0) for side in SIDES], axis=0)
+    away = middle - armholes
+    if np.linalg.norm(away) > _TELLING and away[2] > -0.5 * np.linalg.norm(away):
+        k = int(np.argmax(np.abs(away)))
+        toward = (
+            ("forward", "to the left", "upward")
+            if away[k] > 0
+            else (
+                "backward",
+                "to the right",
+                "upward",
+            )
+        )
+        raise UserError(
+            source,
+            "up",
+            f"the body of the garment hangs {toward[k]} of the armholes, expected below them",
+        )

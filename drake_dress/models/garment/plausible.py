@@ -1,0 +1,102 @@
+"""Refuses meshes that are well formed and cannot be a garment.
+
+One missing or damaged line shifts all node numbers behind it, or moves a node: the file still
+reads as a mesh. Such meshes show by edges that cross the garment, by more surface than a garment
+of that size has, and by nodes far from all their neighbours. All measures are ratios, so that the
+unit of the file does not matter. Of sound garments (coats at 2 to 6 cm, five files of other
+people's) the longest edge reaches 0.15 of the diagonal, and the area 0.8 of its square.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drake_dress.errors import UserError
+from drake_dress.models.garment.edges import border_edges, unique_edges
+from drake_dress.models.garment.files.raw import FloatArray, RawMesh
+from drake_dress.models.garment.mesh import IntArray, face_areas
+
+_LONGEST = 0.35  # edge by the diagonal of the bounding box
+_LARGEST_AREA = 2.5  # area by the square of the diagonal: three layers of a garment
+# A node is off its surface if its shortest edge is this part of the diagonal, and if the faces
+# around it close up to a spike: the sum of their angles there, rad, or, for a node of the border,
+# the ratio of its edges to those that its neighbours share.
+_FAR = 0.03
+_SPIKE_ANGLE = 2.5
+_SPIKE_RATIO = 4.0
+
+_CAUSES = "are node numbers shifted by a missing line, or a coordinate damaged?"
+
+
+def check_plausible(mesh: RawMesh) -> None:
+    """Checks that edges, nodes and area can be those of a garment.
+
+    Args:
+        mesh: in m, without duplicate nodes.
+
+    Raises:
+        UserError: nodes far off their neighbours, edges across the garment, too much surface, or
+            faces without area.
+    """
+    x, faces = mesh.position, mesh.faces
+    diagonal = float(np.linalg.norm(np.ptp(x, axis=0)))
+    if not 0.0 < diagonal < np.inf:
+        raise UserError(mesh.source, "nodes", f"the mesh is {diagonal:g} wide, expected a garment")
+    edges = unique_edges(faces)
+    length = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
+    _check_spikes(mesh, edges, length, diagonal)
+    k = int(np.argmax(length))
+    if length[k] > _LONGEST * diagonal:
+        raise UserError(
+            mesh.source,
+            "faces",
+            f"an edge is {length[k]:.3g} m long in a garment with a diagonal of "
+            f"{diagonal:.3g} m, from {mesh.node(edges[k, 0])} to "
+            f"{mesh.node(edges[k, 1])}; half of all are below {np.median(length):.2g} m "
+            f"({_CAUSES})",
+        )
+    areas = face_areas(x, faces)
+    if areas.sum() > _LARGEST_AREA * diagonal**2:
+        raise UserError(
+            mesh.source,
+            "faces",
+            f"an area of {areas.sum():.3g} m² with a diagonal of "
+            f"{diagonal:.3g} m, expected {_LARGEST_AREA * diagonal**2:.2g} "
+            f"m² at most ({_CAUSES})",
+        )
+    flat = np.flatnonzero(areas < 1e-6 * np.mean(areas))
+    if len(flat):
+        raise UserError(
+            mesh.source, "faces", f"{len(flat)} without area, the first is {mesh.face(flat[0])}"
+        )
+
+
+def _check_spikes(mesh: RawMesh, edges: IntArray, length: FloatArray, diagonal: float) -> None:
+    x, faces, n = mesh.position, mesh.faces, len(mesh.position)
+    shortest = np.full(n, np.inf)
+    for end in edges.T:
+        np.minimum.at(shortest, end, length)
+    far = shortest > _FAR * diagonal
+    if not far.any():
+        return
+    angle, across, count = np.zeros(n), np.zeros(n), np.zeros(n)
+    for k in range(3):
+        at, b, c = (faces[:, (k + j) % 3] for j in range(3))
+        u, v = x[b] - x[at], x[c] - x[at]
+        size = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
+        cosine = np.clip((u * v).sum(axis=1) / np.maximum(size, 1e-300), -1.0, 1.0)
+        np.add.at(angle, at, np.arccos(cosine))
+        np.add.at(across, at, np.linalg.norm(u - v, axis=1))
+        np.add.at(count, at, 1.0)
+    across /= np.maximum(count, 1.0)
+    border = np.zeros(n, dtype=bool)
+    border[border_edges(faces, n)] = True
+    spike = far & np.where(border, shortest > _SPIKE_RATIO * across, angle < _SPIKE_ANGLE)
+    if spike.any():
+        i = int(np.argmax(np.where(spike, shortest, 0.0)))
+        raise UserError(
+            mesh.source,
+            "nodes",
+            f"{mesh.node(i)} is {shortest[i]:.3g} m off its nearest neighbour, where its "
+            f"neighbours are {across[i]:.2g} m apart ({_CAUSES})",
+        )

@@ -1,0 +1,93 @@
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_dress.diagrams import garment
+from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.scenario.schema import Garment, Mesh
+from drake_dress.errors import UserError
+from drake_dress.models.garment.coat import COATS, make_coat
+
+JACKET = make_coat(COATS["jacket"], 0.06)
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "dummy_standing.yaml"
+
+
+def write(path, y_up=False):
+    x = JACKET.rest_position[:, [1, 2, 0]] if y_up else JACKET.rest_position
+    lines = [f"v {a} {b} {c}" for a, b, c in x]
+    lines += [f"f {a} {b} {c}" for a, b, c in JACKET.faces + 1]
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture
+def reads(monkeypatch):
+    """Counts the files that are read."""
+    count = []
+
+    def counted(*args):
+        count.append(args[0])
+        return original(*args)
+
+    original = garment.read_garment
+    monkeypatch.setattr(garment, "read_garment", counted)
+    monkeypatch.setattr(garment, "_kept", type(garment._kept)())
+    return count
+
+
+def test_a_file_is_read_once_at_any_spacing_until_it_or_its_keys_change(tmp_path, reads):
+    path = tmp_path / "coat.obj"
+    write(path)
+    wanted = Garment(mesh=Mesh(file="coat.obj"))
+    first = garment.build_garment(wanted, 0.05, tmp_path)
+    garment.build_garment(wanted, 0.07, tmp_path)
+    again = garment.build_garment(wanted, 0.05, tmp_path)
+    assert len(reads) == 1
+    assert np.array_equal(first.rest_position, again.rest_position)
+    assert first.rest_position is not again.rest_position
+    garment.build_garment(Garment(mesh=Mesh(file="coat.obj", weld=1e-4)), 0.05, tmp_path)
+    assert len(reads) == 2
+    os.utime(path, ns=(1, 1))
+    garment.build_garment(wanted, 0.05, tmp_path)
+    assert len(reads) == 3
+
+
+def test_keys_of_a_mesh_reach_the_file(tmp_path, reads):
+    write(tmp_path / "coat.obj", y_up=True)
+    wanted = Garment(mesh=Mesh(file="coat.obj", up="y"))
+    mesh = garment.build_garment(wanted, 0.06, tmp_path)
+    assert np.allclose(
+        np.ptp(mesh.rest_position, axis=0), np.ptp(JACKET.rest_position, axis=0), atol=0.03
+    )
+    with pytest.raises(UserError, match="garment.mesh.up: y"):
+        garment.build_garment(Garment(mesh=Mesh(file="coat.obj")), 0.06, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("override", "reason"),
+    [
+        ("garment.mesh.up=w", "garment.mesh.up: is 'w', expected z or y"),
+        ("garment.mesh.weld=0.5", "garment.mesh.weld: is 0.5, expected 0 to 0.02"),
+        ("garment.mesh.weld=-1", "garment.mesh.weld: is -1"),
+        ("garment.mesh.leave_out=Button", "garment.mesh.leave_out: is 'Button', expected a list"),
+        ("garment.mesh.leave_out=[5]", r"garment.mesh.leave_out\[0\]: is 5, expected text"),
+    ],
+)
+def test_wrong_keys_are_told_by_the_scenario(override, reason):
+    with pytest.raises(UserError, match=reason):
+        load_scenario(SCENARIO, ["garment.mesh.file=coat.obj", override])
+
+
+def test_a_scenario_with_all_keys_loads():
+    scenario = load_scenario(
+        SCENARIO,
+        [
+            "garment.mesh.file=coat.obj",
+            "garment.mesh.up=-y",
+            "garment.mesh.weld=1e-4",
+            'garment.mesh.leave_out=[Button, "<0.05 m"]',
+        ],
+    )
+    assert scenario.garment.mesh.up == "-y"
+    assert scenario.garment.mesh.leave_out == ["Button", "<0.05 m"]
