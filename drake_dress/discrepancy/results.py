@@ -7,8 +7,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from drake_dress import __version__
 from drake_dress.diagrams.build import effects as effects_on
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
@@ -16,6 +14,7 @@ from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
+from drake_dress.yaml_text import read_yaml, write_yaml
 
 
 def as_json(
@@ -73,7 +72,7 @@ def as_json(
 
 def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Explanation) -> str:
     """Returns the scenario with what was found, as YAML that `drake-dress run` takes."""
-    content = yaml.safe_load(resolved_yaml(scenario))
+    content = read_yaml("scenario", resolved_yaml(scenario))
     found: dict[str, Any] = {}
     for effect in effects_on(scenario):
         found[effect.NAME] = effect.values()
@@ -95,7 +94,7 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
             tolerance=n.tolerance,
         )
     # what is not there is not written: the loader refuses empty groups
-    text = yaml.safe_dump(_without_none(content), sort_keys=False)
+    text = write_yaml(_without_none(content))
     head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
     return head + text
 
