@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
+from drake_dress.file_output import write_text
 from drake_dress.yaml_text import read_yaml, write_yaml
 
 
@@ -97,13 +97,6 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
     text = write_yaml(_without_none(content))
     head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
     return head + text
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a file so that it is whole or not there."""
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
