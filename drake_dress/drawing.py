@@ -10,8 +10,9 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,26 +23,30 @@ if TYPE_CHECKING:
 
 
 def load_matplotlib() -> None:
-    """Imports Matplotlib whatever `MPLBACKEND` says, which stays as it is for others."""
+    """Imports Matplotlib whatever `MPLBACKEND` says, which holds for others if it can."""
+    if "matplotlib" in sys.modules:
+        return
+    backend = os.environ.pop("MPLBACKEND", None)
     try:
-        importlib.import_module("matplotlib")
-    except ValueError:
-        backend = os.environ.pop("MPLBACKEND", None)
-        try:
-            importlib.import_module("matplotlib")
-        finally:
-            if backend is not None:
-                os.environ["MPLBACKEND"] = backend
+        matplotlib = importlib.import_module("matplotlib")
+    finally:
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+    if backend:
+        # As Matplotlib does at its import, where it fails for a backend that is not installed.
+        with suppress(Exception):
+            matplotlib.rcParams["backend"] = backend
 
 
 @contextmanager
 def plain_settings() -> Iterator[None]:
-    """Has Matplotlib's own settings hold meanwhile, not the user's."""
+    """Has Matplotlib's own settings hold meanwhile, not the user's; files are the same each time."""
     load_matplotlib()
     import matplotlib
 
     settings = {k: v for k, v in matplotlib.rcParamsDefault.items() if "backend" not in k}
-    with matplotlib.rc_context(settings):
+    # Names inside a file are drawn by chance otherwise.
+    with matplotlib.rc_context(settings | {"svg.hashsalt": "drake_dress"}):
         yield
 
 
@@ -57,7 +62,7 @@ def new_figure(width: float, height: float, **options: object) -> Figure:
 
 
 def as_svg(figure: Figure) -> bytes:
-    """Returns a figure as a file, the same whenever it is made."""
+    """Returns a figure as a file."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()

@@ -187,6 +187,8 @@ def _made(directory: Path) -> Iterator[None]:
     try:
         for folder in (*reversed(directory.parents), directory):
             if not folder.is_dir():
+                if folder.exists():
+                    raise NotADirectoryError(errno.ENOTDIR, f"{folder} is a file")
                 folder.mkdir()
                 made.append(folder)
         yield

@@ -59,6 +59,16 @@ def test_an_unusable_directory_is_told_with_its_option(name: str, place: Path) -
     assert tree(place) == before
 
 
+def test_why_is_told(place: Path) -> None:
+    for out, words in (
+        ("file/sub/deeper", "file is a file"),
+        ("nowhere", "leads nowhere"),
+        ("a" * 300, "name too long"),
+    ):
+        with pytest.raises(UserError, match=words):
+            prove_directory("--out", out, RUN_FILES)
+
+
 @pytest.mark.parametrize("file", ["file/a.json", "taken", "a" * 300, "", "/proc/x.json", "loop"])
 def test_an_unusable_file_is_told_with_its_option(file: str, place: Path) -> None:
     before = tree(place)

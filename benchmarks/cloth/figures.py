@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy.typing as npt
 
-from drake_dress.drawing import new_figure
+from drake_dress.drawing import new_figure, plain_settings
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Panel:
     equal: bool = False
 
 
+@plain_settings()
 def write_figure(file: Path, panels: Sequence[Panel]) -> None:
     """Writes panels side by side as a PNG."""
     figure = new_figure(5.6 * len(panels), 4.2)

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.dressing.cases import METHODS, SERIES_STEP
 from benchmarks.statistics import wilson
-from drake_dress.drawing import as_svg
+from drake_dress.drawing import as_svg, plain_settings
 from drake_dress.models.sides import SIDES
 from drake_dress.report.page import chart
 
@@ -67,6 +67,7 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     ]
 
 
+@plain_settings()
 def figure(results: Sequence[dict[str, Any]]) -> str:
     """Returns an SVG: s, l and force of both sleeves over time, medians and quartiles."""
     done = [r for r in results if "summary" in r]

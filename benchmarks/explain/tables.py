@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.statistics import wilson
 from drake_dress.discrepancy.explanation import DISCRETISATION
-from drake_dress.drawing import as_svg
+from drake_dress.drawing import as_svg, plain_settings
 from drake_dress.report.page import chart
 
 ASKED = {"effect": 90, "nothing": 95, "pair": 75, "coarse": 90, "outside": 100}
@@ -189,6 +189,7 @@ def _hidden_there(result: dict[str, Any], name: str) -> bool:
     )
 
 
+@plain_settings()
 def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
     """Returns an SVG: how often causes of a given confidence are right."""
     figure, (ax,) = chart(4.5, 4.0)

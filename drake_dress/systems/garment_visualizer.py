@@ -8,7 +8,7 @@ from pydrake.geometry import Box, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from drake_dress.drawing import new_figure, pixels
+from drake_dress.drawing import new_figure, pixels, plain_settings
 from drake_dress.models.sides import SIDES
 
 STAGE_NAMES = ("prepare", "dress", "done")
@@ -154,6 +154,7 @@ class DressingScene:
             self._meshcat.SetTransform(path, RigidTransform(p))
 
 
+@plain_settings()
 def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
     """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
     figure = new_figure(0.18 * len(text) + 0.4, 0.6, dpi=72)
