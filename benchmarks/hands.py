@@ -24,8 +24,8 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import opened
-from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.preparing import distance_aside
 from drake_dress.models.dressing.sight import distance_to_opening

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
 
 
 def read_results(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drake_dress.discrepancy.results import write_text
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
 
 END = "<!-- end -->"
 

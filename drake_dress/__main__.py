@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import errno
 import importlib
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,8 +13,23 @@ from typing import NoReturn
 import drake_dress
 from drake_dress import __version__
 from drake_dress.errors import UserError
+from drake_dress.file_output import (
+    DATASET_FILES,
+    EXPLAIN_FILES,
+    RUN_FILES,
+    prove_directory,
+    prove_file,
+)
+from drake_dress.interrupt import interrupt_of, signals_raised
+from drake_dress.libraries import check_libraries, import_problem
+from drake_dress.machine import worker_count
+from drake_dress.shipped import shipped_scenario
+from drake_dress.streams import forgiving_streams, keep_standard_descriptors
+from drake_dress.yaml_text import plain_value
 
-FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
+FAILED, UNUSABLE = 1, 2
+# Ports that a program may open without being root.
+_PORTS = 1024, 65535
 # By name, what each measures; the first is the default.
 BENCHMARKS = {
     "cloth": "accuracy and speed of the garment, beside other simulators where installed",
@@ -49,27 +62,47 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command line; returns the exit status."""
+    """Runs a command line; returns the exit status.
+
+    May be called any number of times in a process: handlers of signals, standard output and errors
+    are as before when it returns.
+    """
+    if arguments is None:
+        keep_standard_descriptors()
     words = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        if words[:1] == ["bench"]:
-            # A benchmark has options of its own.
-            return _bench(words[1:])
-        options = _parser().parse_args(words)
-        _check_libraries()
-        status: int = options.command(options)
-        return status
-    except UserError as error:
-        print(f"drake-dress: {error}", file=sys.stderr)
-        return UNUSABLE
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-            raise
-        print(f"drake-dress: {error.filename or 'disk'}: {error.strerror}", file=sys.stderr)
-        return FAILED
-    except KeyboardInterrupt:
-        print("drake-dress: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    with forgiving_streams(), signals_raised():
+        try:
+            return _status(words)
+        except UserError as error:
+            return _told(str(error), UNUSABLE)
+        except ImportError as error:
+            return _told(str(import_problem(error)), UNUSABLE)
+        except OSError as error:
+            reason = error.strerror or " ".join(str(error).split())
+            return _told(f"{error.filename or 'file system'}: {reason}", FAILED)
+        except MemoryError:
+            return _told("not enough memory", FAILED)
+        except KeyboardInterrupt as error:
+            interrupt = interrupt_of(error)
+            return _told(interrupt.word, interrupt.status)
+
+
+def _status(words: list[str]) -> int:
+    for word in words:
+        if "\0" in word:
+            raise UserError("command line", repr(word), "holds a NUL character, expected none")
+    if words[:1] == ["bench"]:
+        # A benchmark has options of its own.
+        return _bench(words[1:])
+    options = _parser().parse_args(words)
+    check_libraries()
+    status: int = options.command(options)
+    return status
+
+
+def _told(line: str, status: int) -> int:
+    print(f"drake-dress: {line}", file=sys.stderr)
+    return status
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -92,7 +125,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="change a value of the scenario by its dotted key; may be given again",
     )
-    run.add_argument("--seed", type=int, metavar="N", help="in place of the scenario's seed")
+    run.add_argument("--seed", type=_seed, metavar="N", help="in place of the scenario's seed")
     run.add_argument(
         "--meshcat",
         action=argparse.BooleanOptionalAction,
@@ -121,7 +154,7 @@ def _parser() -> argparse.ArgumentParser:
     lab.add_argument("scenario", metavar="SCENARIO.yaml")
     lab.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>-lab")
     lab.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
-    lab.add_argument("--seed", type=int, metavar="N", help="in place of the scenario's seed")
+    lab.add_argument("--seed", type=_seed, metavar="N", help="in place of the scenario's seed")
     lab.add_argument(
         "--realtime-rate",
         type=_rate,
@@ -138,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument(
         "directory", metavar="DIR", nargs="?", help="with poses.csv (image,q1,…,q7) and pictures"
     )
-    calibrate.add_argument("--scenario", metavar="SCENARIO.yaml", default="scenarios/lab.yaml")
+    calibrate.add_argument(
+        "--scenario", metavar="SCENARIO.yaml", help="default: lab.yaml of the program's own"
+    )
     calibrate.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     calibrate.add_argument(
         "--side", choices=("left", "right"), default="left", help="arm that holds the board"
@@ -158,7 +193,7 @@ def _parser() -> argparse.ArgumentParser:
 
     replay = verbs.add_parser("replay", help="show a log in Meshcat, with a slider")
     replay.add_argument("log", metavar="run.h5")
-    replay.add_argument("--port", type=int, metavar="PORT", help="default: a free one")
+    replay.add_argument("--port", type=_port, metavar="PORT", help="default: a free one")
     replay.set_defaults(command=_replay)
 
     explain = verbs.add_parser(
@@ -182,9 +217,11 @@ def _parser() -> argparse.ArgumentParser:
         help="sway, lift, drag, shift, pull, drop, dress; default: all but shift and drop",
     )
     hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
-    hidden.add_argument("--seed", type=int, default=0, metavar="N")
+    hidden.add_argument("--seed", type=_seed, default=0, metavar="N")
     hidden.add_argument("--out", metavar="DIR", required=True)
-    hidden.add_argument("--scenario", metavar="SCENARIO.yaml", default="scenarios/measured.yaml")
+    hidden.add_argument(
+        "--scenario", metavar="SCENARIO.yaml", help="default: measured.yaml of the program's own"
+    )
     hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     hidden.add_argument("--size", type=_rate, default=1.0, help="of the effect; default 1")
     hidden.add_argument(
@@ -209,20 +246,22 @@ def _add_report(verb: argparse.ArgumentParser) -> None:
 
 
 def _calibrate(options: argparse.Namespace) -> int:
-    from drake_dress.diagrams.calibration import calibrate_camera, parse_board, write_board
+    from drake_dress.diagrams.calibration import POSES, calibrate_camera, parse_board, write_board
     from drake_dress.diagrams.scenario import load_scenario
 
     board = parse_board(options.board)
     if options.print_board is not None:
-        write_board(board, Path(options.print_board))
+        write_board(board, prove_file("--print-board", options.print_board))
         return 0
     if options.directory is None:
         raise UserError("calibrate", "", "expected DIR, or --print-board FILE.png")
-    directory, source = Path(options.directory), Path(options.scenario)
-    if not directory.is_dir():
+    directory = Path(options.directory)
+    source = shipped_scenario("lab") if options.scenario is None else Path(options.scenario)
+    if not os.path.isdir(directory):
         raise UserError(str(directory), "", "no such directory, expected one with poses.csv")
-    out = Path(options.out) if options.out else directory / "calibration.json"
     scenario = load_scenario(source, options.set)
+    out = directory / "calibration.json" if options.out is None else options.out
+    out = prove_file("--out", out, [source, directory / POSES])
     calibrate_camera(directory, scenario, source, options.side, board, options.camera, out)
     return 0
 
@@ -233,7 +272,8 @@ def _sim_station(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(options.scenario, options.set, options.seed)
     source = Path(options.scenario)
-    out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}-lab")
+    default = Path("out") / f"{source.stem}-seed{scenario.seed}-lab"
+    out = _directory(options.out, default, RUN_FILES, [source])
     return run_lab(scenario, source, out, options.realtime_rate, options.report)
 
 
@@ -243,8 +283,9 @@ def _run(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(options.scenario, options.set, options.seed)
     source = Path(options.scenario)
-    out = _directory(options.out or Path("out") / f"{source.stem}-seed{scenario.seed}")
-    beside = not options.one_process and (os.cpu_count() or 1) > 1
+    default = Path("out") / f"{source.stem}-seed{scenario.seed}"
+    out = _directory(options.out, default, RUN_FILES, [source])
+    beside = not options.one_process and worker_count() > 1
     return run_scenario(
         scenario, source, out, options.meshcat, options.realtime_rate, beside, options.report
     )
@@ -259,7 +300,9 @@ def _replay(options: argparse.Namespace) -> int:
 def _explain(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.commands import explain_files
 
-    out = _directory(options.out or Path("out") / f"explain-{Path(options.measured[0]).stem}")
+    default = Path("out") / f"explain-{Path(options.measured[0]).stem}"
+    inputs = [*options.measured, options.scenario]
+    out = _directory(options.out, default, EXPLAIN_FILES, inputs)
     explain_files(options.measured, options.scenario, options.set, out, options.workers)
     return 0
 
@@ -269,13 +312,14 @@ def _dataset_measured(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.generate import Sensors
     from drake_dress.discrepancy.motions import USUAL
 
-    out = _directory(options.out)
+    scenario = options.scenario or shipped_scenario("measured")
+    out = _directory(options.out, Path(), DATASET_FILES, [scenario])
     sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
     write_dataset(
         options.hide,
         options.seed,
         out,
-        options.scenario,
+        str(scenario),
         options.set,
         options.size,
         sensors,
@@ -304,47 +348,57 @@ def _bench(words: list[str]) -> int:
     return status
 
 
-def _directory(out: str | Path) -> Path:
-    """Returns where to write; it need not be there yet."""
-    out = Path(out)
-    if out.exists() and not out.is_dir():
-        raise UserError("--out", "", f"{out} is a file, expected a directory")
-    return out
+def _directory(
+    out: str | None, default: Path, names: Sequence[str], inputs: Sequence[str | Path]
+) -> Path:
+    """Returns where to write, once it has proved writable; it need not be there yet."""
+    return prove_directory("--out", default if out is None else out, names, inputs)
+
+
+def _number(text: str) -> int | float:
+    """Returns a number, which is read as a scenario's are."""
+    try:
+        value = plain_value(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
 
 
 def _rate(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    value = float(_number(text))
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
     return value
 
 
+def _whole(text: str) -> int:
+    value = _number(text)
+    if not isinstance(value, int):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return value
+
+
 def _count(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+    value = _whole(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected 1 or more")
     return value
 
 
-def _check_libraries() -> None:
-    """Tells in one line when a system library that Drake loads is missing."""
-    try:
-        importlib.import_module("pydrake.common")
-    except ImportError as error:
-        missing = re.search(r"(lib[\w.+-]+\.so[\d.]*)", str(error))
-        name = missing.group(1) if missing else str(error)
-        raise UserError(
-            "pydrake",
-            "",
-            f"cannot be loaded: {name} is missing, expected the system libraries that the README "
-            "names",
-        ) from error
+def _seed(text: str) -> int:
+    value = _whole(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
+    return value
+
+
+def _port(text: str) -> int:
+    value, (least, most) = _whole(text), _PORTS
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f"{text} is out of range, expected {least} to {most}")
+    return value
 
 
 if __name__ == "__main__":

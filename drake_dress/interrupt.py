@@ -1,33 +1,116 @@
-"""Ctrl-C as a flag, so that a loop ends between two steps and nothing is lost."""
+"""Signals that end a command, as a flag: a loop ends between two steps and nothing is lost.
+
+Ctrl-C (SIGINT), SIGTERM (from `kill`, a cluster or a container that ends a job) and SIGHUP (a
+terminal that closes) are treated alike. The exit status is 128 plus the signal's number, as shells
+have it.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM or SIGHUP came where nothing catches it."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+class Interrupt(threading.Event):
+    """Is set by the first signal that ends a command.
+
+    Attributes:
+        number: of that signal; SIGINT while none came.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.number: int = signal.SIGINT
+
+    @property
+    def status(self) -> int:
+        """Exit status of a command that the signal ended."""
+        return 128 + self.number
+
+    @property
+    def word(self) -> str:
+        """What the signal did, for the user."""
+        return _WORDS[signal.Signals(self.number)]
+
+    def error(self) -> KeyboardInterrupt:
+        """Returns the exception that the signal raises where nothing catches it."""
+        return KeyboardInterrupt() if self.number == signal.SIGINT else Terminated(self.number)
+
+
+def interrupt_of(error: KeyboardInterrupt) -> Interrupt:
+    """Returns what an exception tells of the signal that raised it."""
+    interrupt = Interrupt()
+    interrupt.number = error.number if isinstance(error, Terminated) else signal.SIGINT
+    return interrupt
 
 
 @contextmanager
-def caught_interrupt() -> Iterator[threading.Event]:
-    """Yields an event that the first Ctrl-C sets; a second one interrupts as usual.
+def caught_interrupt() -> Iterator[Interrupt]:
+    """Yields an event that the first signal sets; a second one interrupts as usual.
 
     Python raises KeyboardInterrupt wherever it happens to be, which may be a callback whose
     exceptions are swallowed; a loop that looks at the event cannot miss it. Off the main thread,
-    where no handler can be set, the event stays unset.
+    where no handler can be set, the event stays unset. Signals that are ignored, such as SIGHUP
+    under nohup, stay so.
     """
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-    usual = signal.getsignal(signal.SIGINT)
+    event = Interrupt()
 
-    def on_interrupt(_number: int, _frame: object) -> None:
+    def on_signal(number: int, _frame: object) -> None:
+        event.number = number
         event.set()
-        signal.signal(signal.SIGINT, usual)
+        restore()
 
-    signal.signal(signal.SIGINT, on_interrupt)
-    try:
+    with _handled(on_signal) as restore:
         yield event
+
+
+@contextmanager
+def signals_raised() -> Iterator[None]:
+    """Has SIGTERM and SIGHUP raise an exception, as SIGINT does, so that files are closed."""
+
+    def on_signal(number: int, _frame: object) -> None:
+        raise Terminated(number)
+
+    with _handled(on_signal, _ENDING[1:]):
+        yield
+
+
+@contextmanager
+def _handled(
+    handler: Callable[[int, Any], None], numbers: tuple[signal.Signals, ...] = _ENDING
+) -> Iterator[Callable[[], None]]:
+    """Sets a handler; yields what gives the former ones back, which the end does at the latest."""
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: None
+        return
+    usual = {
+        number: found
+        for number in numbers
+        if (found := signal.getsignal(number)) is not None
+        and (found is not signal.SIG_IGN or number == signal.SIGINT)
+    }
+
+    def restore() -> None:
+        for number, former in usual.items():
+            signal.signal(number, former)
+
+    for number in usual:
+        signal.signal(number, handler)
+    try:
+        yield restore
     finally:
-        signal.signal(signal.SIGINT, usual)
+        restore()

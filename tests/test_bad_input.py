@@ -1,10 +1,12 @@
 """What cannot be used is told in one line, with status 2, and leaves nothing behind."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from drake_dress.__main__ import main
+from drake_dress.diagrams.scenario import load_scenario
 
 # scenario text, then words that the line must hold
 BAD_YAML = {
@@ -169,6 +171,18 @@ BAD_YAML = {
     ),
     "coat measure out of range": ("garment: {coat: {chest: 9}}", ["chest"]),
     "missing mesh": ("garment: {mesh: {file: nowhere.obj}}", ["nowhere.obj"]),
+    "key that stands twice": (
+        "plant: {spacing: 0.05}\nseed: 1\nplant: {time_step: 0.01}",
+        ["plant", "stands twice, lines 1 and 3"],
+    ),
+    "octal or decimal": ("seed: 010", ["seed", "line 1", "8 or 10"]),
+    "sixties": ("duration: 1:30", ["duration", "line 1", "90"]),
+    "yes for true": ("plant: {self_collision: yes}", ["plant.self_collision", "line 1", "true"]),
+    "quoted number": ("duration: '3'", ["duration", "'3'", "number"]),
+    "seed too large": (f"seed: {2**70}", ["seed", "line 1", "64 bits"]),
+    "beyond all numbers": ("duration: 1e400", ["duration", "line 1", "1e400"]),
+    "too deep": ("a: " + 1000 * "[", ["line 1", "deeper"]),
+    "two documents": ("seed: 1\n---\nseed: 2", ["line 2", "second document"]),
     "unknown unit": ("garment: {mesh: {file: a.obj, unit: inch}}", ["garment.mesh.unit", "mm"]),
     "loop of words": (
         "garment: {mesh: {file: a.obj, loops: {left_cuff: [a]}}}",
@@ -216,6 +230,10 @@ def test_bad_scenario(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["run", "S", "--set", "plant.spacng=0.02"], ["plant.spacng", "spacing"]),
         (["run", "S", "--set", "plant.spacing=wide"], ["plant.spacing", "number"]),
         (["run", "S", "--set", "seed.more=1"], ["seed.more"]),
+        (["run", "S", "--set", "seed=010"], ["--set", "seed", "8 or 10"]),
+        (["run", "S", "--set", "plant={spacing: 0.05, spacing: 0.03}"], ["plant", "twice"]),
+        (["run", "S", "--set", "plant.self_collision=on"], ["plant.self_collision", "true"]),
+        (["run", "S", "--set", "plant.spacing=[1"], ["--set", "plant.spacing", "YAML"]),
         (["run", "S", "--seed", "x"], ["--seed"]),
         (["run", "S", "--realtime-rate", "-1"], ["--realtime-rate"]),
         (["replay", "no.h5"], ["no.h5"]),
@@ -232,6 +250,40 @@ def test_bad_command_line(
     line = refused(capsys, [str(path) if a == "S" else a for a in arguments])
     for word in words:
         assert word in line, line
+
+
+UNREADABLE = {
+    "UTF-16": ("seed: 0".encode("utf-16"), "UTF-16"),
+    "Latin-1": ("# größe\nseed: 0".encode("latin-1"), "line 1"),
+    "NUL": (b"seed: 0\n\0\n", "NUL"),
+    "huge": (b"#" * (5 << 20), "larger than 4 MB"),
+}
+
+
+@pytest.mark.parametrize("name", UNREADABLE)
+def test_what_is_no_text_is_no_scenario(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, words = UNREADABLE[name]
+    path = tmp_path / "scenario.yaml"
+    path.write_bytes(data)
+    assert words in refused(capsys, ["run", str(path)])
+
+
+def test_what_is_no_regular_file_is_told_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipe = tmp_path / "pipe.yaml"
+    os.mkfifo(pipe)
+    for path in (str(pipe), "/dev/zero", "/dev/null"):
+        assert "no regular file" in refused(capsys, ["run", path])
+    assert "cannot be read" in refused(capsys, ["run", str(tmp_path / ("a" * 300))])
+
+
+def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_bytes(b"\xef\xbb\xbfseed: 3\n")
+    assert load_scenario(path).seed == 3
 
 
 def test_binary_file_is_no_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,6 +27,7 @@ from benchmarks.cloth.peers import mujoco_flex, newton_style3d, newton_vbd
 from benchmarks.cloth.reference import STIFF_FROM, Reference, fine_reference
 from benchmarks.cloth.scene import Scene
 from benchmarks.cloth.table import Table, milliseconds
+from drake_dress.drawing import load_matplotlib
 
 Result = dict[str, Any]
 
@@ -333,6 +334,7 @@ _MAPS = ("Blues", "Purples", "Greens", "Reds", "Oranges", "Greys")
 
 def steps_panels(result: Result) -> list[Panel]:
     """Returns the paper's pair of plots: distance over time, cost of a simulated second."""
+    load_matplotlib()
     from matplotlib import colormaps
 
     engines = list(dict.fromkeys(run["engine"] for run in result["runs"]))

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy.typing as npt
 
+from drake_dress.drawing import new_figure, plain_settings
+
 
 @dataclass(frozen=True)
 class Line:
@@ -33,14 +35,11 @@ class Panel:
     equal: bool = False
 
 
+@plain_settings()
 def write_figure(file: Path, panels: Sequence[Panel]) -> None:
     """Writes panels side by side as a PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, len(panels), figsize=(5.6 * len(panels), 4.2), squeeze=False)
+    figure = new_figure(5.6 * len(panels), 4.2)
+    axes = figure.subplots(1, len(panels), squeeze=False)
     for axis, panel in zip(axes[0], panels, strict=True):
         for line in panel.lines:
             axis.plot(
@@ -65,4 +64,3 @@ def write_figure(file: Path, panels: Sequence[Panel]) -> None:
     figure.tight_layout()
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=130)
-    plt.close(figure)

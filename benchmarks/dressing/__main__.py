@@ -15,7 +15,7 @@ from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import seed_range
 from benchmarks.parser import OneLineParser, exit_with
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
-from drake_dress.discrepancy.results import write_text
+from drake_dress.file_output import write_text
 
 _NAME = "dressing"
 

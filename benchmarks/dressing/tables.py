@@ -10,8 +10,9 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.dressing.cases import METHODS, SERIES_STEP
 from benchmarks.statistics import wilson
+from drake_dress.drawing import as_svg, plain_settings
 from drake_dress.models.sides import SIDES
-from drake_dress.report.page import chart, svg
+from drake_dress.report.page import chart
 
 _COLOURS = {"full": "#0b7a5e", "global": "#2a5db0", "local": "#b0562a"}
 _WHAT = (("s", "s"), ("l", "l, m"), ("force", "gripper force, N"))
@@ -66,6 +67,7 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     ]
 
 
+@plain_settings()
 def figure(results: Sequence[dict[str, Any]]) -> str:
     """Returns an SVG: s, l and force of both sleeves over time, medians and quartiles."""
     done = [r for r in results if "summary" in r]
@@ -82,7 +84,7 @@ def figure(results: Sequence[dict[str, Any]]) -> str:
         ax.set_ylabel(f"{side}\n{label}", fontsize=8)
     axes[0].legend(fontsize=8, ncols=3, frameon=False)
     axes[-1].set_xlabel("s")
-    return svg(drawing).decode("utf-8")
+    return as_svg(drawing).decode("utf-8")
 
 
 def _bands(series: Iterable[dict[str, Any]], name: str):  # type: ignore[no-untyped-def]

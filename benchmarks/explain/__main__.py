@@ -26,7 +26,8 @@ from benchmarks.section import END, around, begin, write_between
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
-from drake_dress.discrepancy.results import write_json, write_text
+from drake_dress.discrepancy.results import write_json
+from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.effects.effect import Effect
 

@@ -11,7 +11,8 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.statistics import wilson
 from drake_dress.discrepancy.explanation import DISCRETISATION
-from drake_dress.report.page import chart, svg
+from drake_dress.drawing import as_svg, plain_settings
+from drake_dress.report.page import chart
 
 ASKED = {"effect": 90, "nothing": 95, "pair": 75, "coarse": 90, "outside": 100}
 _CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
@@ -188,6 +189,7 @@ def _hidden_there(result: dict[str, Any], name: str) -> bool:
     )
 
 
+@plain_settings()
 def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
     """Returns an SVG: how often causes of a given confidence are right."""
     figure, (ax,) = chart(4.5, 4.0)
@@ -203,4 +205,4 @@ def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
         ax.annotate(str(count), (at, share), (5, -10), textcoords="offset points", fontsize=8)
     ax.set_xlabel("confidence given")
     ax.set_ylabel("share that is right")
-    return svg(figure).decode("utf-8")
+    return as_svg(figure).decode("utf-8")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from rich.table import Table
 from drake_dress.diagrams.build import placement
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_bytes, write_text
 from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.perception.charuco import (
     LEAST_CORNERS,
@@ -30,6 +33,7 @@ from drake_dress.models.perception.charuco import (
     find_intrinsics,
 )
 from drake_dress.models.sides import Side
+from drake_dress.text_file import read_text
 
 POSES = "poses.csv"
 _HEADER = ["image", *(f"q{i}" for i in range(1, 8))]
@@ -68,7 +72,9 @@ def calibrate_camera(
     names: list[str] = []
     size = (0, 0)
     for name, q in rows:
-        image = cv2.imread(str(directory / name))
+        picture = directory / name
+        # OpenCV would wait for a pipe without a writer.
+        image = cv2.imread(str(picture)) if os.path.isfile(picture) else None
         if image is None:
             raise UserError(str(directory / name), "", "is no readable picture")
         if size != (0, 0) and (image.shape[1], image.shape[0]) != size:
@@ -90,8 +96,7 @@ def calibrate_camera(
     except CalibrationError as error:
         hint = f"; {len(rows) - len(seen)} of {len(rows)} show fewer than {LEAST_CORNERS} corners"
         raise UserError(str(directory), "", f"{error}{hint}") from error
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(_written(found, names, size), indent=2) + "\n", encoding="utf-8")
+    write_text(out, json.dumps(_written(found, names, size), indent=2) + "\n")
     _tell(found, names, len(rows))
     print(f"calibration: {out}")
 
@@ -106,13 +111,13 @@ def write_board(board: Board, path: Path) -> None:
         picture = board.picture(round(board.square / 0.0254 * 600))
     except CalibrationError as error:
         raise UserError("--board", "", str(error)) from error
-    path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        written = cv2.imwrite(str(path), picture)
+        made, data = cv2.imencode(path.suffix, picture)
     except cv2.error:
-        written = False
-    if not written:
+        made = False
+    if not made:
         raise UserError(str(path), "", "cannot be written as a picture, expected a .png")
+    write_bytes(path, data.tobytes())
     print(f"board: {path}, to print at 600 dpi; a square is {1e3 * board.square:g} mm")
 
 
@@ -140,14 +145,10 @@ def parse_board(text: str) -> Board:
 
 
 def _poses(path: Path) -> list[tuple[str, np.ndarray]]:
+    text = read_text(path, f"a table {','.join(_HEADER)}")
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-    except FileNotFoundError:
-        raise UserError(
-            str(path), "", f"no such file, expected a table {','.join(_HEADER)}"
-        ) from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
         raise UserError(str(path), "", f"cannot be read as CSV: {error}") from error
     if not lines or [word.strip() for word in lines[0]] != _HEADER:
         raise UserError(str(path), "line 1", f"expected {','.join(_HEADER)}")

@@ -29,12 +29,13 @@ from drake_dress.diagrams.assemble import garments
 from drake_dress.diagrams.build import cameras as station_cameras
 from drake_dress.diagrams.build import links, plant_station, station_parameters
 from drake_dress.diagrams.hardware_station import NoBusError, control_modes, open_bus
-from drake_dress.diagrams.run import DONE, INTERRUPTED, NOT_DRESSED, conclude
+from drake_dress.diagrams.run import NOT_DRESSED, concluded
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
 from drake_dress.diagrams.station import ARM_STATUS, SimulatedStation
 from drake_dress.diagrams.studio import Studio, add_picture_messages
 from drake_dress.errors import UserError
-from drake_dress.interrupt import caught_interrupt
+from drake_dress.file_output import RUN_FILES, claimed, remove_results
+from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -113,30 +114,27 @@ def run_lab(
     take = None
     if scenario.station.cameras:
         take = Apart(Studio(station_parameters(scenario, meshes.plant))).submit
-    out.mkdir(parents=True, exist_ok=True)
-    with RunLogWriter(
-        out / "run.h5",
-        garment=meshes.plant,
-        scenario_text=resolved_yaml(scenario),
-        version=__version__,
-        seed=scenario.seed,
-        radius=station.person.radius,
-        capsule_radius=[c.radius for c in station.person.capsules],
-        estimate_garment=meshes.belief,
-        bases=arm_bases(station.robots),
-    ) as writer:
-        lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
-        heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer)
-    if not heard:
-        (out / "run.h5").unlink()
-        print("interrupted" if ended is None else f"no run: {ended}")
-        return INTERRUPTED if ended is None else NOT_DRESSED
-    success, reason = conclude(out, wall_time, report)
-    if ended is None:
-        print("interrupted: what had run is in the log")
-        return INTERRUPTED
-    print("both sleeves on" if success else f"not dressed: {reason}")
-    return DONE if success else NOT_DRESSED
+    with claimed("--out", out):
+        with RunLogWriter(
+            out / RUN_FILES[0],
+            garment=meshes.plant,
+            scenario_text=resolved_yaml(scenario),
+            version=__version__,
+            seed=scenario.seed,
+            radius=station.person.radius,
+            capsule_radius=[c.radius for c in station.person.capsules],
+            estimate_garment=meshes.belief,
+            bases=arm_bases(station.robots),
+        ) as writer:
+            remove_results(out, RUN_FILES[1:])
+            lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
+            heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer)
+        interrupt = ended if isinstance(ended, Interrupt) else None
+        if not heard:
+            remove_results(out, RUN_FILES[:1])
+            print(f"no run: {ended}" if interrupt is None else interrupt.word)
+            return NOT_DRESSED if interrupt is None else interrupt.status
+        return concluded(out, wall_time, report, interrupt)
 
 
 def make_lab(
@@ -345,11 +343,11 @@ def _record(
 
 def _play(
     lab: Lab, scenario: Scenario, realtime_rate: float, writer: RunLogWriter
-) -> tuple[bool, str | None, float]:
+) -> tuple[bool, str | Interrupt, float]:
     """Runs until commands have ended.
 
-    Returns whether there were any, why it ended, None if the user interrupted, and how long the
-    run took, s.
+    Returns whether there were any, why it ended or the signal that ended it, and how long the run
+    took, s.
     """
     simulator = Simulator(lab.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
@@ -396,7 +394,7 @@ def _play(
                 ended = "commands ended"
     writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
     wall = 0.0 if begun_at is None else clock.perf_counter() - begun_at
-    return begun_at is not None, ended, wall
+    return begun_at is not None, interrupt if ended is None else ended, wall
 
 
 def _command_check(mode: int) -> Check:

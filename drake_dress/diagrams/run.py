@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -27,16 +28,18 @@ from drake_dress.diagrams.hardware_station import (
 from drake_dress.diagrams.pace import SteadyPace
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
 from drake_dress.errors import UserError
-from drake_dress.interrupt import caught_interrupt
+from drake_dress.file_output import RUN_FILES, claimed, remove_results
+from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_writer import RunLogWriter
-from drake_dress.report.measures import measure
+from drake_dress.report.measures import Measures, measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import summarize, write_summary
+from drake_dress.report.web_page import open_page
 from drake_dress.systems.command_meter import process_age
 
-DONE, NOT_DRESSED, INTERRUPTED = 0, 1, 130
+DONE, NOT_DRESSED = 0, 1
 # Simulated time between looks at the stages, s, and for which both sleeves must stay done.
 _CHUNK = 0.1
 _STAY = 1.0
@@ -53,6 +56,8 @@ def run_scenario(
 ) -> int:
     """Runs a scenario and writes log, summary, report and replay; returns the exit status.
 
+    What an earlier run left in `out` is removed. A signal ends the run; what had run is in the log.
+
     Args:
         scenario: loaded and validated; its variation is drawn here from its seed.
         source: the scenario's file, for messages and paths relative to it.
@@ -66,7 +71,7 @@ def run_scenario(
 
     Raises:
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
-            hardware is silent, or not where the run begins.
+            hardware is silent, or not where the run begins; or another run writes to `out`.
     """
     scenario = apply_variation(scenario)
     meshes, limits = garments(scenario, source)
@@ -75,31 +80,26 @@ def run_scenario(
     if isinstance(p.station, HardwareStation):
         realtime_rate = realtime_rate or 1.0
 
-    begin = clock.perf_counter()
-    out.mkdir(parents=True, exist_ok=True)
-    with RunLogWriter(
-        out / "run.h5",
-        garment=p.garments.plant,
-        scenario_text=resolved_yaml(scenario),
-        version=__version__,
-        seed=scenario.seed,
-        radius=p.station.person.radius,
-        capsule_radius=[c.radius for c in p.station.person.capsules],
-        estimate_garment=p.garments.belief,
-        bases=arm_bases(p.station.robots),
-        estimated=isinstance(p.station, HardwareStation),
-    ) as writer:
-        dressing = wired(p, writer)
-        ending = _simulate(dressing, scenario.duration, realtime_rate)
-        _note(dressing, ending, writer)
-    wall_time = clock.perf_counter() - begin
-
-    success, reason = conclude(out, wall_time, report)
-    if ending.interrupted:
-        print("interrupted: what had run is in the log")
-        return INTERRUPTED
-    print("both sleeves on" if success else f"not dressed: {reason}")
-    return DONE if success else NOT_DRESSED
+    with claimed("--out", out):
+        begin = clock.perf_counter()
+        with RunLogWriter(
+            out / RUN_FILES[0],
+            garment=p.garments.plant,
+            scenario_text=resolved_yaml(scenario),
+            version=__version__,
+            seed=scenario.seed,
+            radius=p.station.person.radius,
+            capsule_radius=[c.radius for c in p.station.person.capsules],
+            estimate_garment=p.garments.belief,
+            bases=arm_bases(p.station.robots),
+            estimated=isinstance(p.station, HardwareStation),
+        ) as writer:
+            remove_results(out, RUN_FILES[1:])
+            dressing = wired(p, writer)
+            ending = _simulate(dressing, scenario.duration, realtime_rate)
+            _note(dressing, ending, writer)
+        wall_time = clock.perf_counter() - begin
+        return concluded(out, wall_time, report, ending.interrupt)
 
 
 def _parts(
@@ -126,7 +126,7 @@ def _parts(
                 interrupt.is_set,
             )
         if interrupt.is_set():
-            raise KeyboardInterrupt
+            raise interrupt.error()
         return p
     except ArmReachError as error:
         raise UserError(str(source), arms, str(error)) from error
@@ -134,7 +134,7 @@ def _parts(
         raise UserError(str(source), f"{hardware}.lcm_url", str(error)) from error
     except (StationSilentError, NotAtStartError) as error:
         if isinstance(error, StationSilentError) and interrupt.is_set():
-            raise KeyboardInterrupt from None
+            raise interrupt.error() from None
         raise UserError(str(source), hardware, str(error)) from error
 
 
@@ -155,21 +155,25 @@ def _note(dressing: Dressing, ending: Ending, writer: RunLogWriter) -> None:
         writer.note("ended_by", ending.fault)
 
 
-def _open_meshcat() -> Meshcat:
-    """Returns a page that listens on localhost only, and says where."""
-    page = Meshcat(MeshcatParams(host="localhost"))
+def _open_meshcat() -> Meshcat | None:
+    """Returns a page that listens on localhost only, and says where; None where none can be."""
+    try:
+        page = open_page()
+    except UserError as error:
+        print(f"no live page: {error.message}; the run goes on without", file=sys.stderr)
+        return None
     print(f"live: {page.web_url()}", flush=True)
     return page
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Why a run ended before its time: the user interrupted, or the station had a fault.
+    """Why a run ended before its time: a signal came, or the station had a fault.
 
     `behind` is real time, s, by which a run on hardware fell behind the rate that was asked for.
     """
 
-    interrupted: bool = False
+    interrupt: Interrupt | None = None
     fault: str | None = None
     behind: float = 0.0
 
@@ -178,10 +182,10 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
     """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
     simulator = Simulator(dressing.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
-    if isinstance(dressing.station, HardwareStation) and not _made_ready(
-        dressing, dressing.station
-    ):
-        return Ending(interrupted=True)
+    if isinstance(dressing.station, HardwareStation):
+        early = _made_ready(dressing, dressing.station)
+        if early is not None:
+            return Ending(early)
     simulator.Initialize()
     hardware = isinstance(dressing.station, HardwareStation)
     pace = SteadyPace(simulator) if hardware else None
@@ -223,17 +227,18 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
             done_since = min(done_since, now) if is_finished(stage) else np.inf
             if now - done_since >= _STAY:
                 break
-        return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
+        ended = interrupt if interrupt.is_set() else None
+        return Ending(ended, fault, 0.0 if pace is None else pace.lost)
 
 
-def _made_ready(dressing: Dressing, station: HardwareStation) -> bool:
-    """Has controllers solve once and takes what comes meanwhile; returns whether to go on."""
+def _made_ready(dressing: Dressing, station: HardwareStation) -> Interrupt | None:
+    """Has controllers solve once and takes what comes meanwhile; returns a signal that came."""
     with caught_interrupt() as interrupt:
         print("rehearsing: each controller solves once", flush=True)
         garment, joints = station.heard.garment, station.heard.person
         dressing.rehearse(garment, joints, interrupt.is_set)
         station.catch_up()
-        return not interrupt.is_set()
+        return interrupt if interrupt.is_set() else None
 
 
 def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
@@ -244,21 +249,59 @@ def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
     return watch.conclusion(watch.GetMyContextFromRoot(simulator.get_context()))
 
 
+def concluded(out: Path, wall_time: float, report: bool, interrupt: Interrupt | None) -> int:
+    """Writes what `conclude` does, tells how the run ended; returns the exit status.
+
+    Args:
+        out: directory of the run.
+        wall_time: that it took, s.
+        report: whether report and replay are written.
+        interrupt: the signal that ended it, if one did.
+    """
+    success, reason = conclude(out, wall_time, report)
+    if interrupt is not None:
+        print(f"{interrupt.word}: what had run is in the log")
+        return interrupt.status
+    print("both sleeves on" if success else f"not dressed: {reason}")
+    return DONE if success else NOT_DRESSED
+
+
 def conclude(out: Path, wall_time: float, report: bool = True) -> tuple[bool, str | None]:
     """Writes the summary of the log in `out`, and report and replay if they are wanted.
+
+    Each is written by itself: one that fails is told in a line and takes nothing else with it.
 
     Returns:
         success and reason.
     """
-    with RunLog.open(out / "run.h5") as log:
+    log_file, summary_file, report_file, replay_file = (out / name for name in RUN_FILES)
+    with RunLog.open(log_file) as log:
         measures = measure(log)
         summary = summarize(log, wall_time=wall_time, measures=measures)
-        write_summary(summary, out / "summary.json")
+        written = [_written(summary_file, lambda: write_summary(summary, summary_file))]
         if report:
-            # its plots take a second to import, which no robot has to wait for
-            from drake_dress.report.report_html import write_report
-
-            write_report(out, measures=measures)
-            write_replay_html(log, out / "replay.html")
-    print(f"{'log, report and replay' if report else 'log and summary'}: {out}")
+            written.append(_written(report_file, lambda: _write_report(out, measures)))
+            written.append(_written(replay_file, lambda: write_replay_html(log, replay_file)))
+    if all(written):
+        print(f"{'log, report and replay' if report else 'log and summary'}: {out}")
+    else:
+        print(f"log: {log_file}")
     return bool(summary["success"]), summary["reason"]
+
+
+def _write_report(out: Path, measures: Measures) -> None:
+    # its plots take a second to import, which no robot has to wait for
+    from drake_dress.report.report_html import write_report
+
+    write_report(out, measures=measures)
+
+
+def _written(path: Path, write: Callable[[], object]) -> bool:
+    """Writes a file about a run that is over; returns whether that went well, and tells if not."""
+    try:
+        write()
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        print(f"drake-dress: {path}: cannot be written: {reason}", file=sys.stderr)
+        return False
+    return True

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -19,14 +20,20 @@ from drake_dress.discrepancy.generate import Sensors, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, RANDOM, draw_hidden
 from drake_dress.discrepancy.motions import MOTIONS, USUAL
 from drake_dress.discrepancy.reading import all_notes, read_recordings
-from drake_dress.discrepancy.report import report_page
-from drake_dress.discrepancy.results import as_json, extended_yaml, write_json, write_text
+from drake_dress.discrepancy.results import as_json, extended_yaml, write_json
 from drake_dress.discrepancy.sentences import headline
 from drake_dress.discrepancy.suggestion import suggest
 from drake_dress.discrepancy.where import spots
 from drake_dress.discrepancy.windows import windows
 from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.errors import UserError
+from drake_dress.file_output import (
+    DATASET_FILES,
+    EXPLAIN_FILES,
+    claimed,
+    remove_results,
+    write_text,
+)
 
 DURATION = 4.0
 
@@ -74,14 +81,17 @@ def explain_files(
             stage("running on its own")
             alone = windows(experiment, found, tick)
             advice = suggest(found, scenario, base, stage)
-            yaml_of_scenario = resolved_yaml(scenario)
-            page = report_page(found, experiment, off, alone, advice, yaml_of_scenario, notes)
             yaml_text = extended_yaml(scenario, experiment, found)
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "extended.yaml", yaml_text)
-    write_text(out / "report.html", page)
-    write_json(out / "explanation.json", as_json(found, off, alone, advice, notes))
-    print(headline(found))
+            page = _page(out, found, experiment, off, alone, advice, resolved_yaml(scenario), notes)
+    # whatever comes of the files, the answer is there
+    print(headline(found), flush=True)
+    extended, report, explanation = (out / name for name in EXPLAIN_FILES)
+    with claimed("--out", out, wait=True):
+        remove_results(out, EXPLAIN_FILES)
+        write_text(extended, yaml_text)
+        write_json(explanation, as_json(found, off, alone, advice, notes))
+        if page is not None:
+            write_text(report, page)
     print(f"report, explanation and extended scenario: {out}")
     return found
 
@@ -134,8 +144,6 @@ def write_dataset(
             motions=motions,
         )
     recordings = [measured(r, sensors, rng) for r in clean]
-    out.mkdir(parents=True, exist_ok=True)
-    write_recordings(out / "measured.h5", recordings, resolved_yaml(scenario))
     names = [e.NAME for e in hidden]
     answer = {
         "effect": "+".join(names) if names else NOTHING,
@@ -143,8 +151,24 @@ def write_dataset(
     }
     if len(hidden) == 1:
         answer["parameters"] = hidden[0].values()
-    write_json(out / "answer.json", answer)
+    measured_file, answer_file = (out / name for name in DATASET_FILES)
+    with claimed("--out", out, wait=True):
+        remove_results(out, DATASET_FILES)
+        write_recordings(measured_file, recordings, resolved_yaml(scenario))
+        write_json(answer_file, answer)
     print(f"measured.h5 and answer.json: {out}" + (" (random)" if hide == RANDOM else ""))
+
+
+def _page(out: Path, *told: Any) -> str | None:
+    """Returns the report; where it cannot be made, tells so in a line and returns None."""
+    try:
+        from drake_dress.discrepancy.report import report_page
+
+        return report_page(*told)
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        print(f"drake-dress: {out / EXPLAIN_FILES[1]}: {reason}", file=sys.stderr)
+        return None
 
 
 @contextmanager

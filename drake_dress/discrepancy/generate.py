@@ -6,10 +6,7 @@ step, other random draws, and a motion-capture system's noise and drop-outs on w
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,11 +18,13 @@ from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
+from drake_dress.machine import worker_count
 from drake_dress.models.cloth.elements import IntArray
 from drake_dress.models.effects.composition import seen_points
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.sampling import spread_out
 from drake_dress.models.human.body import ArmPose
+from drake_dress.worker_pool import WorkerPool
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -163,9 +162,8 @@ def record_all(
         motions: of `MOTIONS`.
     """
     lab = truth(scenario, base, effects)
-    context = multiprocessing.get_context("fork")
     recordings = []
-    with ProcessPoolExecutor(workers or os.cpu_count() or 1, mp_context=context) as pool:
+    with WorkerPool(min(len(motions), workers or worker_count())) as pool:
         futures = [
             pool.submit(record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
             for k, name in enumerate(motions)

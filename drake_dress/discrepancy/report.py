@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 
 from drake_dress import __version__
 from drake_dress.discrepancy.experiment import Experiment
@@ -15,13 +15,18 @@ from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.sentences import headline, plain, values
 from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
+from drake_dress.drawing import plain_settings
 from drake_dress.report.page import chart, embedded, html_page
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FloatArray = npt.NDArray[np.float64]
 
 _BEFORE, _AFTER, _NOISE = "#b8453b", "#0b7a5e", "#66727f"
 
 
+@plain_settings()
 def report_page(
     explanation: Explanation,
     experiment: Experiment,

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from drake_dress import __version__
 from drake_dress.diagrams.build import effects as effects_on
@@ -17,6 +14,8 @@ from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
+from drake_dress.file_output import write_text
+from drake_dress.yaml_text import read_yaml, write_yaml
 
 
 def as_json(
@@ -79,7 +78,7 @@ def as_json(
 
 def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Explanation) -> str:
     """Returns the scenario with what was found, as YAML that `drake-dress run` takes."""
-    content = yaml.safe_load(resolved_yaml(scenario))
+    content = read_yaml("scenario", resolved_yaml(scenario))
     found: dict[str, Any] = {}
     for effect in effects_on(scenario):
         found[effect.NAME] = effect.values()
@@ -101,16 +100,9 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
             tolerance=n.tolerance,
         )
     # what is not there is not written: the loader refuses empty groups
-    text = yaml.safe_dump(_without_none(content), sort_keys=False)
+    text = write_yaml(_without_none(content))
     head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
     return head + text
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a file so that it is whole or not there."""
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

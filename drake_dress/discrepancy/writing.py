@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,14 +10,14 @@ import numpy as np
 
 from drake_dress import __version__
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.file_output import replacing
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES, SCHEMA
 
 
 def write_recordings(path: Path, recordings: Sequence[Recording], scenario_text: str) -> None:
     """Writes `path`, an HDF5 file with a group a recording; nothing is left half written."""
-    partial = path.with_name(path.name + ".partial")
-    with h5py.File(partial, "w") as file:
+    with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs["schema"] = SCHEMA
         file.attrs["scenario"] = scenario_text
         file.attrs["version"] = __version__
@@ -39,7 +38,6 @@ def write_recordings(path: Path, recordings: Sequence[Recording], scenario_text:
             if r.joint_position is not None:
                 joints = _add(group, "human/joint_position", r.joint_position, "m", "world")
                 joints.attrs["names"] = list(JOINT_NAMES)
-    os.replace(partial, path)
 
 
 def _add(

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.hdf5_state import Hdf5State, look_at
 from drake_dress.models.sides import SIDES
-from drake_dress.report.log_schema import LOOPS, check_log
+from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,21 +39,36 @@ class RunLog:
         """Opens a log.
 
         Raises:
-            UserError: missing, not HDF5, another schema, or a dataset missing or misshapen.
+            UserError: missing, being written, cut short, not HDF5, another schema, or a dataset
+                missing or misshapen.
         """
         path = Path(path)
-        if not path.is_file():
-            raise UserError(str(path), "", "no such file; expected a run.h5")
+        try:
+            found = look_at(path)
+        except FileNotFoundError as error:
+            raise UserError(str(path), "", "no such file; expected a run.h5") from error
+        except (OSError, ValueError) as error:
+            message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+            raise UserError(str(path), "", f"{message}; expected a run.h5") from error
+        if found.state is Hdf5State.OPEN:
+            message = "is still being written by a run; wait until it has ended"
+            raise UserError(str(path), "", message)
+        if found.state not in (Hdf5State.SOUND, Hdf5State.KILLED):
+            raise UserError(str(path), "", f"{found.message}; expected a run.h5")
         try:
             file = h5py.File(path, "r")
         except OSError as error:
-            if "lock" in str(error):
-                message = "is still being written by a run; wait until it has ended"
+            if found.state is Hdf5State.KILLED:
+                message = f"{found.message}, and cannot be read; expected a run.h5"
             else:
-                message = "is not a readable HDF5 file; expected a run.h5"
+                message = "is damaged: HDF5 cannot open it; expected a run.h5"
             raise UserError(str(path), "", message) from error
         try:
             check_log(str(path), file)
+        except (OSError, RuntimeError, KeyError) as error:
+            file.close()
+            message = f"is damaged: {error}; expected a run.h5"
+            raise UserError(str(path), "", message) from error
         except BaseException:
             file.close()
             raise
@@ -95,6 +111,11 @@ class RunLog:
         """What was wrong with the station, that ended the run; None if nothing was."""
         text = self.file.attrs.get("ended_by")
         return None if text is None else str(text)
+
+    @property
+    def killed(self) -> bool:
+        """Whether the process that wrote it ended without closing it; what it flushed is here."""
+        return not self.file.attrs.get(COMPLETE, True) and self.ended_by is None
 
     @property
     def events(self) -> list[str]:

@@ -11,6 +11,8 @@ from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 
 SCHEMA = "drake_dress.log/1"
+# Attribute: whether the writer closed the file; without it, nobody noted.
+COMPLETE = "complete"
 LOOPS = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
 JOINT_NAMES = (
     "left_shoulder",

@@ -37,6 +37,7 @@ from drake_dress.report.disk import give_back, keep_room, locked, reserved
 from drake_dress.report.log_schema import (
     ARM_SERIES,
     CLEARANCES,
+    COMPLETE,
     JOINT_NAMES,
     LOOPS,
     SCHEMA,
@@ -173,6 +174,9 @@ class RunLogWriter:
         try:
             self._lock: int | None = locked(self.path)
             self._file = _open(self.path, "w")
+        except BlockingIOError as error:
+            message = "cannot be written: another run writes it, or something reads it"
+            raise UserError(str(path), "", message) from error
         except OSError as error:
             raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
         self._reserve = reserved(self.path.parent, _RESERVE)
@@ -203,6 +207,7 @@ class RunLogWriter:
         attributes["scenario"] = scenario_text
         attributes["version"] = version
         attributes["seed"] = seed
+        attributes[COMPLETE] = False
 
         self._write_garment("/garment", garment)
         self._fixed("/human/radius", np.asarray(radius, dtype=np.float64).reshape(6), "m")
@@ -489,6 +494,7 @@ class RunLogWriter:
             for dataset in self._series.values():
                 if dataset.shape[0] != self._count:
                     dataset.resize(self._count, axis=0)
+            self._file.attrs.modify(COMPLETE, True)
         finally:
             self._file.close()
 

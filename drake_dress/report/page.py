@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+
+from drake_dress.drawing import as_svg, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def html_page(title: str, parts: Sequence[str]) -> str:
@@ -28,8 +31,7 @@ def chart(
     width: float, height: float, rows: int = 1, columns: int = 1
 ) -> tuple[Figure, list[Axes]]:
     """Returns an empty chart of so many inches; axes below each other share what they run over."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasSVG(figure)
+    figure = new_figure(width, height, layout="constrained")
     axes = list(np.ravel(figure.subplots(rows, columns, sharex=columns == 1)))
     for ax in axes:
         ax.spines[["top", "right"]].set_visible(False)
@@ -37,17 +39,10 @@ def chart(
     return figure, axes
 
 
-def svg(figure: Figure) -> bytes:
-    """Returns a chart as a file, the same whenever it is made."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue()
-
-
 def embedded(figure: Figure, title: str, note: str = "") -> str:
     """Returns a chart as a picture inside the page."""
     # As an image of its own: identifiers of several inline pictures would clash.
-    data = base64.b64encode(svg(figure)).decode("ascii")
+    data = base64.b64encode(as_svg(figure)).decode("ascii")
     return f'<figure><h3>{title}</h3><img alt="{title}" src="data:image/svg+xml;base64,{data}">' + (
         f"<figcaption>{note}</figcaption></figure>" if note else "</figure>"
     )

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import signal
 import time as clock
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Capsule, Meshcat, MeshcatParams, Rgba, Sphere
+from pydrake.geometry import Capsule, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
+from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
+from drake_dress.report.web_page import open_page
 from drake_dress.systems.garment_visualizer import DressingScene
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
@@ -30,20 +33,30 @@ def show_replay(path: str | Path, port: int | None = None) -> int:
         port: of the page; None: the first free one from 7000.
 
     Raises:
-        UserError: the log cannot be used.
+        UserError: the log or the port cannot be used.
     """
+    try:
+        return _shown(path, port)
+    except OSError as error:
+        raise UserError(str(path), "", f"is damaged: {error}") from error
+
+
+def _shown(path: str | Path, port: int | None) -> int:
     with RunLog.open(path) as log:
         if not len(log):
             print(f"{path}: nothing was logged", flush=True)
             return 0
+        if log.killed:
+            print(f"{path}: was left by a run that was killed; shown is what it had written")
         with caught_interrupt() as interrupt:
-            meshcat = Meshcat(MeshcatParams(host="localhost", port=port))
+            meshcat = open_page(port)
             url = meshcat.web_url()
             print(f"{path}: {log.time[-1]:.1f} s at {url} (Stop or Ctrl-C ends)", flush=True)
             replay = MeshcatReplay(meshcat, log)
             while not (replay.stopped or interrupt.wait(_POLL_PERIOD)):
                 replay.update()
-    return 0
+    # Ctrl-C is the usual end, other signals are not.
+    return 0 if interrupt.number == signal.SIGINT else interrupt.status
 
 
 class MeshcatReplay:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_bytes
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
@@ -59,7 +60,7 @@ def write_replay_html(
         if len(page) <= max_bytes or fps < 0.5:
             break
         fps *= 0.5
-    Path(path).write_bytes(page)
+    write_bytes(Path(path), page)
 
 
 def _page(log: RunLog, fps: float) -> bytes:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import image as matplotlib_image
-from matplotlib.axes import Axes
 
+from drake_dress.drawing import as_png, plain_settings
+from drake_dress.file_output import write_text
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
@@ -22,6 +21,9 @@ from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import chart, embedded, html_page
 from drake_dress.report.stills import CameraPose, render_still
 from drake_dress.report.summary import SuccessRules, read_summary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _COLOR = {"left": "#0b7a5e", "right": "#b8453b"}
 _STAGE_SHADE = ("#eef1f4", "#dbe8f5", "#dff1e4")
@@ -48,10 +50,11 @@ def write_report(
         m = measures if measures is not None else measure(log)
         page = _page(log, summary, m, rules or SuccessRules())
     path = run_dir / "report.html"
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
     return path
 
 
+@plain_settings()
 def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules) -> str:
     success = bool(summary.get("success"))
     verdict = "Both sleeves are on" if success else "The dressing failed"
@@ -257,9 +260,7 @@ def _pictures(log: RunLog, m: Measures) -> str:
 
 
 def _png(picture: npt.NDArray[np.uint8]) -> str:
-    buffer = io.BytesIO()
-    matplotlib_image.imsave(buffer, picture, format="png")
-    return base64.b64encode(buffer.getvalue()).decode("ascii")
+    return base64.b64encode(as_png(picture)).decode("ascii")
 
 
 def _charts(

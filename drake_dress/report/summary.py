@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import ArmMeasures, measure_arms
@@ -120,7 +121,7 @@ def summarize(
 
 def write_summary(summary: dict[str, Any], path: str | Path) -> None:
     """Writes a summary as strict JSON (no NaN in it)."""
-    Path(path).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(Path(path), json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import multiprocessing
 import os
-import signal
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from typing import Any
 
-_PR_SET_PDEATHSIG = 1
+from drake_dress.worker_pool import WorkerPool
+
 _NICENESS = 10
 _worker: Callable[..., Any] | None = None
 
@@ -26,14 +23,7 @@ class Apart:
     """
 
     def __init__(self, work: Callable[..., Any]) -> None:
-        # forked from a process with threads, Numba and BLAS may hang
-        self._pool = ProcessPoolExecutor(
-            max_workers=1,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_begin,
-            initargs=(work, os.getpid()),
-        )
-        self._process = self._pool.submit(os.getpid)
+        self._pool = WorkerPool(1, initializer=_begin, initargs=(work,))
 
     def submit(self, *arguments: Any) -> Future[Any]:
         """Returns what will be the result."""
@@ -41,26 +31,14 @@ class Apart:
 
     def kill(self) -> None:
         """Ends the process whatever it does; results that are awaited become exceptions."""
-        if self._process.done() and self._process.exception() is None:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(self._process.result(), signal.SIGKILL)
+        self._pool.kill()
 
 
-def _begin(work: Callable[..., Any], parent: int) -> None:
+def _begin(work: Callable[..., Any]) -> None:
     global _worker
     _worker = work
     # who sends commands goes first where cores are few
     os.nice(_NICENESS)
-    end_with(parent)
-
-
-def end_with(parent: int) -> None:
-    """Has this process end with its parent, however that ends, and leave Ctrl-C to it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        # it ended before the kernel was told
-        os._exit(1)
 
 
 def _work(*arguments: Any) -> Any:

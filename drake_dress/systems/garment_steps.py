@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
@@ -19,7 +18,8 @@ import numpy.typing as npt
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
-from drake_dress.systems.apart import end_with
+from drake_dress.systems.shared_memory import SharedMemory
+from drake_dress.worker_pool import end_with, kill_at_exit
 
 FloatArray = npt.NDArray[np.float64]
 # The fields of a state that are vectors of the nodes, and those that are numbers of theirs.
@@ -116,7 +116,7 @@ class StepsBeside:
     def __init__(self, cloth: Integrator, surroundings: Surroundings) -> None:
         # forked from a process with threads, Numba and BLAS may hang
         context = multiprocessing.get_context("spawn")
-        shared = _Shared(cloth.elements.node_count, surroundings.size, context.RawArray)
+        shared = _Shared(cloth.elements.node_count, surroundings.size)
         self._places, self._around = shared.states(), shared.around()
         self._pipe, other = context.Pipe()
         self._process = context.Process(
@@ -126,6 +126,7 @@ class StepsBeside:
             name="garment",
         )
         self._process.start()
+        kill_at_exit(self._process)
         other.close()
         self._under_way = False
         self._place = 0
@@ -170,32 +171,38 @@ class StepsBeside:
 
 
 class _Shared:
-    """Memory that two processes share: two states, and what is around.
+    """What two processes share: two states, and what is around.
 
     Args:
         n: nodes.
         size: of what is around.
-        make: makes an array of a C type that both see.
     """
 
-    def __init__(self, n: int, size: int, make: Callable[[str, int], Any]) -> None:
-        self._around = make("d", size)
-        self._states = [
-            {k: make("d", 3 * n) for k in _VECTORS} | {k: make("i", n) for k in _NUMBERS}
-            for _ in range(2)
-        ]
+    def __init__(self, n: int, size: int) -> None:
+        self._n, self._size = n, size
+        self._block = SharedMemory(8 * size + 2 * self._state_bytes)
+
+    @property
+    def _state_bytes(self) -> int:
+        return self._n * (3 * 8 * len(_VECTORS) + 4 * len(_NUMBERS))
 
     def around(self) -> FloatArray:
         """Returns the array."""
-        return np.frombuffer(self._around, np.float64)
+        return np.frombuffer(self._block.memory, np.float64, self._size)
 
     def states(self) -> list[ClothState]:
         """Returns the states whose arrays are that memory."""
-        found = []
-        for m in self._states:
-            x, v, reaction = (np.frombuffer(m[k], np.float64).reshape(-1, 3) for k in _VECTORS)
-            mode, owner = (np.frombuffer(m[k], np.int32) for k in _NUMBERS)
-            found.append(ClothState(x, v, mode, reaction, owner))
+        found, memory, n = [], self._block.memory, self._n
+        for k in range(2):
+            at = 8 * self._size + k * self._state_bytes
+            arrays: dict[str, npt.NDArray[Any]] = {}
+            for name in _VECTORS:
+                arrays[name] = np.frombuffer(memory, np.float64, 3 * n, at).reshape(-1, 3)
+                at += 24 * n
+            for name in _NUMBERS:
+                arrays[name] = np.frombuffer(memory, np.int32, n, at)
+                at += 4 * n
+            found.append(ClothState(**arrays))
         return found
 
 

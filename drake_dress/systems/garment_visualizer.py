@@ -8,6 +8,7 @@ from pydrake.geometry import Box, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from drake_dress.drawing import new_figure, pixels, plain_settings
 from drake_dress.models.sides import SIDES
 
 STAGE_NAMES = ("prepare", "dress", "done")
@@ -153,17 +154,12 @@ class DressingScene:
             self._meshcat.SetTransform(path, RigidTransform(p))
 
 
+@plain_settings()
 def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
     """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
-    # most of a second of a run's start where nobody watches
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(0.18 * len(text) + 0.4, 0.6), dpi=72)
-    canvas = FigureCanvasAgg(figure)
+    figure = new_figure(0.18 * len(text) + 0.4, 0.6, dpi=72)
     figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")
-    canvas.draw()
-    ink = np.asarray(canvas.buffer_rgba())[:, :, 0] < 128
+    ink = pixels(figure)[:, :, 0] < 128
     edge = np.diff(ink.astype(np.int8), axis=1, prepend=0, append=0)
     row, start = np.nonzero(edge == 1)
     _, end = np.nonzero(edge == -1)

@@ -22,6 +22,8 @@ from drake_dress.diagrams.scenario.checks import (
 from drake_dress.diagrams.scenario.schema import Scenario, Variation
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
+from drake_dress.text_file import read_text
+from drake_dress.yaml_text import read_yaml, write_yaml
 
 
 def load_scenario(
@@ -43,7 +45,7 @@ def load_scenario(
         content["seed"] = seed
     content = typed(source, "", content, Scenario)
     try:
-        scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content))
+        scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))
     except (RuntimeError, ValueError, TypeError) as error:
         raise UserError(source, "", f"cannot be read: {error}") from error
     check_ranges(source, "", scenario)
@@ -58,8 +60,7 @@ def load_scenario(
 
 def resolved_yaml(scenario: Scenario) -> str:
     """Returns the whole scenario as YAML that loads to the same."""
-    text: str = yaml_dump_typed(scenario)
-    return text
+    return write_yaml(yaml.safe_load(yaml_dump_typed(scenario)))
 
 
 def apply_variation(scenario: Scenario) -> Scenario:
@@ -88,21 +89,7 @@ def apply_variation(scenario: Scenario) -> Scenario:
 
 def _read(path: Path) -> dict[str, Any]:
     source = str(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UserError(source, "", "no such file, expected a scenario in YAML") from None
-    except IsADirectoryError:
-        raise UserError(source, "", "is a directory, expected a scenario in YAML") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(source, "", f"cannot be read as text: {error}") from error
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise UserError(source, where, f"{problem}, expected YAML") from error
+    content = read_yaml(source, read_text(path, "a scenario in YAML"))
     if content is None:
         raise UserError(source, "", "is empty, expected a scenario in YAML")
     if not isinstance(content, dict):
@@ -113,9 +100,10 @@ def _read(path: Path) -> dict[str, Any]:
 def _override(content: dict[str, Any], key: str, text: str) -> None:
     """Writes the YAML value `text` at the dotted `key`."""
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise UserError("--set", key, f"{text!r} is not a YAML value") from None
+        value = read_yaml("--set", text, one_value=True)
+    except UserError as error:
+        below = f"{error.key}: " if error.key else ""
+        raise UserError("--set", key, f"{below}{error.message}") from error
     *parents, last = key.split(".")
     schema: Any = Scenario
     place = content

@@ -52,12 +52,6 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
         below = typing.get_args(schema)[0]
         return [typed(source, f"{key}[{i}]", item, below) for i, item in enumerate(value)]
     if schema is float:
-        if isinstance(value, str):
-            # YAML 1.1 takes 1e9 for text
-            try:
-                return float(value)
-            except ValueError:
-                pass
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise UserError(source, key, f"is {kind_of(value)}, expected a number")
     elif schema is int:

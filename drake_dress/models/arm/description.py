@@ -8,7 +8,7 @@ cloth.
 
 from __future__ import annotations
 
-import os
+import errno
 import shutil
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+
+from drake_dress.caches import user_cache
 
 PACKAGE = "example-robot-data"
 _FOLDER = "robots/panda_description"
@@ -71,8 +73,10 @@ def panda_source() -> Path:
 
 
 def _user_cache() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "drake_dress"
+    folder = user_cache()
+    if folder is None:
+        raise OSError(errno.EROFS, "no folder for caches can be written to, set XDG_CACHE_HOME")
+    return folder
 
 
 def _convert(source: Path, out: Path) -> None:

@@ -31,7 +31,8 @@ def read_ply(data: bytes, source: str, most_faces: int) -> RawMesh:
         most_faces: number of polygons beyond which nothing is read.
 
     Raises:
-        UserError: there are too many faces, the file is cut off or longer than its header tells, or holds no triangles.
+        UserError: there are too many faces, the file is cut off or longer than its header
+            tells, or holds no triangles.
     """
     header, body = _split(data, source)
     text = bool(re.search(r"^format[ \t]+ascii", header, re.MULTILINE))

@@ -27,8 +27,8 @@ def read_stl(data: bytes, source: str, most_faces: int) -> RawMesh:
         most_faces: number of triangles beyond which reading ends.
 
     Raises:
-        UserError: there are too many triangles, the file is cut off, counts other triangles than it holds, or a line cannot be
-            read.
+        UserError: there are too many triangles, the file is cut off, counts other triangles
+            than it holds, or a line cannot be read.
     """
     start = _HEADER + _COUNT
     if len(data) >= start:

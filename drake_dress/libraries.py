@@ -1,0 +1,70 @@
+"""Tells in one line which library is missing, of the system or of Python."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import re
+
+from drake_dress.errors import UserError
+
+# What Drake and OpenCV load of the system, and the Debian package that has it; `.ci/run` and the
+# README name the same.
+SYSTEM_LIBRARIES = {
+    "libX11.so.6": "libx11-6",
+    "libGLX.so.0": "libglx0",
+    "libOpenGL.so.0": "libopengl0",
+    "libEGL.so.1": "libegl1",
+}
+# Modules that every command needs.
+_NEEDED = ("numpy", "scipy", "yaml", "rich", "h5py", "trimesh", "rtree", "pydrake.common")
+_SHARED_OBJECT = re.compile(r"(lib[\w.+-]+\.so[\d.]*)")
+_INSTALL = "expected all packages of drake_dress: pip install them again"
+
+
+def check_libraries() -> None:
+    """Imports what every command needs.
+
+    Raises:
+        UserError: one of these cannot be imported.
+    """
+    for name in _NEEDED:
+        try:
+            importlib.import_module(name)
+        # Modules that were built for others of another version raise whatever comes to them.
+        except Exception as error:
+            raise import_problem(error, name) from error
+
+
+def import_problem(error: Exception, module: str = "") -> UserError:
+    """Returns what to tell of a module that cannot be imported.
+
+    Args:
+        error: that its import raised.
+        module: that was asked for, where known.
+    """
+    text = " ".join(str(error).split()) or type(error).__name__
+    missing = _SHARED_OBJECT.search(text)
+    if missing and "cannot open shared object file" in text:
+        names = [missing.group(1), *(n for n in SYSTEM_LIBRARIES if not _loads(n))]
+        names = list(dict.fromkeys(names))
+        packages = " ".join(SYSTEM_LIBRARIES[n] for n in names if n in SYSTEM_LIBRARIES)
+        install = f"apt-get install {packages}" if packages else "the system package that has it"
+        verb = "is" if len(names) == 1 else "are"
+        message = f"cannot be loaded: {', '.join(names)} {verb} missing, expected {install}"
+        return UserError(module or "library", "", message)
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        asked = module.partition(".")[0]
+        other = asked and asked != error.name.partition(".")[0]
+        needs = f", which {asked} uses" if other else ""
+        return UserError(error.name, "", f"is not installed{needs}, {_INSTALL}")
+    name = module or getattr(error, "name", None) or "library"
+    return UserError(name, "", f"cannot be imported: {text}, {_INSTALL}")
+
+
+def _loads(name: str) -> bool:
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        return False
+    return True
