@@ -9,6 +9,7 @@ import os
 import signal
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 _PR_SET_PDEATHSIG = 1
@@ -26,21 +27,31 @@ class Apart:
     """
 
     def __init__(self, work: Callable[..., Any]) -> None:
+        self._work = work
+        self._start()
+
+    def _start(self) -> None:
+        self._killed = False
         # forked from a process with threads, Numba and BLAS may hang
         self._pool = ProcessPoolExecutor(
             max_workers=1,
             mp_context=multiprocessing.get_context("spawn"),
             initializer=_begin,
-            initargs=(work, os.getpid()),
+            initargs=(self._work, os.getpid()),
         )
         self._process = self._pool.submit(os.getpid)
 
     def submit(self, *arguments: Any) -> Future[Any]:
-        """Returns what will be the result."""
+        """Returns what will be the result; where the process has ended, another one begins."""
+        if not self._killed:
+            with contextlib.suppress(BrokenProcessPool):
+                return self._pool.submit(_work, *arguments)
+        self._start()
         return self._pool.submit(_work, *arguments)
 
     def kill(self) -> None:
         """Ends the process whatever it does; results that are awaited become exceptions."""
+        self._killed = True
         if self._process.done() and self._process.exception() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self._process.result(), signal.SIGKILL)

@@ -22,8 +22,9 @@ from drake_dress.models.cloth.layered import Integrator
 from drake_dress.systems.apart import end_with
 
 FloatArray = npt.NDArray[np.float64]
-# The fields of a state that are vectors of the nodes, and those that are numbers of theirs.
-_VECTORS, _NUMBERS = ("x", "v", "reaction"), ("mode", "owner")
+# The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
+# solvers go on with.
+_VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner"), "solver"
 # What is said of a step that begins: it goes on from the last one, or from a state that is given.
 _GO_ON, _FROM_GIVEN = b"\0", b"\1"
 
@@ -181,7 +182,9 @@ class _Shared:
     def __init__(self, n: int, size: int, make: Callable[[str, int], Any]) -> None:
         self._around = make("d", size)
         self._states = [
-            {k: make("d", 3 * n) for k in _VECTORS} | {k: make("i", n) for k in _NUMBERS}
+            {k: make("d", 3 * n) for k in _VECTORS}
+            | {k: make("i", n) for k in _NUMBERS}
+            | {_SOLVER: make("i", 2 * (n + 1))}
             for _ in range(2)
         ]
 
@@ -195,12 +198,13 @@ class _Shared:
         for m in self._states:
             x, v, reaction = (np.frombuffer(m[k], np.float64).reshape(-1, 3) for k in _VECTORS)
             mode, owner = (np.frombuffer(m[k], np.int32) for k in _NUMBERS)
-            found.append(ClothState(x, v, mode, reaction, owner))
+            solver = np.frombuffer(m[_SOLVER], np.int32).reshape(2, -1)
+            found.append(ClothState(x, v, mode, reaction, owner, solver))
         return found
 
 
 def _copy(source: ClothState, target: ClothState) -> None:
-    for name in (*_VECTORS, *_NUMBERS):
+    for name in (*_VECTORS, *_NUMBERS, _SOLVER):
         getattr(target, name)[:] = getattr(source, name)
 
 

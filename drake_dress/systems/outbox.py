@@ -66,7 +66,6 @@ class Outbox(LeafSystem):
         self._source, self._channel = source, channel
         self._serializer, self._type, self._lcm = serializer, lcm_type, lcm
         self._faults, self._spoils = tuple(faults), spoils or {}
-        self._rng = np.random.default_rng(0)
         self.DeclareAbstractInputPort("message", serializer.CreateDefaultValue())
         self.DeclareVectorInputPort("since", 1)
         self.DeclarePeriodicPublishEvent(period, offset, self._publish)
@@ -82,7 +81,7 @@ class Outbox(LeafSystem):
             on = kinds_at(self._faults, self._source, float(since.Eval(context)[0]))
         value: AbstractValue = self.GetInputPort("message").EvalAbstract(context)
         encoded = self._stamped(context, self._serializer.Serialize(value))
-        sent = spoiled(encoded, on, self._type, self._spoils, self._rng)
+        sent = spoiled(encoded, on, self._type, self._spoils, context.get_time())
         if sent is None:
             return EventStatus.DidNothing()
         self._lcm.Publish(self._channel, sent)
@@ -90,7 +89,7 @@ class Outbox(LeafSystem):
 
 
 def spoiled(
-    encoded: bytes, on: set[str], lcm_type: Any, spoils: dict[str, Spoil], rng: np.random.Generator
+    encoded: bytes, on: set[str], lcm_type: Any, spoils: dict[str, Spoil], time: float
 ) -> bytes | None:
     """Returns what is sent in place of a message while faults are on; None if nothing is.
 
@@ -99,11 +98,12 @@ def spoiled(
         on: kinds of faults, of `models.supervision.injection`.
         lcm_type: Python class of the message.
         spoils: what kinds of faults do to a decoded message.
-        rng: of bytes that are no message.
+        time: s; bytes that are no message are drawn anew at each, and the same in each run.
     """
     if on & {"stale", "bus_lost", "arm_lost"}:
         return None
     if "malformed" in on:
+        rng = np.random.default_rng(round(1e6 * time))
         garbage: bytes = rng.bytes(int(rng.integers(0, len(encoded) + 1)))
         return garbage
     if not on:

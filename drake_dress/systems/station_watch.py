@@ -28,6 +28,8 @@ _REMEMBERED = 10_000
 class _Memory(Immutable):
     watched: tuple[WatchState, ...]
     supervised: SupervisionState
+    # what changed, when: s and a line
+    events: tuple[tuple[float, str], ...] = ()
 
 
 class StationWatch(LeafSystem):
@@ -49,7 +51,7 @@ class StationWatch(LeafSystem):
     of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
     while none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it
     reports that it does not follow. Beside the ports, `events` tells
-    what changed.
+    what changed in a context.
 
     Args:
         sources: by name, what is asked of each.
@@ -71,8 +73,6 @@ class StationWatch(LeafSystem):
         self.sources = tuple(sources)
         self._settings = tuple(sources.values())
         self._patience = patience
-        # what changed, when: s and a line
-        self.events: list[tuple[float, str]] = []
         count = len(self.sources)
         self._memory = self.DeclareAbstractState(
             Value(_Memory((WatchState(),) * count, SupervisionState.of(count)))
@@ -103,16 +103,19 @@ class StationWatch(LeafSystem):
             for i, w in enumerate(memory.watched)
         )
         supervised = supervise(memory.supervised, [w.fault for w in watched], now, self._patience)
-        self._note(memory, watched, supervised, context.get_time())
-        state.get_mutable_abstract_state(self._memory).set_value(_Memory(watched, supervised))
+        events = memory.events
+        if len(events) < _REMEMBERED:
+            lines = self._changes(memory, watched, supervised)
+            events += tuple((context.get_time(), line) for line in lines)
+        memory = _Memory(watched, supervised, events)
+        state.get_mutable_abstract_state(self._memory).set_value(memory)
 
-    def _note(
+    def _changes(
         self,
         before: _Memory,
         watched: tuple[WatchState, ...],
         supervised: SupervisionState,
-        now: float,
-    ) -> None:
+    ) -> list[str]:
         lines = [
             told(self._told(i), w.fault) if w.fault else f"{self._told(i)}: sound"
             for i, (old, w) in enumerate(zip(before.watched, watched, strict=True))
@@ -120,11 +123,15 @@ class StationWatch(LeafSystem):
         ]
         if before.supervised.permitted != supervised.permitted:
             lines.append("arms may move" if supervised.permitted else "arms hold")
-        if len(self.events) < _REMEMBERED:
-            self.events += [(now, line) for line in lines]
+        return lines
 
     def _told(self, i: int) -> str:
         return self.sources[i].replace("_", " ")
+
+    def events(self, context: Context) -> tuple[tuple[float, str], ...]:
+        """Returns what changed, and when, s, in its own context."""
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        return memory.events
 
     def conclusion(self, context: Context) -> str | None:
         """Returns why the run ends, in its own context; None while it goes on."""
