@@ -14,7 +14,7 @@ from typing import NoReturn
 
 import drake_dress
 from drake_dress import __version__
-from drake_dress.errors import UserError
+from drake_dress.errors import FailedError, UserError
 
 FAILED, UNUSABLE, INTERRUPTED = 1, 2, 130
 # By name, what each measures; the first is the default.
@@ -62,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"drake-dress: {error}", file=sys.stderr)
         return UNUSABLE
+    except FailedError as error:
+        print(f"drake-dress: {error}", file=sys.stderr)
+        return FAILED
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise

@@ -15,3 +15,7 @@ class UserError(ValueError):
         self.key = key
         self.message = " ".join(message.split())
         super().__init__(": ".join(part for part in (source, key, self.message) if part))
+
+
+class FailedError(RuntimeError):
+    """What was asked for ran and did not succeed, for a reason told in one line: exit status 1."""
