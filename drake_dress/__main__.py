@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import drake_dress
 from drake_dress import __version__
-from drake_dress.errors import UserError
+from drake_dress.errors import FailedError, UserError
 from drake_dress.file_output import (
     DATASET_FILES,
     EXPLAIN_FILES,
@@ -75,6 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _status(words)
         except UserError as error:
             return _told(str(error), UNUSABLE)
+        except FailedError as error:
+            return _told(str(error), FAILED)
         except ImportError as error:
             return _told(str(import_problem(error)), UNUSABLE)
         except OSError as error:

@@ -24,6 +24,10 @@ class UserError(ValueError):
         super().__init__(": ".join(part for part in parts if part))
 
 
+class FailedError(RuntimeError):
+    """What was asked for ran and did not succeed, for a reason told in one line: exit status 1."""
+
+
 def _in_one_line(text: str, longest: int) -> str:
     # far more than is shown need not be looked at
     if len(text) > 4 * longest:

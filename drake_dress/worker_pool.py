@@ -52,6 +52,7 @@ class WorkerPool(Executor):
         self._threads = ThreadPoolExecutor(max_workers, "worker-pool")
         self._free: SimpleQueue[tuple[Connection, BaseProcess]] = SimpleQueue()
         self._processes: list[BaseProcess] = []
+        self._killed = False
         # Python waits at its end for processes, which ignore the signal that it sends them.
         atexit.register(_kill_all, weakref.WeakMethod(self.kill))
         for _ in range(max_workers):
@@ -63,6 +64,11 @@ class WorkerPool(Executor):
             other.close()
             self._processes.append(process)
             self._free.put((pipe, process))
+
+    @property
+    def alive(self) -> bool:
+        """Whether no process has ended."""
+        return not self._killed and all(process.is_alive() for process in self._processes)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Returns what will be the result of `fn`, which can be pickled, as can all else."""
@@ -83,6 +89,7 @@ class WorkerPool(Executor):
 
     def kill(self) -> None:
         """Ends the processes whatever they do; results that are awaited become exceptions."""
+        self._killed = True
         for process in self._processes:
             with contextlib.suppress(ValueError):
                 process.kill()

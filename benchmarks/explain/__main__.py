@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import os
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.results import write_json
 from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.machine import worker_count
 from drake_dress.models.effects.effect import Effect
 
 GROUPS = ("effect", "nothing", "pair", "coarse", "outside")
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         around(options.into, _NAME)
     draws = {g: options.draws or _DRAWS[g] for g in GROUPS}
     chosen = study(options.only, draws, options.seed, options.size, options.noise, options.beside)
-    workers = max(1, (os.cpu_count() or 1) // options.jobs)
+    workers = max(1, worker_count() // options.jobs)
     kept = {} if options.json is None else read_results(options.json, name_of, _NAME)
     new = [case for case in chosen if case.name not in kept]
     if options.kept:

@@ -96,8 +96,9 @@ def run_scenario(
         ) as writer:
             remove_results(out, RUN_FILES[1:])
             dressing = wired(p, writer)
-            ending = _simulate(dressing, scenario.duration, realtime_rate)
-            _note(dressing, ending, writer)
+            simulator = Simulator(dressing.diagram)
+            ending = _simulate(dressing, simulator, scenario.duration, realtime_rate)
+            _note(dressing, simulator, ending, writer)
         wall_time = clock.perf_counter() - begin
         return concluded(out, wall_time, report, ending.interrupt)
 
@@ -138,12 +139,14 @@ def _parts(
         raise UserError(str(source), hardware, str(error)) from error
 
 
-def _note(dressing: Dressing, ending: Ending, writer: RunLogWriter) -> None:
+def _note(dressing: Dressing, simulator: Simulator, ending: Ending, writer: RunLogWriter) -> None:
     """Writes to the log what was wrong with hardware, and why the run ended if for that."""
     if isinstance(dressing.station, HardwareStation):
-        events = dressing.station.watch.events
+        watch = dressing.station.watch
+        watch_context = watch.GetMyContextFromRoot(simulator.get_context())
+        events = watch.events(watch_context)
         writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
-        writer.note("dropped_messages", json.dumps(dressing.station.watch.dropped))
+        writer.note("dropped_messages", json.dumps(watch.dropped(watch_context)))
         meter = dressing.station.meter
         if meter.first is not None:
             times, ages = meter.commands
@@ -178,9 +181,10 @@ class Ending:
     behind: float = 0.0
 
 
-def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Ending:
+def _simulate(
+    dressing: Dressing, simulator: Simulator, duration: float, realtime_rate: float
+) -> Ending:
     """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
-    simulator = Simulator(dressing.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
     if isinstance(dressing.station, HardwareStation):
         early = _made_ready(dressing, dressing.station)
@@ -217,7 +221,7 @@ def _simulate(dressing: Dressing, duration: float, realtime_rate: float) -> Endi
                 # no command without a log of it: commands end, and arms stop by themselves
                 fault = f"log: cannot be written: {error}"
                 break
-            fault = _station_fault(dressing, simulator) or dressing.mpc.failure
+            fault = _station_fault(dressing, simulator) or dressing.mpc.failure(context)
             stage = stage_port.Eval(context)
             names = [("prepare", "dress", "done")[int(s)] for s in stage]
             progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")

@@ -11,10 +11,7 @@ nearby (multi-fidelity): p ↦ refined(p₀) + level(p) − level(p₀).
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -27,6 +24,8 @@ from drake_dress.discrepancy.candidates import NEED_CONTACT
 from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
+from drake_dress.discrepancy.workers import Workers
+from drake_dress.machine import worker_count
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.transfer import barycentric_transfer
 
@@ -34,6 +33,7 @@ FloatArray = npt.NDArray[np.float64]
 Level = Literal["screening", "scenario", "doubled", "refined"]
 LEVELS: tuple[Level, ...] = ("screening", "scenario", "doubled", "refined")
 _Key = tuple[Level, int, tuple[Effect, ...]]
+_Replayers = dict[tuple[Level, int], Replayer]
 
 # ω of the observer, 1/s: soft enough to see what is wrong, hard enough not to lose the garment.
 GAIN = 6.0
@@ -150,42 +150,47 @@ class Experiment:
         )
         self.labs = {level: Lab.of(scenario, base, n) for level, n in self.numerics.items()}
         self.samples = [_samples(r, period) for r in self.recordings]
-        self._workers = workers or os.cpu_count() or 1
-        self._pool: ProcessPoolExecutor | None = None
+        self._count = workers or worker_count()
+        self._workers: Workers | None = None
+        # how the garment hangs at the start of each recording, (n,3) m
+        self._starts: dict[tuple[Level, int], FloatArray] = {}
         self._told: dict[_Key, Told] = {}
         self._apart: set[tuple[Level, int]] = set()
 
     def __enter__(self) -> Experiment:
-        replayers = {
+        replayers: _Replayers = {
             (level, i): Replayer(self.labs[level], r)
             for level in LEVELS
             for i, r in enumerate(self.recordings)
         }
-        # the first level finds how the garment hangs, the others start from there
-        self._open(replayers)
-        first = LEVELS[0]
-        count = len(self.recordings)
-        coarse = self._map(_settle, [((first, i), None) for i in range(count)])
-        others = [key for key in replayers if key[0] in ("scenario", "refined")]
-        near = {
-            level: barycentric_transfer(self.labs[first].garment, self.labs[level].garment)
-            for level, _ in others
-        }
-        fine = self._map(_settle, [(key, near[key[0]] @ coarse[key[1]]) for key in others])
-        for i in range(count):
-            replayers[first, i].start_from(coarse[i])
-        for key, start in zip(others, fine, strict=True):
-            replayers[key].start_from(start)
-            if key[0] == "refined":
-                # on the same mesh
-                replayers["doubled", key[1]].start_from(start)
-        self._pool_or_fail().shutdown()
-        self._open(replayers)
+        self._workers = Workers(replayers, self._count)
+        try:
+            self._settle()
+        except BaseException:
+            self._workers.end()
+            raise
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+        if self._workers is not None:
+            self._workers.end()
+            self._workers = None
+
+    def _settle(self) -> None:
+        """Finds how the garment hangs: at the first level, from where the others start."""
+        first = LEVELS[0]
+        count = range(len(self.recordings))
+        coarse = self._map(_settled, [((first, i), None) for i in count])
+        self._starts = {(first, i): coarse[i] for i in count}
+        near: dict[Level, FloatArray] = {
+            level: barycentric_transfer(self.labs[first].garment, self.labs[level].garment)
+            for level in ("scenario", "refined")
+        }
+        others = [(level, i) for level in near for i in count]
+        fine = self._map(_settled, [(key, near[key[0]] @ coarse[key[1]]) for key in others])
+        self._starts |= dict(zip(others, fine, strict=True))
+        # on the same mesh
+        self._starts |= {("doubled", i): self._starts["refined", i] for i in count}
 
     def tell(
         self,
@@ -210,7 +215,9 @@ class Experiment:
             for level, effects in jobs
         ]
         new = [k for k in dict.fromkeys(k for row in keys for k in row) if k not in self._told]
-        work = [(level, i, effects, self.samples[i]) for level, i, effects in new]
+        work = [
+            (level, i, self._start(level, i), effects, self.samples[i]) for level, i, effects in new
+        ]
         for key, told in zip(new, self._map(_replay, work, progress), strict=True):
             self._told[key] = told
             if not key[2] and not told.contact.any():
@@ -242,52 +249,45 @@ class Experiment:
         """
         count = len(self.recordings)
         work = [
-            (level, i, tuple(effects), disturbed)
+            (level, i, self._start(level, i), tuple(effects), disturbed)
             for level, effects, disturbed in jobs
             for i in range(count)
         ]
         told = self._map(_run_free, work, progress)
         return [told[j * count : (j + 1) * count] for j in range(len(jobs))]
 
-    def _open(self, replayers: dict[tuple[Level, int], Replayer]) -> None:
-        global _replayers
-        _replayers = replayers
-        # forked workers share what is in memory, compiled kernels too
-        context = multiprocessing.get_context("fork")
-        self._pool = ProcessPoolExecutor(self._workers, mp_context=context)
-
-    def _pool_or_fail(self) -> ProcessPoolExecutor:
-        if self._pool is None:
+    def _start(self, level: Level, index: int) -> FloatArray:
+        if self._workers is None:
             raise RuntimeError("the experiment is not open; use `with`")
-        return self._pool
+        return self._starts[level, index]
 
     def _map(self, function, work, progress=None):  # type: ignore[no-untyped-def]
-        futures = [self._pool_or_fail().submit(function, *w) for w in work]
-        results = []
-        for future in futures:
-            results.append(future.result())
-            if progress is not None:
-                progress()
-        return results
+        if self._workers is None:
+            raise RuntimeError("the experiment is not open; use `with`")
+        return self._workers.map(function, work, progress)
 
 
-_replayers: dict[tuple[Level, int], Replayer] = {}
-
-
-def _settle(key: tuple[Level, int], near: FloatArray | None) -> FloatArray:
-    return _replayers[key].settled(near)
+def _settled(replayers: _Replayers, key: tuple[Level, int], near: FloatArray | None) -> FloatArray:
+    return replayers[key].settled(near)
 
 
 def _replay(
-    level: Level, index: int, effects: tuple[Effect, ...], samples: npt.NDArray[np.int64]
+    replayers: _Replayers,
+    level: Level,
+    index: int,
+    start: FloatArray,
+    effects: tuple[Effect, ...],
+    samples: npt.NDArray[np.int64],
 ) -> Told:
+    replayer = replayers[level, index]
+    replayer.start_from(start)
     try:
-        p = _replayers[level, index].run(effects, gain=GAIN)
+        p = replayer.run(effects, gain=GAIN)
     except ValueError:
         # effects may be tried at values with which coarse steps swing up
         if not effects:
             raise
-        markers = _replayers[level, index].recording.marker_position.shape[1]
+        markers = replayer.recording.marker_position.shape[1]
         count = len(samples)
         far = np.full((count, markers, 3), _FAR)
         return Told(far, np.full((count, 2, 3), _HARD), np.zeros(count))
@@ -298,8 +298,16 @@ def _replay(
     )
 
 
-def _run_free(level: Level, index: int, effects: tuple[Effect, ...], disturbed: bool) -> FreeRun:
-    replayer = _replayers[level, index]
+def _run_free(
+    replayers: _Replayers,
+    level: Level,
+    index: int,
+    start: FloatArray,
+    effects: tuple[Effect, ...],
+    disturbed: bool,
+) -> FreeRun:
+    replayer = replayers[level, index]
+    replayer.start_from(start)
     time = replayer.recording.time
     count = max(1, round(replayer.recording.duration / _WINDOW))
     length = replayer.recording.duration / count

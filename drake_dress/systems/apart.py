@@ -23,10 +23,16 @@ class Apart:
     """
 
     def __init__(self, work: Callable[..., Any]) -> None:
-        self._pool = WorkerPool(1, initializer=_begin, initargs=(work,))
+        self._work = work
+        self._start()
+
+    def _start(self) -> None:
+        self._pool = WorkerPool(1, initializer=_begin, initargs=(self._work,))
 
     def submit(self, *arguments: Any) -> Future[Any]:
-        """Returns what will be the result."""
+        """Returns what will be the result; where the process has ended, another one begins."""
+        if not self._pool.alive:
+            self._start()
         return self._pool.submit(_work, *arguments)
 
     def kill(self) -> None:

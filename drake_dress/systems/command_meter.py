@@ -35,7 +35,9 @@ class CommandMeter(LeafSystem):
     Args:
         period, offset: of the commands, s.
 
-    The newest commands are kept, as many as a few minutes have, however long a run takes.
+    The newest commands are kept, as many as a few minutes have, however long a run takes. They are
+    kept outside the context: they tell of this process and its clock, not of what is simulated, and
+    nothing in a diagram reads them.
     """
 
     def __init__(self, period: float, offset: float) -> None:

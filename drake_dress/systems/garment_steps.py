@@ -22,8 +22,9 @@ from drake_dress.systems.shared_memory import SharedMemory
 from drake_dress.worker_pool import end_with, kill_at_exit
 
 FloatArray = npt.NDArray[np.float64]
-# The fields of a state that are vectors of the nodes, and those that are numbers of theirs.
-_VECTORS, _NUMBERS = ("x", "v", "reaction"), ("mode", "owner")
+# The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
+# solvers go on with.
+_VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner"), "solver"
 # What is said of a step that begins: it goes on from the last one, or from a state that is given.
 _GO_ON, _FROM_GIVEN = b"\0", b"\1"
 
@@ -184,7 +185,8 @@ class _Shared:
 
     @property
     def _state_bytes(self) -> int:
-        return self._n * (3 * 8 * len(_VECTORS) + 4 * len(_NUMBERS))
+        n = self._n
+        return n * (3 * 8 * len(_VECTORS) + 4 * len(_NUMBERS)) + 4 * 2 * (n + 1)
 
     def around(self) -> FloatArray:
         """Returns the array."""
@@ -202,12 +204,14 @@ class _Shared:
             for name in _NUMBERS:
                 arrays[name] = np.frombuffer(memory, np.int32, n, at)
                 at += 4 * n
+            solver = np.frombuffer(memory, np.int32, 2 * (n + 1), at)
+            arrays[_SOLVER] = solver.reshape(2, -1)
             found.append(ClothState(**arrays))
         return found
 
 
 def _copy(source: ClothState, target: ClothState) -> None:
-    for name in (*_VECTORS, *_NUMBERS):
+    for name in (*_VECTORS, *_NUMBERS, _SOLVER):
         getattr(target, name)[:] = getattr(source, name)
 
 

@@ -16,6 +16,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
 from drake_dress.models.dressing.stages import Stage
+from drake_dress.models.immutable import Immutable
 from drake_dress.systems.apart import Apart
 
 # Between looks for a plan where the world does not wait, s.
@@ -30,6 +31,24 @@ class _Finished:
     state: PolicyState
     joints: np.ndarray
     solve_time: float
+
+
+@dataclass(frozen=True)
+class _Progress(Immutable):
+    """The solve under way in a context, if there is one.
+
+    A copy of the context awaits the same result: what a solve gives depends on what it was begun
+    with alone, and a Future can be read more than once.
+
+    Attributes:
+        pending: the result, None while no solve is under way.
+        begun_at: when the last solve was begun, s.
+        failure: why there are no more solves.
+    """
+
+    pending: Future[_Finished] | None = None
+    begun_at: float = 0.0
+    failure: str | None = None
 
 
 @dataclass(frozen=True)
@@ -96,8 +115,9 @@ class GlobalMpc(LeafSystem):
         patience: with a solve, where it does not, s.
         beside: whether solves run in a process of their own where the world waits, too.
 
-    Attributes:
-        failure: why there are no plans any more; None while there are.
+    All that a run changes stands in its context: several simulators of one diagram give what each
+    gives alone. They share the thread or process that solves, one solve after another; where the
+    world does not wait, a failure of one ends the solve under way of another, too.
     """
 
     def __init__(
@@ -119,7 +139,6 @@ class GlobalMpc(LeafSystem):
         self._delay = delay
         self._period = period
         self._patience = patience
-        self.failure: str | None = None
         solve = _Solve(policy)
         self._apart = Apart(solve) if beside or not waits else None
         if self._apart is None:
@@ -127,17 +146,16 @@ class GlobalMpc(LeafSystem):
             self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)
         else:
             self._submit = self._apart.submit
-        self._pending: Future[_Finished] | None = None
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
         self._waits = waits
-        self._begun_at = 0.0
         idle = GlobalPlan(
             0.0, policy.parameters.time_step, np.zeros((n, 2, 3)), np.zeros((n + 1, 2, 3))
         )
         self._idle = idle
         self._plan = self.DeclareAbstractState(Value(idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
+        self._progress = self.DeclareAbstractState(Value(_Progress()))
         # what `_show` shows, and when was seen what the plan in use answers
         self._shown = self.DeclareDiscreteState(np.zeros(11))
         self.DeclareVectorInputPort("garment_position", 3 * m)
@@ -205,54 +223,66 @@ class GlobalMpc(LeafSystem):
             finished.joints[first:] if p.plans else None,
         )
 
+    def failure(self, context: Context) -> str | None:
+        """Returns why there are no plans any more, in its own context; None while there are."""
+        return self._progress_in(context).failure
+
+    def _progress_in(self, context: Context) -> _Progress:
+        progress: _Progress = context.get_abstract_state(self._progress).get_value()
+        return progress
+
     def _begin(self, context: Context, state: State) -> None:
-        if self._pending is not None or self.failure is not None:
+        progress = self._progress_in(context)
+        if progress.pending is not None or progress.failure is not None:
             return
-        gone = context.get_time() - self._begun_at
-        self._begun_at = context.get_time()
+        now = context.get_time()
         x = self.get_input_port(0).Eval(context).reshape(-1, 3).copy()
         v = self.get_input_port(1).Eval(context).reshape(-1, 3).copy()
         joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3).copy()
         memory = context.get_abstract_state(self._memory).get_value()
-        now = context.get_time()
         # periods that were missed are gone, too
-        periods = max(1, round(gone / self._period))
+        periods = max(1, round((now - progress.begun_at) / self._period))
         steps = round(periods * self._period / self._policy.parameters.time_step)
-        self._pending = self._submit(memory, x, v, joints, now, steps)
+        pending = self._submit(memory, x, v, joints, now, steps)
+        self._set_progress(state, _Progress(pending, now))
+
+    def _set_progress(self, state: State, progress: _Progress) -> None:
+        state.get_mutable_abstract_state(self._progress).set_value(progress)
 
     def _look(self, context: Context, state: State) -> None:
-        if self._pending is None:
+        progress = self._progress_in(context)
+        if progress.pending is None:
             return
-        since = context.get_time() - self._begun_at
-        if self._pending.done():
-            error = self._pending.exception()
+        since = context.get_time() - progress.begun_at
+        if progress.pending.done():
+            error = progress.pending.exception()
             if error is not None:
-                self._fail(f"{type(error).__name__}: {error}", state)
+                self._fail(f"{type(error).__name__}: {error}", progress, state)
             elif since >= self._delay - 1e-9:
                 self._finish(context, state)
         elif since > self._patience:
-            self._fail(f"no plan for {self._patience:g} s", state)
+            self._fail(f"no plan for {self._patience:g} s", progress, state)
         else:
             plan: GlobalPlan = context.get_abstract_state(self._plan).get_value()
             end = plan.start + len(plan.velocity) * plan.time_step
             if plan.assignment is not None and context.get_time() > end + self._period:
                 state.get_mutable_abstract_state(self._plan).set_value(self._idle)
 
-    def _fail(self, why: str, state: State) -> None:
-        self.failure = f"global controller: {why}"
-        self._pending = None
+    def _fail(self, why: str, progress: _Progress, state: State) -> None:
+        self._set_progress(state, _Progress(None, progress.begun_at, f"global controller: {why}"))
         state.get_mutable_abstract_state(self._plan).set_value(self._idle)
         if self._apart is not None:
             # nobody waits for it, the end of this process included
             self._apart.kill()
 
     def _finish(self, context: Context, state: State) -> None:
-        if self._pending is None:
+        progress = self._progress_in(context)
+        if progress.pending is None:
             return
-        finished = self._pending.result()
-        self._pending = None
+        finished = progress.pending.result()
+        self._set_progress(state, _Progress(None, progress.begun_at))
         now = context.get_time()
-        plan = self._plan_of(finished, now if self._waits else self._begun_at + self._delay)
+        plan = self._plan_of(finished, now if self._waits else progress.begun_at + self._delay)
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)
         shown = context.get_discrete_state(self._shown).value()
@@ -262,7 +292,7 @@ class GlobalMpc(LeafSystem):
                 [
                     [float(s) for s in stages],
                     finished.decision.target[-1].ravel(),
-                    [finished.solve_time, shown[9] + 1.0, self._begun_at],
+                    [finished.solve_time, shown[9] + 1.0, progress.begun_at],
                 ]
             )
         )

@@ -30,6 +30,13 @@ class _Memory(Immutable):
     solve_time: float = np.nan
 
 
+@dataclass(frozen=True)
+class _Solving(Immutable):
+    """The result of the solve under way on the thread, if there is one; copies await the same."""
+
+    pending: Future[_Memory] | None = None
+
+
 class LocalCompensation(LeafSystem):
     """Solves local problems at a fixed rate, and corrects between two solves by their gains.
 
@@ -65,7 +72,7 @@ class LocalCompensation(LeafSystem):
         joints_step: between predicted joints, s.
         joints_count: M, how many there are beyond now.
         feedback: whether to correct between solves.
-        record: takes each problem solved, if given.
+        record: takes each problem solved, if given, of all contexts.
         beside: whether to solve on a thread, while the rest of the diagram waits for others.
     """
 
@@ -88,7 +95,7 @@ class LocalCompensation(LeafSystem):
         self._feedback = feedback
         self._record = record
         self._threads = ThreadPoolExecutor(1, "local-controller") if beside else None
-        self._pending: Future[_Memory] | None = None
+        self._solving = self.DeclareAbstractState(Value(_Solving()))
         idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
         resting = controller.resting(0.0)
         self._memory = self.DeclareAbstractState(Value(_Memory(LocalState(), resting)))
@@ -138,7 +145,8 @@ class LocalCompensation(LeafSystem):
         )
         looked = clock.perf_counter() - begin
         if self._threads is not None:
-            self._pending = self._threads.submit(self._solved, looked, *seen)
+            solving = _Solving(self._threads.submit(self._solved, looked, *seen))
+            state.get_mutable_abstract_state(self._solving).set_value(solving)
         else:
             state.get_mutable_abstract_state(self._memory).set_value(self._solved(looked, *seen))
 
@@ -153,8 +161,10 @@ class LocalCompensation(LeafSystem):
 
     def _adopt(self, context: Context, state: State) -> None:
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
-        if self._pending is not None:
-            memory, self._pending = self._pending.result(), None
+        solving: _Solving = context.get_abstract_state(self._solving).get_value()
+        if solving.pending is not None:
+            memory = solving.pending.result()
+            state.get_mutable_abstract_state(self._solving).set_value(_Solving())
             state.get_mutable_abstract_state(self._memory).set_value(memory)
         state.get_mutable_abstract_state(self._plan).set_value(memory.plan)
         if np.isfinite(memory.solve_time):

@@ -29,6 +29,10 @@ _REMEMBERED = 10_000
 class _Memory(Immutable):
     watched: tuple[WatchState, ...]
     supervised: SupervisionState
+    # what changed, when: s and a line
+    events: tuple[tuple[float, str], ...] = ()
+    # messages of each source so far that were repeated or late
+    dropped: tuple[int, ...] = ()
 
 
 class StationWatch(LeafSystem):
@@ -49,8 +53,8 @@ class StationWatch(LeafSystem):
     Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) of each source, flags
     of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
     while none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it
-    reports that it does not follow. Beside the ports, `events` tells what changed, and `dropped`
-    counts the repeated and late messages of each source.
+    reports that it does not follow. Beside the ports, `events` tells what changed in a context, and
+    `dropped` counts the repeated and late messages of each source.
 
     Args:
         sources: by name, what is asked of each.
@@ -72,12 +76,9 @@ class StationWatch(LeafSystem):
         self.sources = tuple(sources)
         self._settings = tuple(sources.values())
         self._patience = patience
-        # what changed, when: s and a line
-        self.events: list[tuple[float, str]] = []
-        self.dropped = dict.fromkeys(self.sources, 0)
         count = len(self.sources)
         self._memory = self.DeclareAbstractState(
-            Value(_Memory((WatchState(),) * count, SupervisionState.of(count)))
+            Value(_Memory((WatchState(),) * count, SupervisionState.of(count), (), (0,) * count))
         )
         for name in self.sources:
             self.DeclareAbstractInputPort(name, Value(Received()))
@@ -108,17 +109,21 @@ class StationWatch(LeafSystem):
             for w, arrival, settings in zip(memory.watched, arrivals, self._settings, strict=True)
         )
         supervised = supervise(memory.supervised, [w.fault for w in watched], now, self._patience)
-        self._note(memory, watched, supervised, context.get_time())
-        self._count(arrivals, context.get_time())
-        state.get_mutable_abstract_state(self._memory).set_value(_Memory(watched, supervised))
+        events = memory.events
+        if len(events) < _REMEMBERED:
+            lines = self._changes(memory, watched, supervised)
+            lines += self._dropping(memory.dropped, arrivals)
+            events += tuple((context.get_time(), line) for line in lines)
+        dropped = tuple(arrival.dropped for arrival in arrivals)
+        memory = _Memory(watched, supervised, events, dropped)
+        state.get_mutable_abstract_state(self._memory).set_value(memory)
 
-    def _note(
+    def _changes(
         self,
         before: _Memory,
         watched: tuple[WatchState, ...],
         supervised: SupervisionState,
-        now: float,
-    ) -> None:
+    ) -> list[str]:
         lines = [
             told(self._told(i), w.fault, w.reason) if w.fault else f"{self._told(i)}: sound"
             for i, (old, w) in enumerate(zip(before.watched, watched, strict=True))
@@ -126,20 +131,27 @@ class StationWatch(LeafSystem):
         ]
         if before.supervised.permitted != supervised.permitted:
             lines.append("arms may move" if supervised.permitted else "arms hold")
-        self._tell(now, lines)
+        return lines
 
-    def _count(self, arrivals: list[Arrival], now: float) -> None:
-        for i, (name, arrival) in enumerate(zip(self.sources, arrivals, strict=True)):
-            if arrival.dropped and not self.dropped[name]:
-                self._tell(now, [f"{self._told(i)}: a repeated or late message is dropped"])
-            self.dropped[name] = arrival.dropped
-
-    def _tell(self, now: float, lines: list[str]) -> None:
-        if len(self.events) < _REMEMBERED:
-            self.events += [(now, line) for line in lines]
+    def _dropping(self, before: tuple[int, ...], arrivals: list[Arrival]) -> list[str]:
+        return [
+            f"{self._told(i)}: a repeated or late message is dropped"
+            for i, (count, arrival) in enumerate(zip(before, arrivals, strict=True))
+            if arrival.dropped and not count
+        ]
 
     def _told(self, i: int) -> str:
         return self.sources[i].replace("_", " ")
+
+    def events(self, context: Context) -> tuple[tuple[float, str], ...]:
+        """Returns what changed, and when, s, in its own context."""
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        return memory.events
+
+    def dropped(self, context: Context) -> dict[str, int]:
+        """Returns how many messages of each source were repeated or late, in its own context."""
+        memory: _Memory = context.get_abstract_state(self._memory).get_value()
+        return dict(zip(self.sources, memory.dropped, strict=True))
 
     def conclusion(self, context: Context) -> str | None:
         """Returns why the run ends, in its own context; None while it goes on."""

@@ -134,6 +134,14 @@ class Pair:
         watch = self.station.watch
         return watch.conclusion(watch.GetMyContextFromRoot(self.root))
 
+    def events(self) -> tuple[tuple[float, str], ...]:
+        watch = self.station.watch
+        return watch.events(watch.GetMyContextFromRoot(self.root))
+
+    def dropped(self) -> dict[str, int]:
+        watch = self.station.watch
+        return watch.dropped(watch.GetMyContextFromRoot(self.root))
+
 
 def test_both_stations_have_the_same_ports() -> None:
     pair = Pair(settings=(CAMERA,))
@@ -339,7 +347,7 @@ def test_messages_out_of_order_hold_nothing_and_are_counted() -> None:
     since = np.array([r["since"][0] for r in rows])
     assert (permitted[since > 0.3] == 1.0).all()
     assert pair.conclusion() is None
-    dropped = pair.station.watch.dropped
+    dropped = pair.dropped()
     assert dropped["left_arm"] > 20 and dropped["right_arm"] > 20 and dropped["person"] > 5
     # of an estimate that comes every 20 ms, a clock set back by 8 ms makes none late
     assert dropped["garment"] == 0
@@ -348,7 +356,7 @@ def test_messages_out_of_order_hold_nothing_and_are_counted() -> None:
 def test_what_is_refused_is_told_in_the_events() -> None:
     pair = Pair(LabFault("person_limb", "person", 0.4, 0.3))
     pair.run(1.2)
-    lines = [line for _, line in pair.station.watch.events]
+    lines = [line for _, line in pair.events()]
     refused = next(i for i, line in enumerate(lines) if "forearm" in line)
     assert lines[refused] == "person: left forearm 0.96 m, expected 0.21 to 0.43 m (impossible)"
     assert lines[refused + 1] == "arms hold"

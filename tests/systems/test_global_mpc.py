@@ -77,7 +77,8 @@ def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
         assert moves[7:10].all(), ends
         first = int(np.argmin(moves[7:])) + 7
         assert not moves[first] and 0.1 * first <= 1.3 + _PERIOD + 0.11, ends
-        found = controllers[ends].failure
+        mpc = controllers[ends]
+        found = mpc.failure(mpc.GetMyContextFromRoot(simulator.get_context()))
         if failure is None:
             assert found is None
             assert moves[first:].any(), "it goes on with the plan that came late"

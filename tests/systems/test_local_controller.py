@@ -111,3 +111,39 @@ def test_between_solves_it_answers_to_where_grippers_are(controller: LocalContro
 def test_a_delay_of_a_period_or_more_is_refused(controller: LocalController) -> None:
     with pytest.raises(ValueError, match="delay"):
         LocalCompensation(controller, PERIOD, PERIOD, 0.2, 5)
+
+
+def test_solves_in_two_contexts_do_not_know_of_each_other(controller: LocalController) -> None:
+    """Also while they are under way on the thread, and in a copy of a context."""
+    system, first, _ = simulator(controller, beside=True)
+    second = Simulator(system, first.get_context().Clone())
+    port = system.GetInputPort("garment_position")
+    moved = port.Eval(second.get_context()) + 0.01
+    port.FixValue(second.get_mutable_context(), moved)
+    second.Initialize()
+
+    def go_on(*simulators: Simulator) -> list[np.ndarray]:
+        seen = []
+        # ends within solves and between them
+        for k in range(1, 12):
+            for sim in simulators:
+                sim.AdvanceTo(0.5 * k * DELAY)
+                seen.append(asked(system, sim))
+        return seen
+
+    in_turn = go_on(first, second)
+    alone = []
+    for offset in (0.0, 0.01):
+        other, sim, _ = simulator(controller, beside=True)
+        where = other.GetInputPort("garment_position")
+        context = sim.get_mutable_context()
+        where.FixValue(context, where.Eval(context) + offset)
+        sim.Initialize()
+        found = []
+        for k in range(1, 12):
+            sim.AdvanceTo(0.5 * k * DELAY)
+            found.append(asked(other, sim))
+        alone.append(found)
+    np.testing.assert_array_equal(in_turn[0::2], alone[0])
+    np.testing.assert_array_equal(in_turn[1::2], alone[1])
+    assert not np.array_equal(in_turn[0::2], in_turn[1::2])

@@ -240,6 +240,8 @@ class ExplicitBiasCloth:
             ValueError: an input has the wrong shape, or something in it is not finite.
         """
         h, m = self.time_step, self.material
+        # The tape keeps them: a caller may write to his arrays before the adjoint runs.
+        x, v, held_motion = x.copy(), v.copy(), held_motion.copy()
         if held_motion.shape != (len(self.held), 3):
             raise ValueError(
                 f"held_motion has shape {held_motion.shape}, expected ({len(self.held)}, 3)"

@@ -10,7 +10,7 @@ surface, slipping nodes keep their normal velocity and feel μ times their norma
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,7 +23,6 @@ from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK, SystemMatrix
 from drake_dress.models.cloth.filtered_stiffness import (
-    no_stretch,
     normal_response,
     prepare_filtered,
 )
@@ -61,6 +60,9 @@ class ClothState:
         mode: (n,) 0 free, 1 stick, 2 slip, 3 held.
         reaction: (n,3) force of person or gripper on the node in the last step, N.
         owner: (n,) obstacle that the node touches, -1 without.
+        solver: (2,n+1) what the linear solvers of the next step start from, so that a step depends
+            on its arguments alone. Row 0 is of the linearly implicit scheme, row 1 of Projective
+            Dynamics: how worn the factor is, -1 without one, then 1 for each node it leaves out.
     """
 
     x: FloatArray
@@ -68,6 +70,12 @@ class ClothState:
     mode: IntArray
     reaction: FloatArray
     owner: IntArray
+    solver: IntArray = field(default_factory=lambda: np.empty((2, 0), dtype=np.int32))
+
+    def __post_init__(self) -> None:
+        if self.solver.shape[1] == 0:
+            no_factor = np.full((2, len(self.x) + 1), -1, dtype=np.int32)
+            object.__setattr__(self, "solver", no_factor)
 
     @staticmethod
     def at_rest(x: FloatArray) -> ClothState:
@@ -154,9 +162,8 @@ class ImplicitCloth:
             Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale, fibres
         )
         self._scale, self._diagonal = scale, (mass + scale * bending).diagonal()
-        self._block = no_stretch()
+        # the factor made last: another state may go on with the same one
         self._factor: Factor | None = None
-        self._steps_since_factor = 0
 
     def step(
         self,
@@ -183,7 +190,7 @@ class ImplicitCloth:
         x, v = state.x, state.v
         mu, adhesion = influences.contact_law(m.friction, len(x))
         force = internal_force(e, m.stretch_stiffness, m.bending_stiffness, x)
-        self._block = prepare_filtered(e, m.stretch_stiffness, x)
+        block = prepare_filtered(e, m.stretch_stiffness, x)
         force += self.mass[:, None] * self.gravity
         if self._fibres is not None:
             self._fibres.add_force(x, force)
@@ -191,7 +198,7 @@ class ImplicitCloth:
         if influences.force is not None:
             force += influences.force
         rhs = self.mass[:, None] * v + h * force
-        across = normal_response(e, self._block, self._scale, self._diagonal)
+        across = normal_response(e, block, self._scale, self._diagonal)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
@@ -211,19 +218,18 @@ class ImplicitCloth:
         )
         mode = contact.mode
 
-        velocity = self._start(v, held_velocity, mode, near.normal, rhs, guess)
+        velocity = self._start(v, held_velocity, mode, near.normal, rhs, block, guess)
         total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
-        refactored = self._renew_factor(mode, contact.resistance)
+        factor, refactored, memory = self._renewed_factor(state.solver[0], mode, contact.resistance)
         impulse = np.empty_like(velocity)
         max_passes = self._max_passes if contact.is_near else 1
         while True:
             contact.prescribe(velocity)
             last = passes + 1 >= max_passes
             tolerance = self._tolerance if last else _COARSER * self._tolerance
-            assert self._factor is not None
             iterations, residual = self._system.solve(
-                self._factor,
-                self._block,
+                factor,
+                block,
                 mode,
                 near.normal,
                 rhs + contact.drive(),
@@ -252,10 +258,9 @@ class ImplicitCloth:
                 break
         end = x + h * velocity
         if not np.isfinite(end).all():
-            self._factor = None
             explain_not_finite(x, v, held_velocity, self.held)
         if residual > 0.1:
-            self._factor = None
+            memory[0] = -1
         touching = (mode == STICK) | (mode == SLIP)
         after = ClothState(
             end,
@@ -263,6 +268,7 @@ class ImplicitCloth:
             mode,
             contact.impulse(velocity, impulse) / h,
             np.where(touching, near.owner, -1).astype(np.int32),
+            np.stack([memory, state.solver[1]]),
         )
         return after, StepInfo(passes, total, residual, refactored)
 
@@ -273,6 +279,7 @@ class ImplicitCloth:
         mode: IntArray,
         normal: FloatArray,
         rhs: FloatArray,
+        block: FloatArray,
         guess: FloatArray | None,
     ) -> FloatArray:
         """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
@@ -284,27 +291,37 @@ class ImplicitCloth:
         best, least = v, np.inf
         for start in (v.copy(), other):
             start[self.held] = held_velocity
-            size = self._system.residual2(start, self._block, rhs, mode, normal)
+            size = self._system.residual2(start, block, rhs, mode, normal)
             # what is no number is taken, too: it is told at the end of the step
             if not size >= least:
                 best, least = start, size
         return best
 
-    def _renew_factor(self, mode: IntArray, resistance: FloatArray) -> bool:
-        """Makes a factor of P without the bound nodes when the last one has become stale."""
+    def _renewed_factor(
+        self, memory: IntArray, mode: IntArray, resistance: FloatArray
+    ) -> tuple[Factor, bool, IntArray]:
+        """Returns a factor of P without the bound nodes, a new one if the last has become stale.
+
+        Also returns whether it is new, and what the next step has to know of it.
+
+        Args:
+            memory: (n+1,) row of `ClothState.solver`.
+            mode: (n,) of the nodes.
+            resistance: (n,) of friction to slipping nodes, kg.
+        """
         masked = (mode == STICK) | (mode == HELD) | (resistance > self._firm)
-        stale = self._factor is None
-        if self._factor is not None:
-            different = int(np.count_nonzero(masked != self._factor.masked))
+        age, last = int(memory[0]), memory[1:] == 1
+        stale = age < 0
+        if not stale:
+            different = int(np.count_nonzero(masked != last))
             allowed = max(15, int(0.15 * np.count_nonzero(masked)))
-            stale = different > allowed or (
-                different > 0 and self._steps_since_factor >= _REFACTOR_AFTER
-            )
-        self._steps_since_factor += 1
-        if stale:
-            self._factor = self._symbolic.factorize(masked)
-            self._steps_since_factor = 0
-        return stale
+            stale = different > allowed or (different > 0 and age >= _REFACTOR_AFTER)
+        left_out = masked if stale else last
+        if self._factor is None or not np.array_equal(self._factor.masked, left_out):
+            self._factor = self._symbolic.factorize(left_out)
+        following = np.empty(len(mode) + 1, dtype=np.int32)
+        following[0], following[1:] = 0 if stale else age + 1, left_out
+        return self._factor, stale, following
 
 
 def with_position(state: ClothState, x: FloatArray) -> ClothState:

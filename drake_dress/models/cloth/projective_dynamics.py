@@ -197,6 +197,7 @@ class ProjectiveDynamicsCloth:
             self._tolerance,
         )
         self._system.start_counting()
+        self._system.go_on(state.solver[1])
         inertial = state.x + h * state.v + h * h * self.gravity
         if influences.force is not None:
             inertial += h * h * influences.force / self.mass[:, None]
@@ -206,9 +207,11 @@ class ProjectiveDynamicsCloth:
         # a falling garment falls on, a hanging one goes on as before
         falls = equations.energy(fall) < equations.energy(steady)
         start = fall if falls else steady
+        of_predictor = state.solver[0]
         if self._predictor is not None:
             ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences, guess)
             start = steady = ahead.x
+            of_predictor = ahead.solver[0]
         x = contact.place(start, steady)
         history = self._history
         if history is not None:
@@ -254,6 +257,7 @@ class ProjectiveDynamicsCloth:
             contact.mode,
             reaction,
             np.where(touching, contact.owner, -1).astype(np.int32),
+            np.stack([of_predictor, self._system.memory()]),
         )
         return after, ProjectiveInfo(
             iterations,

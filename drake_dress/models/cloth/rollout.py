@@ -92,6 +92,8 @@ def roll_out(
             f"{count} motions and {len(obstacles)} sets of obstacles, expected as many"
         )
     length = segment or max(1, math.isqrt(count))
+    # The adjoint runs the steps again: a caller may write to his arrays before it does.
+    x, v, held_motion = x.copy(), v.copy(), np.array(held_motion)
     starts, states = [], []
     for j in range(count):
         if j % length == 0:

@@ -4,6 +4,9 @@
 
 are tensors that know how to go backward. `bodies` and `material` let gradients flow to where the
 obstacles are and to what the garment is made of. Torch is imported with this module only.
+
+The step keeps copies of its inputs, and torch keeps their version numbers: an input that is written
+to before the backward pass raises RuntimeError there. So does a second derivative.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 import torch
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.differentiable_once import differentiable_once
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 
 MATERIAL = ("surface_density", "stretch_stiffness", "bending_stiffness", "friction", "margin")
@@ -35,22 +39,28 @@ class ClothStep(torch.autograd.Function):
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Runs the step; see `cloth_step`."""
         offset = _array(bodies)
-        moved = obstacles.moved(offset) if offset.any() else obstacles
+        moved = obstacles.moved(offset) if offset.any() else obstacles.copy()
         x1, v1, reaction, tape = cloth.step(_array(x), _array(v), _array(held_motion), moved)
         ctx.cloth, ctx.tape = cloth, tape
         ctx.by_material = ctx.needs_input_grad[6]
+        ctx.save_for_backward(x, v, held_motion, bodies, material)
         return tuple(torch.from_numpy(a) for a in (x1, v1, reaction[cloth.held]))  # type: ignore[return-value]
 
     @staticmethod
     def backward(ctx: Any, *bars: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         """Runs the adjoint."""
+        inputs = ctx.saved_tensors  # raises if one was written to since
         g = ctx.cloth.vector_jacobian_product(ctx.tape, *map(_array, bars), ctx.by_material)
         bodies = np.stack([g.origin, g.rotation, g.velocity, g.angular_velocity], axis=1)
         material = None
         if ctx.by_material:
             material = torch.tensor([g.material[name] for name in MATERIAL], dtype=torch.float64)
         back = [torch.from_numpy(a) for a in (g.x, g.v, g.held_motion, bodies)]
-        return (None, None, *back, material)
+        return (
+            None,
+            None,
+            *differentiable_once((*back, material), (*inputs, *bars), "cloth_step"),
+        )
 
 
 def cloth_step(
@@ -64,7 +74,8 @@ def cloth_step(
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Returns positions (n,3), velocities (n,3) and reactions of the held nodes (k,3) after a step.
 
-    All tensors are float64 on the CPU.
+    All tensors are float64 on the CPU. Differentiable once: a second derivative raises
+    RuntimeError, and so does a backward pass after an input was written to in place.
 
     Args:
         cloth: the garment.

@@ -166,7 +166,7 @@ def solve_constrained_ddp(
                 v = inside[0]
             if not ended or not _are_within(p.price, on_x, on_v):
                 on_x.multiplier[:], on_v.multiplier[:] = inside[1:]
-            converged = True
+            converged = ended
         elif not np.isfinite(v).all():
             v[:], on_x.multiplier[:], on_v.multiplier[:] = 0.0, 0.0, 0.0
     return LocalSolution(
@@ -266,10 +266,14 @@ def feedback_gains(problem: LocalProblem, solution: LocalSolution) -> FloatArray
     hessian[:, range(n), range(n)] = 2.0 * p.state_weight
     x_slope = 2.0 * p.state_weight * (solution.x - p.state_target)
     v_slope = 2.0 * p.input_weight * (solution.v - p.input_target)
-    law = _room(steps, n, m, on_x.radius.shape[1] + on_v.radius.shape[1] + n)
+    rows = on_x.radius.shape[1] + on_v.radius.shape[1] + n
     backward: Any = _backward
     r = 2.0 * p.input_weight
-    backward(p.input_matrix, hessian, r, x_slope, v_slope, on_x, on_v, law)
+    dropped = 1
+    while dropped:
+        law = _room(steps, n, m, rows)
+        dropped = backward(p.input_matrix, hessian, r, x_slope, v_slope, on_x, on_v, law)
+        rows += dropped
     gain: FloatArray = law.gain
     return gain
 
@@ -398,8 +402,12 @@ def _backward(b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-un
         on_x: bounds on states, measured along it.
         on_v: bounds on inputs, likewise.
         law: filled.
+
+    Returns:
+        How many rows found no room in the law: if any, fill another one with room for them.
     """
     n, m = b.shape
+    dropped = 0
     steps, most_rows = law.owner.shape
     p_xx, p_x = np.zeros((n, n)), np.zeros(n)
     rows, residual = np.empty((most_rows, m + n + 1)), np.empty((most_rows, m + n + 1))
@@ -413,13 +421,15 @@ def _backward(b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-un
         _act(b, p_xx, p_x, r[i], v_slope[i], law, i)
         _bend(on_v, i, law.q_vv[i])
         # `residual` still is that of the step after
-        number = _gather(b, on_x, on_v, law, i, residual, rows)
+        number, without_room = _gather(b, on_x, on_v, law, i, residual, rows)
+        dropped += without_room
         law.rank[i] = split_rows(
             rows, number, m, law.basis[i], residual, law.owner[i], law.coefficient[i]
         )
         _hand_over(rows, residual, number, m, law.owner[i], law.carried[i])
         _decide(law, i, both)
         _cost_to_go(law, i, both, p_xx, p_x)
+    return dropped
 
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
@@ -458,7 +468,9 @@ def _act(b, p_xx, p_x, r, v_slope, law, i):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def]
-    """Fills rows [g_v | g_x | g] of what is to hold after step `i`; returns how many.
+    """Fills rows [g_v | g_x | g] of what is to hold after step `i`.
+
+    Returns how many, and for how many more there is no room.
 
     They are active bounds on its input and on the state that it leads to (Eq.
     current-constraint), and what the step after could not keep by itself (Eq. future-constraint).
@@ -467,9 +479,11 @@ def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def
     n, m = b.shape
     steps, most_rows = law.owner.shape
     source = law.source[i]
-    number = 0
+    number, without_room = 0, 0
     for k in range(on_v.active.shape[1]):
-        if on_v.active[i, k] and number < most_rows:
+        if on_v.active[i, k] and number == most_rows:
+            without_room += 1
+        elif on_v.active[i, k]:
             for c in range(m):
                 s = 0.0
                 for a in range(3):
@@ -482,7 +496,9 @@ def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def
             number += 1
     on_input = number
     for k in range(on_x.active.shape[1]):
-        if on_x.active[i + 1, k] and number < most_rows:
+        if on_x.active[i + 1, k] and number == most_rows:
+            without_room += 1
+        elif on_x.active[i + 1, k]:
             for e in range(n):
                 s = 0.0
                 for a in range(3):
@@ -494,7 +510,10 @@ def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def
     if i + 1 < steps:
         for k in range(law.number[i + 1]):
             scale = law.carried[i + 1, k]
-            if law.owner[i + 1, k] >= 0 or scale == 0.0 or number >= most_rows:
+            if law.owner[i + 1, k] >= 0 or scale == 0.0:
+                continue
+            if number == most_rows:
+                without_room += 1
                 continue
             for a in range(n + 1):
                 rows[number, m + a] = handed[k, m + a] / scale
@@ -507,7 +526,7 @@ def _gather(b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def
                 s += rows[k, m + a] * b[a, c]
             rows[k, c] = s
     law.number[i] = number
-    return number
+    return number, without_room
 
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
@@ -760,7 +779,8 @@ def _sweep(cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: ignore[no
         Sweeps, and whether they ended at an optimum.
     """
     steps, m = v.shape
-    law = _room(steps, m, m, on_x.radius.shape[1] + on_v.radius.shape[1] + m)
+    room = on_x.radius.shape[1] + on_v.radius.shape[1] + m
+    law = _room(steps, m, m, room)
     b = np.eye(m)
     x_new, v_new, dx, dv = np.empty_like(x), np.empty_like(v), np.zeros_like(x), np.zeros_like(v)
     x_slope, v_slope = np.zeros_like(x), np.zeros_like(v)
@@ -775,7 +795,11 @@ def _sweep(cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: ignore[no
     _begin(on_v)
     price = 0.0
     for sweep in range(1, max_sweeps + 1):
-        _backward(b, cost.w, cost.r, x_slope, v_slope, on_x, on_v, law)
+        dropped = _backward(b, cost.w, cost.r, x_slope, v_slope, on_x, on_v, law)
+        while dropped > 0:
+            room += dropped
+            law = _room(steps, m, m, room)
+            dropped = _backward(b, cost.w, cost.r, x_slope, v_slope, on_x, on_v, law)
         _forward(b, law, dx, dv, x_found, v_found)
         x_largest, x_least, x_beyond = _judge(on_x, dx, x_found, x_linear)
         v_largest, v_least, v_beyond = _judge(on_v, dv, v_found, v_linear)

@@ -114,7 +114,7 @@ class LocalSolution:
         violation: of the worst bound.
         sweeps: backward and forward passes with an active set.
         interior_steps: with barriers instead.
-        converged: the conditions of optimality hold.
+        converged: the conditions of optimality hold; never where a solver gave up.
     """
 
     v: FloatArray

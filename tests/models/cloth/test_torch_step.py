@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit_bias import INNER, ExplicitBiasCloth
 from drake_dress.models.cloth.torch_step import MATERIAL as NAMES
 from drake_dress.models.cloth.torch_step import cloth_step
-from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb
+from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb, make
 
 
 def _scene():  # type: ignore[no-untyped-def]
@@ -59,3 +59,65 @@ def test_wrong_tensors_are_refused() -> None:
     other = torch.tensor([getattr(MATERIAL, n) for n in NAMES], dtype=torch.float64) * 1.1
     with pytest.raises(ValueError, match="the cloth was made with"):
         cloth_step(cloth, x, v, motion, limb(), material=other)
+
+
+def _leaves() -> tuple[ExplicitBiasCloth, list[torch.Tensor]]:
+    """x, v, motion, bodies, material."""
+    cloth, x, v, motion = _scene()
+    bodies = torch.zeros((2, 4, 3), dtype=torch.float64)
+    material = torch.tensor([getattr(MATERIAL, n) for n in NAMES], dtype=torch.float64)
+    return cloth, [t.requires_grad_() for t in (x, v, motion, bodies, material)]
+
+
+def _run(cloth, leaves, obstacles):  # type: ignore[no-untyped-def]
+    x, v, motion, bodies, material = leaves
+    return cloth_step(cloth, x, v, motion, obstacles, bodies, material)
+
+
+@pytest.mark.parametrize("which", range(5))
+def test_an_input_written_to_before_backward_is_noticed(which: int) -> None:
+    cloth, leaves = _leaves()
+    x1, _, _ = _run(cloth, leaves, limb())
+    with torch.no_grad():
+        leaves[which].mul_(1.5)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        x1.sum().backward()
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_what_is_written_elsewhere_does_not_change_a_gradient(inner: str) -> None:
+    """Not to results, nor to obstacles, nor to memory behind torch's back, nor by other steps."""
+    _, leaves = _leaves()
+    e, *_ = draped(0.02)
+    cloth = make(e, 0.02, inner, {"stationary": 3, "conjugate_gradients": 20}.get(inner, 1))
+    if inner == "stationary":  # has no derivative where nodes slip
+        leaves[0] = (leaves[0].detach() + 10.0).requires_grad_()
+    found = []
+    for disturbed in (False, True):
+        obstacles = limb()
+        results = _run(cloth, leaves, obstacles)
+        loss = sum(r.sum() for r in results)
+        before = [t.detach().clone() for t in leaves]
+        if disturbed:
+            other = [(t.detach() + 0.001).requires_grad_() for t in leaves[:3]]
+            cloth_step(cloth, *other, limb())[0].sum().backward()
+            for array in (obstacles.a, obstacles.b, obstacles.velocity, obstacles.angular_velocity):
+                array += 0.01
+            for tensor in (*leaves, *results):
+                tensor.detach().numpy()[...] = 7.0
+        found.append(torch.autograd.grad(loss, leaves))
+        for tensor, old in zip(leaves, before, strict=True):
+            tensor.detach().numpy()[...] = old.numpy()
+    for calm, after in zip(*found, strict=True):
+        assert torch.equal(calm, after)
+
+
+@pytest.mark.parametrize("which", range(5))
+def test_a_second_derivative_is_refused(which: int) -> None:
+    """Also where what comes in, here that of a sum, needs no gradient of its own."""
+    cloth, leaves = _leaves()
+    x1, _, _ = _run(cloth, leaves, limb())
+    (slope,) = torch.autograd.grad(x1.sum(), leaves[which], create_graph=True)
+    penalty = (slope**2).sum() + (leaves[which] ** 2).sum()
+    with pytest.raises(RuntimeError, match="cloth_step has no second derivative"):
+        penalty.backward()

@@ -6,6 +6,7 @@ Vectors are (B,n) arrays of `wp.vec3d` inside the package: the same memory as (B
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -76,6 +77,38 @@ def scalars_in(value: Any, name: str, batch: int, device: wp.Device) -> wp.array
         raise ValueError(f"{name} holds {value.dtype.__name__}, expected float64")
     _check_device(name, value.device, device)
     return value
+
+
+@dataclass(frozen=True)
+class SharedTensors:
+    """Torch tensors whose memory a tape shares, with the versions that they had then.
+
+    Attributes:
+        tensors: names and tensors. versions: of each, which torch counts up at every write in
+            place. Writes through other views of the memory, as NumPy's, are not counted.
+    """
+
+    tensors: tuple[tuple[str, Any], ...]
+    versions: tuple[int, ...]
+
+    @classmethod
+    def of(cls, **arrays: Any) -> SharedTensors:
+        """Returns those of `arrays` that are tensors with a version."""
+        tensors = tuple(
+            (name, value)
+            for name, value in arrays.items()
+            if kind_of(value) == "torch" and not value.is_inference()
+        )
+        return cls(tensors, tuple(tensor._version for _, tensor in tensors))
+
+    def check(self) -> None:
+        """Raises RuntimeError if one of them was written to since."""
+        for (name, tensor), version in zip(self.tensors, self.versions, strict=True):
+            if tensor._version != version:
+                raise RuntimeError(
+                    f"{name} was modified by an inplace operation between the step and its "
+                    "derivative, which shares its memory: give the step a clone"
+                )
 
 
 def array_out(array: wp.array, kind: Kind) -> Any:

@@ -12,6 +12,7 @@ import warp as wp
 from drake_dress.models.cloth.batch.bodies import Bodies
 from drake_dress.models.cloth.batch.cloth import BatchCloth, Fabric
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.differentiable_once import differentiable_once
 
 
 def torch_step(
@@ -24,8 +25,9 @@ def torch_step(
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Returns position (B,n,3), velocity (B,n,3) and reaction at the held nodes (B,k,3).
 
-    Differentiable by `x`, `v`, `held_motion` and the tensors of `fabric`, once (no second
-    derivative). Tensors are float64 on the cloth's device and are not copied.
+    Differentiable by `x`, `v`, `held_motion` and the tensors of `fabric`, once: a second derivative
+    raises RuntimeError. Tensors are float64 on the cloth's device and are not copied: a backward
+    pass after one was written to in place raises RuntimeError, too.
 
     Args:
         cloth: steps them.
@@ -63,14 +65,13 @@ class _Step(torch.autograd.Function):
             )
         ctx.cloth, ctx.tape = cloth, tape
         # The tape shares their memory: torch then notices if they are written to before backward.
-        ctx.save_for_backward(x, v, *(f for f in fabric if f is not None))
+        ctx.save_for_backward(x, v, held_motion, *(f for f in fabric if f is not None))
         held = torch.as_tensor(cloth.held, dtype=torch.int64, device=reaction.device)
         return x_next, v_next, reaction[:, held]
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *bars: torch.Tensor) -> tuple[Any, ...]:
-        _ = ctx.saved_tensors
+        inputs = ctx.saved_tensors  # raises if one was written to since
         with _on_stream(ctx.cloth):
             g = ctx.cloth.vector_jacobian_product(
                 ctx.tape, *bars, by_fabric=any(ctx.needs_input_grad[5:])
@@ -78,7 +79,8 @@ class _Step(torch.autograd.Function):
         by_fabric = (g.stretch_stiffness, g.bending_stiffness, g.surface_density, g.friction)
         gradients = (None, None, g.x, g.v, g.held_motion, *by_fabric)
         needed = zip(gradients, ctx.needs_input_grad, strict=True)
-        return tuple(gradient if need else None for gradient, need in needed)
+        wanted = [gradient if need else None for gradient, need in needed]
+        return differentiable_once(wanted, (*inputs, *bars), "torch_step")
 
 
 def _given(values: Sequence[torch.Tensor | None]) -> bool:

@@ -23,7 +23,13 @@ import warp as wp
 
 from drake_dress.models.cloth.batch import friction_kernels
 from drake_dress.models.cloth.batch.adjoint import pull_back
-from drake_dress.models.cloth.batch.arrays import array_out, kind_of, scalars_in, vectors_in
+from drake_dress.models.cloth.batch.arrays import (
+    SharedTensors,
+    array_out,
+    kind_of,
+    scalars_in,
+    vectors_in,
+)
 from drake_dress.models.cloth.batch.bodies import Bodies, make_bodies
 from drake_dress.models.cloth.batch.contact_kernels import prescribe_held
 from drake_dress.models.cloth.batch.contact_step import (
@@ -176,6 +182,15 @@ class BatchCloth:
         """
         engine, h = self._engine, self.time_step
         kind = kind_of(x)
+        f = fabric or Fabric()
+        shared = SharedTensors.of(
+            x=x,
+            v=v,
+            stretch_stiffness=f.stretch_stiffness,
+            bending_stiffness=f.bending_stiffness,
+            surface_density=f.surface_density,
+            friction=f.friction,
+        )
         bodies: Any = obstacles
         if isinstance(obstacles, (Obstacles, Sequence)):
             bodies = self.bodies(obstacles)
@@ -227,7 +242,9 @@ class BatchCloth:
             bind_change(engine, parameters, contact, pull, change)
         engine.solver.solve(parameters, kinds, mode, pull, change)
         engine.launch(friction_kernels.add, [v, change, v_next])
-        tape = Tape(kind, x, v, parameters, bodies, base_solve, mode, contact, motion, change)
+        tape = Tape(
+            kind, x, v, parameters, bodies, base_solve, mode, contact, motion, change, shared
+        )
         return array_out(x_next, kind), array_out(v_next, kind), array_out(reaction, kind), tape
 
     def vector_jacobian_product(
@@ -248,8 +265,10 @@ class BatchCloth:
             by_fabric: also by stiffnesses, density and friction of each garment.
 
         Raises:
+            RuntimeError: a tensor that the step took was written to in place since.
             ValueError: an array has a wrong shape, type or device.
         """
+        tape.shared.check()
         n, b, device = self._engine.node_count, self.batch, self.device
         x_bar = vectors_in(x_bar, "x_bar", b, n, device)
         v_bar = vectors_in(v_bar, "v_bar", b, n, device)

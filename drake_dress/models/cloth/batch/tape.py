@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from drake_dress.models.cloth.batch.arrays import DeviceArray, Kind
+from drake_dress.models.cloth.batch.arrays import DeviceArray, Kind, SharedTensors
 from drake_dress.models.cloth.batch.bodies import Bodies
 from drake_dress.models.cloth.batch.contact_kernels import Proximity
 from drake_dress.models.cloth.batch.friction_kernels import Friction
@@ -64,12 +64,13 @@ class Tape:
     Attributes:
         kind: library of the arrays that the step took.
         x, v: the state before, shared with the caller if it was a torch tensor or Warp array: do
-            not write to it before the adjoint.
+            not write to it before the adjoint, which raises RuntimeError if a tensor was.
         parameters: the fabrics. bodies: what was touched.
         base_solve: (B,) how garments that touch nothing are solved.
         base_mode: HELD or FREE, of all nodes.
         contact: None if nothing touches in any garment.
         motion, change: Δx and Δv.
+        shared: the tensors whose memory this is.
     """
 
     kind: Kind
@@ -82,6 +83,7 @@ class Tape:
     contact: Contact | None
     motion: wp.array
     change: wp.array
+    shared: SharedTensors
 
     @property
     def types(self) -> ContactTypes:

@@ -118,6 +118,30 @@ class Obstacles:
         plane = HalfSpaces.resting(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]))
         return replace(Obstacles.none(), half_spaces=plane)
 
+    def copy(self) -> Obstacles:
+        """Returns the same with arrays of its own; the large signed distances are shared."""
+        p = self.half_spaces
+        planes = (p.point, p.normal, p.velocity, p.angular_velocity)
+        solids = (
+            Solid(
+                s.distance,
+                s.rotation.copy(),
+                s.position.copy(),
+                s.velocity.copy(),
+                s.angular_velocity.copy(),
+            )
+            for s in self.solids
+        )
+        return Obstacles(
+            np.array(self.a),
+            np.array(self.b),
+            np.array(self.radius),
+            np.array(self.velocity),
+            np.array(self.angular_velocity),
+            HalfSpaces(*(np.array(array) for array in planes)),
+            tuple(solids),
+        )
+
     def moved(self, offset: FloatArray) -> Obstacles:
         """Returns the bodies displaced, turned and sped up by `offset` (count,4,3).
 

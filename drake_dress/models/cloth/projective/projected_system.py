@@ -15,7 +15,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.matrices import Csr
@@ -53,6 +53,22 @@ class ProjectedSystem:
     def start_counting(self) -> None:
         """Sets the counts to zero."""
         self.solves = self.factors = 0
+
+    def go_on(self, memory: IntArray) -> None:
+        """Goes on with the factor that was in use when `memory` (n+1,) was returned."""
+        left_out = memory[1:] == 1
+        if memory[0] < 0:
+            self._factor = None
+        elif self._factor is None or not np.array_equal(self._factor.masked, left_out):
+            self._factor = self._symbolic.factorize(left_out)
+        self._excess = max(0, int(memory[0]))
+
+    def memory(self) -> IntArray:
+        """Returns (n+1,) what `go_on` takes; see `ClothState.solver`."""
+        found = np.full(len(self._diagonal) + 1, -1, dtype=np.int32)
+        if self._factor is not None:
+            found[0], found[1:] = self._excess, self._factor.masked
+        return found
 
     def solve(self, rhs: FloatArray, contact: IteratedContact) -> FloatArray:
         """Returns z (n,3) with Π (P + c) z = Π rhs, z = Π z; exact where no node slips."""

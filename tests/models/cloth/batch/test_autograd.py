@@ -61,13 +61,68 @@ def test_backward_is_the_adjoint_of_the_step(device: str) -> None:
         np.testing.assert_array_equal(leaf.grad.cpu().numpy(), slope)
 
 
-def test_state_written_to_before_backward_is_noticed(device: str) -> None:
+def _leaves(scene, device: str) -> list[torch.Tensor]:  # type: ignore[no-untyped-def]
+    """State, motion, and a stretch stiffness of each garment."""
+    stiffness = np.array([m.stretch_stiffness for m in FABRICS])
+    arrays = (scene.x, scene.v, scene.motion, stiffness)
+    return [_tensor(a, device).requires_grad_() for a in arrays]
+
+
+@pytest.mark.parametrize("which", range(4))
+def test_an_input_written_to_before_backward_is_noticed(device: str, which: int) -> None:
     scene = on_limbs(0.02)
-    x, v, motion = (_tensor(a, device) for a in (scene.x, scene.v, scene.motion))
-    x1, *_ = torch_step(scene.cloth(device), x, v.requires_grad_(), motion, scene.obstacles)
-    x += 1.0
+    leaves = _leaves(scene, device)
+    x1, *_ = torch_step(
+        scene.cloth(device, FABRICS), *leaves[:3], scene.obstacles, Fabric(leaves[3])
+    )
+    with torch.no_grad():
+        leaves[which] += 1.0
     with pytest.raises(RuntimeError, match="modified by an inplace operation"):
         x1.sum().backward()
+
+
+def test_the_adjoint_of_a_step_notices_tensors_written_to(device: str) -> None:
+    scene = on_limbs(0.02)
+    cloth = scene.cloth(device)
+    x, v, motion = (_tensor(a, device) for a in (scene.x, scene.v, scene.motion))
+    *_, tape = cloth.step(x, v, motion, scene.obstacles)
+    bars = [torch.ones_like(t) for t in (x, v, motion)]
+    cloth.vector_jacobian_product(tape, *bars)
+    v.mul_(2.0)
+    with pytest.raises(RuntimeError, match="v was modified by an inplace operation"):
+        cloth.vector_jacobian_product(tape, *bars)
+
+
+def test_steps_and_writes_to_results_do_not_change_an_earlier_gradient(device: str) -> None:
+    scene = on_limbs(0.02)
+    cloth = scene.cloth(device, FABRICS)
+    leaves = _leaves(scene, device)
+    found = []
+    for disturbed in (False, True):
+        results = torch_step(cloth, *leaves[:3], scene.obstacles, Fabric(leaves[3]))
+        loss = sum(r.sum() for r in results)
+        if disturbed:
+            copies = [t.detach().clone() + 0.001 for t in leaves[:3]]
+            torch_step(cloth, *copies, scene.obstacles)
+            for array in (*copies, *results):
+                array.detach().fill_(7.0)
+        found.append(torch.autograd.grad(loss, leaves))
+    for calm, after in zip(*found, strict=True):
+        assert torch.equal(calm, after)
+
+
+@pytest.mark.parametrize("which", range(4))
+def test_a_second_derivative_is_refused(device: str, which: int) -> None:
+    """Also where what comes in, here that of a sum, needs no gradient of its own."""
+    scene = on_limbs(0.02)
+    leaves = _leaves(scene, device)
+    x1, *_ = torch_step(
+        scene.cloth(device, FABRICS), *leaves[:3], scene.obstacles, Fabric(leaves[3])
+    )
+    (slope,) = torch.autograd.grad(x1.sum(), leaves[which], create_graph=True)
+    penalty = (slope**2).sum() + (leaves[which] ** 2).sum()
+    with pytest.raises(RuntimeError, match="torch_step has no second derivative"):
+        penalty.backward()
 
 
 def test_arrays_of_all_libraries_give_the_same_and_share_their_memory(device: str) -> None:

@@ -1,0 +1,75 @@
+"""Processes that run simulations of an experiment.
+
+Each gets what it works with once, as it begins, so that experiments that are open at once have
+processes and data of their own.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from drake_dress.errors import FailedError
+from drake_dress.worker_pool import WorkerPool
+
+_common: Any = None
+
+
+class Workers:
+    """Calls functions in processes.
+
+    Args:
+        common: what every function is given first; it is pickled once.
+        count: of processes.
+    """
+
+    def __init__(self, common: Any, count: int) -> None:
+        data = pickle.dumps(common, pickle.HIGHEST_PROTOCOL)
+        self._pool = WorkerPool(count, initializer=_begin, initargs=(data,))
+
+    def map(
+        self,
+        function: Callable[..., Any],
+        work: Iterable[Sequence[Any]],
+        progress: Callable[[], None] | None = None,
+    ) -> list[Any]:
+        """Returns `function(common, *arguments)` for all arguments in `work`, in order.
+
+        Args:
+            function: can be pickled.
+            work: arguments of each call.
+            progress: called after each.
+
+        Raises:
+            FailedError: a process has ended.
+        """
+        results = []
+        try:
+            futures: list[Future[Any]] = [self._pool.submit(_call, function, *w) for w in work]
+            for future in futures:
+                results.append(future.result())
+                if progress is not None:
+                    progress()
+        except BrokenProcessPool:
+            raise FailedError(
+                "a process that simulates has ended before its work was done, as where memory "
+                "runs out; with fewer processes less is needed"
+            ) from None
+        return results
+
+    def end(self) -> None:
+        """Ends the processes, and what they do."""
+        self._pool.kill()
+        self._pool.shutdown(cancel_futures=True)
+
+
+def _begin(common: bytes) -> None:
+    global _common
+    _common = pickle.loads(common)
+
+
+def _call(function: Callable[..., Any], *arguments: Any) -> Any:
+    return function(_common, *arguments)
