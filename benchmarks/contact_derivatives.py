@@ -16,10 +16,11 @@ import argparse
 import json
 import sys
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.parser import output_file
+from drake_dress.file_output import write_text
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
@@ -173,12 +174,12 @@ def main() -> int:
     """Runs the comparison; returns 1 if a bound is broken."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--states", type=int, default=1000)
-    parser.add_argument("--json", type=Path, help="write all comparisons here")
+    parser.add_argument("--json", type=output_file, help="write all comparisons here")
     options = parser.parse_args()
     found = run(options.states)
     print_table(found)
     if options.json:
-        options.json.write_text(json.dumps([asdict(c) for c in found], indent=1) + "\n")
+        write_text(options.json, json.dumps([asdict(c) for c in found], indent=1) + "\n")
     broken = [c for c in found if c.cosine_held < 0.999 or c.error_held > 1e-3]
     for c in broken:
         print(f"over the bound: seed {c.seed}, h {c.time_step}: {c.cosine_held}, {c.error_held}")

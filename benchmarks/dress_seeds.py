@@ -16,8 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from kept import seed_range
+from parser import output_file
 from scenario_run import run_scenario
 
+from drake_dress.file_output import write_text
 from drake_dress.report.summary import read_summary
 
 _COLUMNS = (
@@ -40,7 +42,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=seed_range, default=range(10), metavar="A-B")
     parser.add_argument("--jobs", type=int, default=2, help="runs at once (default 2)")
     parser.add_argument("--out", type=Path, default=Path("out/seeds"))
-    parser.add_argument("--json", type=Path, help="write all summaries here")
+    parser.add_argument("--json", type=output_file, help="write all summaries here")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     options = parser.parse_args()
     results: dict[int, dict[str, Any]] = {}
@@ -55,7 +57,7 @@ def main() -> int:
         pool.shutdown(wait=False, cancel_futures=True)
     _print_table(results)
     if options.json:
-        options.json.write_text(json.dumps(results, indent=2, sort_keys=True) + "\n")
+        write_text(options.json, json.dumps(results, indent=2, sort_keys=True) + "\n")
     return int(any("success" not in result for result in results.values()))
 
 

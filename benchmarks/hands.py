@@ -24,6 +24,7 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import opened
+from benchmarks.parser import output_file
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 from drake_dress.models.cloth.elements import FloatArray
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("log", type=Path, nargs="+", metavar="run.h5")
     parser.add_argument("--within", type=float, default=3.0, metavar="S", help="default 3")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="keep the moments")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="keep the moments")
     options = parser.parse_args(arguments)
     found: list[Moment] = []
     try:

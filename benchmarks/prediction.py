@@ -24,10 +24,12 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario
+from benchmarks.parser import output_file
 from drake_dress.diagrams.build import material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
@@ -92,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--iterations", type=_numbers, default=[1, 4, 8, 16], metavar="N,…")
     parser.add_argument("--spacings", type=_numbers, default=[0.028, 0.04], metavar="M,…")
     parser.add_argument("--moments", type=int, default=12, help="of each run")
-    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--json", type=output_file, metavar="FILE")
     options = parser.parse_args(arguments)
     variants = [
         Variant(h, int(n), d)
@@ -109,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{len(found)}/{len(variants) + 1} {result.name}", file=sys.stderr, flush=True)
     print(table(found).text())
     if options.json:
-        options.json.write_text(json.dumps([asdict(f) for f in found], indent=1) + "\n")
+        write_text(options.json, json.dumps([asdict(f) for f in found], indent=1) + "\n")
     return 0
 
 

@@ -23,7 +23,6 @@ import secrets
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -36,6 +35,8 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
+from benchmarks.parser import output_file
+from drake_dress.file_output import write_text
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.floating_gripper import FloatingGripper
@@ -409,14 +410,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--commands", type=int, default=10000, help="in all (default 10000)")
     parser.add_argument("--seed", type=int, help="of all that is random; drawn if not given")
-    parser.add_argument("--json", type=Path, help="write all figures here")
+    parser.add_argument("--json", type=output_file, help="write all figures here")
     options = parser.parse_args()
     seed = secrets.randbelow(2**32) if options.seed is None else options.seed
     print(f"seed {seed}")
     found = run(options.commands, seed, tell=True)
     print_table(found)
     if options.json:
-        options.json.write_text(json.dumps([asdict(w) for w in found], indent=1) + "\n")
+        write_text(options.json, json.dumps([asdict(w) for w in found], indent=1) + "\n")
     return int(any(w.broken() for w in found))
 
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, at_least_one, some_of
+from benchmarks.parser import INTERRUPTED, at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.interrupt import caught_interrupt
@@ -50,8 +50,10 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
         help=f"runs side by side; default {jobs}",
     )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep logs, reports and replays")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="results, resumed from")
+    parser.add_argument(
+        "--keep", type=output_folder, metavar="DIR", help="keep logs, reports and replays"
+    )
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="results, resumed from")
     parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
     parser.add_argument(
         "--into",

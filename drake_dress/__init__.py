@@ -1,8 +1,10 @@
 """Dual-arm dressing with a differentiable garment, as a Drake diagram."""
 
 from drake_dress.caches import prepare_caches
+from drake_dress.machine import limit_threads
 
-# Before any library that keeps a cache is imported.
+# Before any library that keeps a cache or starts threads is imported.
 prepare_caches()
+limit_threads()
 
 __version__ = "0.1.0"

@@ -37,6 +37,8 @@ BENCHMARKS = {
     "dressing": "persons and coats under many seeds, by each method of control",
     "explain": "hidden effects that are named right",
     "hardware": "rates, latency, faults and memory of a run and a lab in two processes",
+    "inputs": "what becomes of drawn bad scenarios, garment files, measured logs and messages",
+    "killed": "what runs leave that are killed, terminated or out of disk",
     "local": "constrained DDP beside the exact optimum",
 }
 

@@ -60,10 +60,10 @@ def temporary_cache() -> Path | None:
     """
     try:
         parent = Path(tempfile.gettempdir())
-    except OSError:
-        return None
-    # Python's last resort is the working directory, which is the user's.
-    if parent == Path.cwd():
+        # Python's last resort is the working directory, which is the user's.
+        if parent == Path.cwd():
+            return None
+    except OSError:  # there is none, or the working directory is gone
         return None
     folder = parent / f"drake-dress-{os.getuid()}"
     try:

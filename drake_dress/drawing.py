@@ -40,7 +40,7 @@ def load_matplotlib() -> None:
 
 @contextmanager
 def plain_settings() -> Iterator[None]:
-    """Has Matplotlib use its own settings meanwhile, not the user's."""
+    """Has Matplotlib's own settings hold, not the user's; files are the same each time."""
     load_matplotlib()
     import matplotlib
 

@@ -90,6 +90,19 @@ def signals_raised() -> Iterator[None]:
 
 
 @contextmanager
+def signals_deferred() -> Iterator[None]:
+    """Has signals that end a command wait, where half of what is done would be worse than none.
+
+    A process that is started meanwhile inherits that they wait.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def _handled(
     handler: Callable[[int, Any], None], numbers: tuple[signal.Signals, ...] = _ENDING
 ) -> Iterator[Callable[[], None]]:

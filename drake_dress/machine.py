@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import MutableMapping
 from pathlib import Path
 
 _OWN_GROUPS = Path("/proc/self/cgroup")
 _GROUPS = Path("/sys/fs/cgroup")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def worker_count(groups: Path = _GROUPS, own: Path = _OWN_GROUPS) -> int:
@@ -25,6 +27,20 @@ def worker_count(groups: Path = _GROUPS, own: Path = _OWN_GROUPS) -> int:
     quota = _quota(groups, own)
     # A quota of 1.5 cores keeps two processes busy most of the time, but one is never held up.
     return max(1, cores if quota is None else min(cores, int(quota)))
+
+
+def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
+    """Has linear algebra use no more threads than this job may use cores.
+
+    Its libraries obey affinities by themselves, but no quota. What the user has set stays.
+
+    Args:
+        environment: of the process, before these libraries are imported.
+    """
+    count = worker_count()
+    if count < len(os.sched_getaffinity(0)):
+        for name in _THREADS:
+            environment.setdefault(name, str(count))
 
 
 def _quota(groups: Path, own: Path) -> float | None:

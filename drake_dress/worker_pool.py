@@ -23,6 +23,8 @@ from multiprocessing.process import BaseProcess
 from queue import SimpleQueue
 from typing import Any
 
+from drake_dress.interrupt import signals_deferred
+
 _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -60,7 +62,9 @@ class WorkerPool(Executor):
             process = context.Process(
                 target=_serve, args=(other, os.getpid(), initializer, tuple(initargs))
             )
-            process.start()
+            # A process that is told half of what to do would complain.
+            with signals_deferred():
+                process.start()
             other.close()
             self._processes.append(process)
             self._free.put((pipe, process))

@@ -7,6 +7,8 @@ import pytest
 
 from drake_dress.__main__ import BENCHMARKS, main
 from drake_dress.diagrams import run
+from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.shipped import shipped_scenario
 
 BENCHES = Path(__file__).resolve().parents[1] / "benchmarks"
 
@@ -29,3 +31,62 @@ def test_a_full_disk_is_told_in_one_line(
     monkeypatch.setattr(run, "run_scenario", full)
     assert main(["run", "scenarios/dummy_standing.yaml", "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err == "drake-dress: place/run.h5: No space left on device\n"
+
+
+OUTPUTS = [
+    ["run", "scenarios/dummy_standing.yaml", "--out"],
+    ["sim-station", "scenarios/lab.yaml", "--out"],
+    ["explain", "none.h5", "--scenario", "scenarios/measured.yaml", "--out"],
+    ["dataset", "measured", "--hide", "wind", "--out"],
+    ["calibrate", ".", "--out"],
+    ["calibrate", "--print-board"],
+    *([["bench", name, "--json"] for name in BENCHMARKS]),
+    ["bench", "dressing", "--keep"],
+    ["bench", "explain", "--cache"],
+]
+
+
+@pytest.mark.parametrize("words", OUTPUTS, ids=" ".join)
+@pytest.mark.parametrize("place", ["file/sub", "long", "/proc/x/y", ""])
+def test_an_output_that_cannot_be_is_told_before_any_work(
+    words: list[str], place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    out = {"file/sub": str(tmp_path / "file" / "sub"), "long": str(tmp_path / ("a" * 300))}
+    try:
+        status = main([*words, out.get(place, place)])
+    except SystemExit as error:
+        status = int(error.code or 0)
+    captured = capsys.readouterr()
+    assert status == 2 and captured.out == ""
+    assert words[-1] in captured.err and captured.err.count("\n") == 1, captured.err
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("words", [["dataset", "measured", "--hide", "nothing", "--out", "new"]])
+def test_the_programs_own_scenarios_are_found_from_anywhere(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found: list[str] = []
+
+    def look(hide: str, seed: int, out: Path, scenario: str, *_: object) -> None:
+        found.append(scenario)
+
+    monkeypatch.setattr("drake_dress.discrepancy.commands.write_dataset", look)
+    assert main(words) == 0
+    assert load_scenario(found[0]) == load_scenario(BENCHES.parent / "scenarios" / "measured.yaml")
+    assert load_scenario(shipped_scenario("lab")).station.arms.model == "panda"
+
+
+def test_an_error_of_the_file_system_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for error in (OSError(errno.EROFS, "Read-only file system", "place"), OSError("odd\nerror")):
+
+        def broken(*_: object, error: OSError = error, **__: object) -> None:
+            raise error
+
+        monkeypatch.setattr(run, "run_scenario", broken)
+        assert main(["run", "scenarios/dummy_standing.yaml", "--out", str(tmp_path)]) == 1
+        assert capsys.readouterr().err.count("\n") == 1

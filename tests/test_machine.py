@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drake_dress.machine import worker_count
+from drake_dress import machine
+from drake_dress.machine import limit_threads, worker_count
 
 
 @pytest.fixture(autouse=True)
@@ -37,6 +38,16 @@ def test_a_quota_of_any_group_above_is_obeyed(tmp_path: Path, text: str, count: 
     group(tmp_path / "job" / "step", cpu__max="max 100000")
     group(tmp_path / "job", cpu__max=text + "\n")
     assert worker_count(tmp_path, own) == count
+
+
+def test_threads_obey_a_quota_unless_the_user_has_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = {"OMP_NUM_THREADS": "5"}
+    monkeypatch.setattr(machine, "worker_count", lambda: 8)
+    limit_threads(environment)
+    assert environment == {"OMP_NUM_THREADS": "5"}
+    monkeypatch.setattr(machine, "worker_count", lambda: 2)
+    limit_threads(environment)
+    assert environment["OMP_NUM_THREADS"] == "5" and environment["OPENBLAS_NUM_THREADS"] == "2"
 
 
 def test_a_quota_of_the_older_kind_is_obeyed(tmp_path: Path) -> None:

@@ -18,7 +18,13 @@ from drake_dress.__main__ import main
 from drake_dress.diagrams import run as run_module
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
-from drake_dress.interrupt import Interrupt, Terminated, caught_interrupt, signals_raised
+from drake_dress.interrupt import (
+    Interrupt,
+    Terminated,
+    caught_interrupt,
+    signals_deferred,
+    signals_raised,
+)
 from drake_dress.report.log import RunLog
 from drake_dress.report.web_page import open_page
 from tests.report import synthetic
@@ -124,6 +130,14 @@ def test_the_first_signal_is_a_flag_and_the_second_an_exception(number: signal.S
             time.sleep(1.0)
     assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
     assert [signal.getsignal(n) for n in signal.Signals] == before
+
+
+def test_a_signal_waits_where_it_is_deferred() -> None:
+    with signals_raised(), caught_interrupt() as interrupt:
+        with signals_deferred():
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert not interrupt.wait(0.05)
+        assert interrupt.wait(1.0) and interrupt.number == signal.SIGTERM
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:

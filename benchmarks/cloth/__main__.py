@@ -16,7 +16,8 @@ from typing import Any
 
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
-from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one
+from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one, output_file, output_folder
+from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
 # In the order of the paper, then what it does not have.
@@ -59,8 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{wall:.0f} s in all" + (", interrupted" if interrupted else ""))
     if options.json:
         document = {"about": about, "quick": options.quick, "wall_s": wall, "scenes": results}
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(_plain(document), indent=1, allow_nan=False) + "\n")
+        text = json.dumps(_plain(document), indent=1, allow_nan=False) + "\n"
+        write_text(options.json, text)
         print(f"wrote {options.json}")
     if options.png:
         for name in names:
@@ -72,8 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench cloth", description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=_file, metavar="FILE", help="write all figures here")
-    parser.add_argument("--png", type=_folder, metavar="DIR", help="write plots as cloth_*.png")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="write all figures here")
+    parser.add_argument(
+        "--png", type=output_folder, metavar="DIR", help="write plots as cloth_*.png"
+    )
     parser.add_argument(
         "--only", type=_names, metavar="NAME,…", help=f"of {', '.join(SCENES)} (default: all)"
     )
@@ -100,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--cache",
-        type=_folder,
+        type=output_folder,
         default=Path("out/cloth_bench"),
         metavar="DIR",
         help="where fine references are kept",
@@ -133,18 +136,6 @@ def _seconds(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected a number above 0")
     return value
-
-
-def _file(text: str) -> Path:
-    if Path(text).is_dir():
-        raise argparse.ArgumentTypeError(f"{text} is a folder, expected a file")
-    return Path(text)
-
-
-def _folder(text: str) -> Path:
-    if Path(text).exists() and not Path(text).is_dir():
-        raise argparse.ArgumentTypeError(f"{text} is a file, expected a folder")
-    return Path(text)
 
 
 def _limit(options: argparse.Namespace) -> float:

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.kept import seed_range
-from benchmarks.parser import OneLineParser, exit_with
+from benchmarks.parser import OneLineParser, exit_with, output_file
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
 from drake_dress.file_output import write_text
 
@@ -35,7 +34,9 @@ def _parser() -> argparse.ArgumentParser:
     add_choices(parser, methods=METHODS, persons=PERSONS, coats=COATS)
     parser.add_argument("--seeds", type=seed_range, default=range(13), metavar="A-B")
     add_study_options(parser, _NAME)
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="s, l and force over time, SVG")
+    parser.add_argument(
+        "--plot", type=output_file, metavar="FILE", help="s, l and force over time, SVG"
+    )
     return parser
 
 

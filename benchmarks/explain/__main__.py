@@ -20,7 +20,14 @@ from typing import Any
 from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, OneLineParser, exit_with, some_of
+from benchmarks.parser import (
+    INTERRUPTED,
+    OneLineParser,
+    exit_with,
+    output_file,
+    output_folder,
+    some_of,
+)
 from benchmarks.section import END, around, begin, write_between
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
@@ -174,14 +181,19 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.md",
         help=f"put the tables between {begin(_NAME)} and {END}",
     )
-    parser.add_argument("--cache", type=Path, default=Path("out/bench-explain"), metavar="DIR")
+    parser.add_argument(
+        "--cache", type=output_folder, default=Path("out/bench-explain"), metavar="DIR"
+    )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases side by side")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="reliability, SVG")
+    parser.add_argument("--plot", type=output_file, metavar="FILE", help="reliability, SVG")
     parser.add_argument(
         "--kept", action="store_true", help="run nothing; tables of what the file of --json holds"
     )
     parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="results; what is there already is not run again"
+        "--json",
+        type=output_file,
+        metavar="FILE",
+        help="results; what is there already is not run again",
     )
     return parser
 

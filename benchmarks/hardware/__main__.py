@@ -25,9 +25,10 @@ from benchmarks.kept import seed_range
 from benchmarks.parser import OneLineParser, at_least_one, exit_with, some_of
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
+from drake_dress.shipped import shipped_scenario
 
 _NAME = "hardware"
-SCENARIO = "scenarios/lab.yaml"
+SCENARIO = str(shipped_scenario("lab"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

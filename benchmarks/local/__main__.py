@@ -19,7 +19,7 @@ from rich.progress import track
 from benchmarks.cloth.table import Table
 from benchmarks.local.problems import random_problem
 from benchmarks.local.recorded import read_problems
-from benchmarks.parser import OneLineParser
+from benchmarks.parser import OneLineParser, output_file
 from drake_dress.discrepancy.results import write_json
 from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--recorded", type=Path, metavar="FILE.npz", help="problems that came up in runs"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="every trial")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="every trial")
     options = parser.parse_args(arguments)
     if options.problems < 0:
         parser.error(f"--problems is {options.problems}, expected 0 or more")

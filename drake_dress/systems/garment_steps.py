@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.interrupt import signals_deferred
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
@@ -126,7 +127,8 @@ class StepsBeside:
             daemon=True,
             name="garment",
         )
-        self._process.start()
+        with signals_deferred():
+            self._process.start()
         kill_at_exit(self._process)
         other.close()
         self._under_way = False

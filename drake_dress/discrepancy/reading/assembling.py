@@ -16,7 +16,6 @@ from drake_dress.discrepancy.reading.plausibility import (
     check_joints,
     check_markers,
     check_places,
-    misfit_note,
 )
 from drake_dress.discrepancy.reading.raw import (
     JOINTS,
@@ -38,6 +37,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # Fewest and most markers: fewer say nothing, each costs time in every step of every simulation.
 _LEAST_MARKERS, _MOST_MARKERS = 4, 1000
+# Nothing that is measured is beyond this in any unit; times of an epoch in nanoseconds are 2e18.
+_WILDEST = 1e20
 _FORCES = tuple(f"gripper/{side}/force" for side in SIDES)
 
 
@@ -74,7 +75,6 @@ def recording_of(raw: RawRecording, mesh: GarmentMesh, surface_density: float | 
     _check_seen(raw, marker)
     start = check_markers(raw, time, marker, places)
     check_grippers(raw, time, gripper, start, mesh)
-    notes += misfit_note(raw, start)
     force, said = _force(raw, count)
     notes += said
     if force is not None:
@@ -84,10 +84,8 @@ def recording_of(raw: RawRecording, mesh: GarmentMesh, surface_density: float | 
         check_joints(raw, time, joints)
     marker_noise, said = noise_of(raw, (MARKERS,), marker)
     notes += said
-    # where markers are not in their places, places say nothing of them
-    placed = None if start is not None and not start.fits else places
-    reach = None if placed is None else reach_between(mesh, placed)
-    marker, said = without_faults(time, marker, placed, reach, marker_noise, names)
+    reach = reach_between(mesh, places)
+    marker, said = without_faults(time, marker, places, reach, marker_noise, names)
     notes += said
     _check_seen(raw, marker)
     force_noise, said = noise_of(raw, _FORCES, force)
@@ -131,6 +129,11 @@ def _taken(
     if bad.any() and dataset != MARKERS:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         raise UserError(raw.source, key, f"is {value[where]} at {where}, expected finite numbers")
+    # a damaged number, whose square may not be one any more
+    wild = np.abs(value) > _WILDEST
+    if wild.any() and dataset != MARKERS:
+        where = tuple(int(i) for i in np.argwhere(wild)[0])
+        raise UserError(raw.source, key, f"is {value[where]:.3g} at {where}, expected SI units")
     return value
 
 

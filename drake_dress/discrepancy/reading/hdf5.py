@@ -21,6 +21,7 @@ from drake_dress.discrepancy.reading.raw import (
     unused_note,
 )
 from drake_dress.errors import UserError
+from drake_dress.hdf5_state import Hdf5State, look_at
 
 # What h5py raises where a file is damaged: the library's errors, and Python's on what it decodes.
 _DAMAGED = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
@@ -38,12 +39,21 @@ def read_hdf5(path: Path) -> list[RawRecording]:
         UserError: the file or a dataset of it cannot be read.
     """
     source = str(path)
+    _check_state(path)
     with _guarded(source, "", "is not a readable HDF5 file"):
         file = h5py.File(path, "r")
     with file:
         with _guarded(source, "", "is not a readable HDF5 file"):
             content = dict(_content(source, file))
         return [_recording(source, file, content, group) for group in recording_groups(content)]
+
+
+def _check_state(path: Path) -> None:
+    """Raises UserError where a file is not whole, or is being written."""
+    with _guarded(str(path), "", "cannot be read"):
+        found = look_at(path)
+    if found.state not in (Hdf5State.SOUND, Hdf5State.KILLED):
+        raise UserError(str(path), "", f"{found.message}, expected a measured log in HDF5")
 
 
 def _content(source: str, file: h5py.File) -> Iterator[tuple[str, h5py.Dataset | None]]:

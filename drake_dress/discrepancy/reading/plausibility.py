@@ -44,6 +44,9 @@ _AWAY = 2.0
 _START = 0.3
 # Limbs of adults and children, m: upper arm, forearm with the wrist; between the shoulders.
 _LIMB, _SHOULDERS = (0.12, 0.5), (0.12, 0.65)
+# A person that faces +x has the left shoulder at the left, whatever way it turns: share of the
+# distance between the shoulders by which it may be at the right.
+_TURNED_AWAY = 0.5
 # The line through the shoulders of who sits or stands is level within this, degrees.
 _LEVEL = 45.0
 # Nothing moved by arms or of a person accelerates more, m/s²; and noise of a coordinate, m.
@@ -163,7 +166,11 @@ def check_markers(
             f"is a mirror image of {PLACES}, expected x forward, y to the wearer's left, z up"
         )
     if not start.fits:
-        return start
+        raise wrong(
+            f"does not fit {PLACES}: moved and turned as a whole they are "
+            f"{100 * start.misfit:.0f} % of the garment's size off, expected {100 * _MISFIT:g} % at "
+            "most; are markers' numbers mixed up?"
+        )
     up = start.rotation[:, 2]
     if np.degrees(np.arccos(np.clip(up[2], -1.0, 1.0))) > _TURNED:
         raise wrong(f"hangs with the garment's up axis along {_axis(up)}, expected z up (+z)")
@@ -261,6 +268,13 @@ def check_joints(raw: RawRecording, time: FloatArray, joints: FloatArray) -> Non
             key,
             f"has the shoulders one above the other ({tilt:.0f} degrees from level), expected z up",
         )
+    if across[1] < -_TURNED_AWAY * np.linalg.norm(across):
+        raise UserError(
+            raw.source,
+            key,
+            f"has the left shoulder {-across[1]:.2g} m to the right of the right one, expected a "
+            "person that faces +x, with the left at +y; are left and right exchanged?",
+        )
     if np.abs(joints).max() > _FARTHEST:
         raise UserError(
             raw.source,
@@ -283,16 +297,6 @@ def at_start(time: FloatArray, values: FloatArray) -> FloatArray:
                 found[k] = np.median(part, axis=0)
                 break
     return found
-
-
-def misfit_note(raw: RawRecording, start: Start | None) -> list[str]:
-    """Returns what is to be said where markers do not hang as they lie at rest."""
-    if start is None or start.flat or start.fits:
-        return []
-    return [
-        f"{raw.key(MARKERS)} does not fit the rest places: moved and turned as a whole they are "
-        f"{100 * start.misfit:.0f} % of the garment's size off; are markers' numbers mixed up?"
-    ]
 
 
 def axis_name(direction: FloatArray) -> str:
