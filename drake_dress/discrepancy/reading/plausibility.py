@@ -168,8 +168,8 @@ def check_markers(
     if not start.fits:
         raise wrong(
             f"does not fit {PLACES}: moved and turned as a whole they are "
-            f"{100 * start.misfit:.0f} % of the garment's size off, expected {100 * _MISFIT:g} % at "
-            "most; are markers' numbers mixed up?"
+            f"{100 * start.misfit:.0f} % of the garment's size off, expected up to "
+            f"{100 * _MISFIT:g} %; are markers' numbers mixed up?"
         )
     up = start.rotation[:, 2]
     if np.degrees(np.arccos(np.clip(up[2], -1.0, 1.0))) > _TURNED:
