@@ -221,7 +221,7 @@ def _parser() -> argparse.ArgumentParser:
         help="sway, lift, drag, shift, pull, drop, dress; default: all but shift and drop",
     )
     hidden.add_argument("--hide", metavar="EFFECT|nothing|random", required=True)
-    hidden.add_argument("--seed", type=_seed, default=0, metavar="N")
+    hidden.add_argument("--seed", type=_whole, default=0, metavar="N")
     hidden.add_argument("--out", metavar="DIR", required=True)
     hidden.add_argument(
         "--scenario", metavar="SCENARIO.yaml", help="default: measured.yaml of the program's own"

@@ -10,7 +10,7 @@ from pathlib import Path
 from drake_dress.errors import UserError
 
 # Far more than any scenario or table of poses; a mistaken file is told before it fills memory.
-MAX_BYTES = 4 << 20
+MAX_BYTES = 1 << 20
 _OTHER_ENCODINGS = {
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",

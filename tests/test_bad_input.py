@@ -256,7 +256,7 @@ UNREADABLE = {
     "UTF-16": ("seed: 0".encode("utf-16"), "UTF-16"),
     "Latin-1": ("# größe\nseed: 0".encode("latin-1"), "line 1"),
     "NUL": (b"seed: 0\n\0\n", "NUL"),
-    "huge": (b"#" * (5 << 20), "larger than 4 MB"),
+    "huge": (b"#" * (2 << 20), "larger than 1 MB"),
 }
 
 
