@@ -107,6 +107,10 @@ class StationWatch(LeafSystem):
         if len(events) < _REMEMBERED:
             lines = self._changes(memory, watched, supervised)
             events += tuple((context.get_time(), line) for line in lines)
+            if len(events) >= _REMEMBERED:
+                events += (
+                    (context.get_time(), "further changes are not noted: there were too many"),
+                )
         memory = _Memory(watched, supervised, events)
         state.get_mutable_abstract_state(self._memory).set_value(memory)
 

@@ -17,12 +17,15 @@ class MadeUp:
     """Simulations that move markers in proportion to what cloth weighs more.
 
     From a weight on, the coarsest one folds the cloth of one recording another way. Finer ones are
-    `steeper` by that factor. Stretch stiffness is a decoy: it does what weight does and a little
-    that was seen besides, but what refining changes with it is larger than all of that. Effects
-    act `during` those samples only, by steady offsets, while cloth touches the person.
+    `steeper` by that factor. What was seen weighs more by `truth`, kg/m². Stretch stiffness is a
+    decoy: it does what weight does and a little that was seen besides, but what refining
+    changes with it is larger than all of that. Effects act `during` those samples only, by
+    steady offsets, while cloth touches the person.
     """
 
-    def __init__(self, rng, folds_from=0.02, steeper=1.0, besides=0.0, during=slice(None)):
+    def __init__(
+        self, rng, folds_from=0.02, steeper=1.0, besides=0.0, during=slice(None), truth=TRUTH
+    ):
         time = np.arange(SAMPLES) * 0.02
         self.told_at = []
         self._folds_from, self._steeper = folds_from, steeper
@@ -43,8 +46,8 @@ class MadeUp:
         path = np.zeros((SAMPLES, 2, 3))
         self.recordings = []
         for i in range(COUNT):
-            seen = self._marker("refined", i, TRUTH / steeper, 0.0)
-            seen = seen + TRUTH * self._besides[i]
+            seen = self._marker("refined", i, truth / steeper, 0.0)
+            seen = seen + truth * self._besides[i]
             seen = seen + rng.normal(0.0, NOISE, (SAMPLES, MARKERS, 3))
             self.recordings.append(
                 Recording(
