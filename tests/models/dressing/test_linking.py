@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drake_dress.models.dressing.coordinates import ArmAxis
-from drake_dress.models.dressing.linking import arm_linking_number, linking_number
+from drake_dress.models.dressing.linking import _aside, _height, arm_linking_number, linking_number
+from drake_dress.models.dressing.linking import _distance as _distance_of_points
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -203,3 +204,13 @@ def _distance(loop: FloatArray, segment: FloatArray) -> float:
     p, d = segment[0], segment[1] - segment[0]
     t = np.clip((loop - p) @ d / (d @ d), 0.0, 1.0)
     return float(np.min(np.linalg.norm(loop - p - t[:, None] * d, axis=1)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=random)
+def test_distances_and_volumes_are_those_of_vector_algebra(seed: int) -> None:
+    p, q, r, s = np.random.default_rng(seed).normal(size=(4, 3))
+    assert _distance_of_points(p, q) == pytest.approx(np.linalg.norm(q - p))
+    assert _aside(p, q, r) == pytest.approx(np.linalg.norm(np.cross(p - q, r - q)))
+    volume = np.linalg.det([p - r, q - r, s - r])
+    assert abs(_height(p, q, r, s)) == pytest.approx(abs(volume))
