@@ -40,6 +40,7 @@ BENCHMARKS = {
     "inputs": "what becomes of drawn bad scenarios, garment files, measured logs and messages",
     "killed": "what runs leave that are killed, terminated or out of disk",
     "local": "constrained DDP beside the exact optimum",
+    "mutation": "faults put into central modules, and whether tests notice them",
 }
 
 _EXAMPLES = """examples:

@@ -26,8 +26,15 @@ from benchmarks.cloth.table import Table
 from benchmarks.inputs.measurements import prepare
 from benchmarks.inputs.trials import Outcome, Result
 from benchmarks.inputs.worker import KINDS, Worker
-from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one, exit_with, some_of
-from benchmarks.section import END, begin, write_between
+from benchmarks.parser import (
+    INTERRUPTED,
+    OneLineParser,
+    at_least_one,
+    exit_with,
+    output_file,
+    some_of,
+)
+from benchmarks.section import END, around, begin, write_between
 from drake_dress import __version__
 from drake_dress.discrepancy.results import write_text
 from drake_dress.interrupt import caught_interrupt
@@ -45,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, 1 if a case did not end as it has to, 2 for bad arguments, 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
+    if options.into is not None:
+        around(options.into, _NAME)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     kinds = list(options.only)
     chosen = [options.case] if options.case is not None else list(range(options.cases))
@@ -159,7 +168,7 @@ def _parser() -> argparse.ArgumentParser:
         help=", ".join(KINDS),
     )  # fmt: skip
     parser.add_argument("--jobs", type=at_least_one, default=2, metavar="N", help="default 2")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="counts and failures")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="counts and failures")
     parser.add_argument(
         "--into", type=Path, metavar="FILE.md",
         help=f"put the table between {begin(_NAME)} and {END}",

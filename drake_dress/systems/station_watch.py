@@ -114,6 +114,10 @@ class StationWatch(LeafSystem):
             lines = self._changes(memory, watched, supervised)
             lines += self._dropping(memory.dropped, arrivals)
             events += tuple((context.get_time(), line) for line in lines)
+            if len(events) >= _REMEMBERED:
+                events += (
+                    (context.get_time(), "further changes are not noted: there were too many"),
+                )
         dropped = tuple(arrival.dropped for arrival in arrivals)
         memory = _Memory(watched, supervised, events, dropped)
         state.get_mutable_abstract_state(self._memory).set_value(memory)

@@ -1,15 +1,16 @@
-import secrets
 import sys
 from pathlib import Path
 
 import numpy as np
+
+from tests.drawing import drawn_seed
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import safety  # noqa: E402
 
 
 def test_no_failure_of_controller_or_sensors_gets_past_the_limits() -> None:
-    seed = secrets.randbelow(2**32)
+    seed = drawn_seed()
     print(f"python benchmarks/safety.py --commands 10000 --seed {seed}")
     found = safety.run(10000, seed)
     assert sum(w.commands for w in found) >= 10000

@@ -28,10 +28,10 @@ class MadeUp:
     """Simulations that move markers in proportion to what cloth weighs more.
 
     From a weight on, the coarsest one folds the cloth of one recording another way. Finer ones are
-    `steeper` by that factor. Stretch stiffness is a decoy: it does what weight does and a little
-    that was seen besides, but what refining changes with it is larger than all of that. Effects
-    act `during` those samples only, by steady offsets, while cloth touches the person. Refining the
-    scenario changes markers by `numerics`, m; what was measured is off the refined one by `off`, m.
+    `steeper` by that factor. What was seen weighs more by `truth`, kg/m². Stretch stiffness is a
+    decoy: it does what weight does and a little that was seen besides, but what refining changes
+    with it is larger than all of that. Effects act `during` those samples only, by steady
+    offsets, while cloth touches the person. Refining the scenario changes markers by `numerics`, m; what was measured is off the refined one by `off`, m.
     Both stay for about 0.4 s.
     """
 
@@ -71,7 +71,7 @@ class MadeUp:
             seen = self._marker("refined", i, truth / steeper, 0.0)
             if off:
                 seen = seen + off * lasting(rng)[i]
-            seen = seen + TRUTH * self._besides[i]
+            seen = seen + truth * self._besides[i]
             seen = seen + rng.normal(0.0, NOISE, (SAMPLES, MARKERS, 3))
             self.recordings.append(
                 Recording(

@@ -103,7 +103,7 @@ def test_it_goes_on_only_from_where_it_holds() -> None:
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.lists(st.tuples(joints | small, joints | small, st.booleans()), max_size=30))
+@given(st.lists(st.tuples(joints | small, joints | small, st.booleans()), min_size=1, max_size=30))
 def test_whatever_is_commanded_drives_stay_within_limits(
     commands: list[tuple[np.ndarray, np.ndarray, bool]],
 ) -> None:

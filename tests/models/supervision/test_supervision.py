@@ -81,15 +81,26 @@ def test_a_run_ends_when_patience_does(fault: Fault, time: float) -> None:
     assert state.ended_by == 1 and not state.permitted
 
 
-@given(st.lists(st.sampled_from([*Fault]), max_size=60))
+@given(st.lists(st.sampled_from([*Fault]), min_size=1, max_size=60))
 def test_nothing_is_permitted_while_anything_is_wrong(faults: list[Fault]) -> None:
     state, now = permitted()
     for k, fault in enumerate(faults):
         state = supervise(state, (fault, Fault.NONE), now + 0.05 * k, PATIENCE)
-        if fault:
-            assert not state.permitted
-    if any(f & FATAL for f in faults[:-8]) and all(faults):
-        assert state.ended_by == 0
+        assert fault and not state.permitted
+
+
+@given(
+    st.lists(st.sampled_from([*Fault]), max_size=20),
+    st.sampled_from([f for f in Fault if f & FATAL]),
+    st.lists(st.sampled_from([*Fault]), min_size=8, max_size=20),
+)
+def test_a_fatal_fault_ends_the_run_whatever_other_faults_come(
+    before: list[Fault], fatal: Fault, later: list[Fault]
+) -> None:
+    state, now = permitted()
+    for k, fault in enumerate([*before, fatal, *later]):
+        state = supervise(state, (fault, Fault.NONE), now + 0.05 * k, PATIENCE)
+    assert state.ended_by == 0
 
 
 def test_a_line_names_what_is_wrong() -> None:

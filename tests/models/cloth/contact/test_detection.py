@@ -19,10 +19,10 @@ def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
     plane = HalfSpaces.resting(rng.uniform(-2.0, 2.0, 3), rng.standard_normal(3))
     bodies = replace(bodies, half_spaces=plane)
     gap = find_proximity(x, bodies, 0.0).gap
-    if out_of_reach(x, bodies, distance):
-        assert gap.min() > distance
-    if gap.min() <= distance:
-        assert not out_of_reach(x, bodies, distance)
+    assert gap.min() > distance or not out_of_reach(x, bodies, distance)
+    # far above the plane nothing is near
+    far = x + 20.0 * plane.normal
+    assert out_of_reach(far, bodies, distance)
     assert out_of_reach(x, Obstacles.none(), distance)
 
 

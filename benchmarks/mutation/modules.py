@@ -1,0 +1,43 @@
+"""Modules that are mutated, and the tests that cover each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Module:
+    """A part of the program with quick tests of its own.
+
+    Attributes:
+        files: that are mutated, from the root of the repository.
+        tests: that are to notice.
+        timeout: of the tests, s: several times what they take. A mutant may never end.
+    """
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    timeout: float = 120.0
+
+
+_MODELS = "drake_dress/models"
+# What stands between commands and a person, what ends a run, what says that an arm is in its
+# sleeve, the solver of the control loop, and the regression by which causes are named.
+MODULES = {
+    "safety": Module((f"{_MODELS}/control/safety.py",), ("tests/models/control/test_safety.py",)),
+    "supervision": Module(
+        (f"{_MODELS}/supervision/supervision.py", f"{_MODELS}/supervision/watch.py"),
+        ("tests/models/supervision",),
+    ),
+    "linking": Module(
+        (f"{_MODELS}/dressing/linking.py",), ("tests/models/dressing/test_linking.py",)
+    ),
+    "constrained_ddp": Module(
+        (f"{_MODELS}/control/constrained_ddp.py",),
+        ("tests/models/control/test_constrained_ddp.py",),
+    ),
+    "regression": Module(
+        ("drake_dress/discrepancy/regression.py",),
+        ("tests/discrepancy/test_regression.py", "tests/discrepancy/test_fitting.py"),
+    ),
+}
