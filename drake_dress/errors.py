@@ -1,7 +1,7 @@
 """What the user gave cannot be used: told in one line, exit status 2."""
 
 # Most characters of a part of the line: a path, a key, what is wrong.
-_SOURCE, _KEY, _MESSAGE = 300, 100, 300
+_SOURCE, _KEY, _MESSAGE = 1000, 100, 300
 
 
 class UserError(ValueError):

@@ -13,7 +13,7 @@ def test_any_error_is_one_printable_line(source: str, key: str, message: str) ->
     line = str(UserError(source, key, message))
     assert len(line.splitlines()) <= 1
     assert line.isprintable()
-    assert len(line) <= 720
+    assert len(line) <= 1420
 
 
 def test_short_texts_are_told_as_they_are() -> None:

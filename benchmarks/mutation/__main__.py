@@ -1,6 +1,6 @@
 """Draws mutants of central modules and counts how many of them the tests notice.
 
-    python -m benchmarks.mutation --mutants 200 --seed 1
+    drake-dress bench mutation --mutants 200 --seed 1
 
 A mutant is a small change of the program. Tests that pass all the same do not hold what was
 changed. What is done is kept, and not run again with the same seed. Survivors that were looked at
@@ -28,6 +28,7 @@ from benchmarks.parser import (
     OneLineParser,
     at_least_one,
     exit_with,
+    output_file,
     some_of,
 )
 from drake_dress.errors import UserError
@@ -102,7 +103,11 @@ def _print_table(results: Mapping[str, dict[str, Any]]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(prog="drake-dress bench mutation", description=__doc__)
+    parser = OneLineParser(
+        prog="drake-dress bench mutation",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--mutants", type=at_least_one, default=200, help="of all modules together")
     parser.add_argument("--seed", type=int, help="of the draw; a new one by default")
     parser.add_argument(
@@ -114,7 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--json",
-        type=Path,
+        type=output_file,
         default=Path("out/mutation.json"),
         help="where results are kept; a study goes on from there",
     )

@@ -31,8 +31,8 @@ class MadeUp:
     `steeper` by that factor. What was seen weighs more by `truth`, kg/m². Stretch stiffness is a
     decoy: it does what weight does and a little that was seen besides, but what refining changes
     with it is larger than all of that. Effects act `during` those samples only, by steady
-    offsets, while cloth touches the person. Refining the scenario changes markers by `numerics`, m; what was measured is off the refined one by `off`, m.
-    Both stay for about 0.4 s.
+    offsets, while cloth touches the person. Refining the scenario changes markers by `numerics`, m;
+    what was measured is off the refined one by `off`, m. Both stay for about 0.4 s.
     """
 
     def __init__(

@@ -16,7 +16,9 @@ from drake_dress.models.garment.edges import border_edges, unique_edges
 from drake_dress.models.garment.files.raw import FloatArray, RawMesh
 from drake_dress.models.garment.mesh import IntArray, face_areas
 
-_LONGEST = 0.35  # edge by the diagonal of the bounding box
+# An edge crosses the garment if it is longer than this part of the diagonal of the bounding box,
+# and than most edges by this factor: a mesh that is coarse throughout is not a damaged one.
+_LONGEST, _LONGER = 0.35, 3.0
 _LARGEST_AREA = 2.5  # area by the square of the diagonal: three layers of a garment
 # A node is off its surface if its shortest edge is this part of the diagonal, and if the faces
 # around it close up to a spike: the sum of their angles there, rad, or, for a node of the border,
@@ -46,7 +48,7 @@ def check_plausible(mesh: RawMesh) -> None:
     length = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
     _check_spikes(mesh, edges, length, diagonal)
     k = int(np.argmax(length))
-    if length[k] > _LONGEST * diagonal:
+    if length[k] > max(_LONGEST * diagonal, _LONGER * float(np.median(length))):
         raise UserError(
             mesh.source,
             "faces",
