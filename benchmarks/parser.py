@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NoReturn
 
 from drake_dress.errors import UserError
-from drake_dress.file_output import prove_directory, prove_file
+from drake_dress.file_output import output_file as output_file
+from drake_dress.file_output import output_folder as output_folder
 
 UNUSABLE, INTERRUPTED = 2, 130
 
@@ -42,22 +42,6 @@ def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
         return names
 
     return parse
-
-
-def output_file(text: str) -> Path:
-    """Returns a file that has proved writable, for argparse: before hours of work, not after."""
-    try:
-        return prove_file("", text)
-    except UserError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def output_folder(text: str) -> Path:
-    """Returns a folder in which files can be written, for argparse."""
-    try:
-        return prove_directory("", text, [])
-    except UserError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def at_least_one(text: str) -> int:

@@ -35,8 +35,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
-from benchmarks.parser import output_file
-from drake_dress.file_output import write_text
+from drake_dress.file_output import output_file, write_text
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.floating_gripper import FloatingGripper

@@ -6,6 +6,7 @@ be written to is told first, by writing there and taking back what was made.
 
 from __future__ import annotations
 
+import argparse
 import errno
 import fcntl
 import os
@@ -73,6 +74,22 @@ def prove_file(option: str, file: str | Path, inputs: Sequence[str | Path] = ())
             raise
         raise UserError(option, str(path), f"cannot be written: {_reason(error)}") from error
     return path
+
+
+def output_file(text: str) -> Path:
+    """Returns a file that has proved writable, for argparse: before hours of work, not after."""
+    try:
+        return prove_file("", text)
+    except UserError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def output_folder(text: str) -> Path:
+    """Returns a folder in which files can be written, for argparse."""
+    try:
+        return prove_directory("", text, [])
+    except UserError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 @contextmanager

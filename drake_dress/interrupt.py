@@ -93,13 +93,18 @@ def signals_raised() -> Iterator[None]:
 def signals_deferred() -> Iterator[None]:
     """Has signals that end a command wait, where half of what is done would be worse than none.
 
-    A process that is started meanwhile inherits that they wait.
+    A process that is started meanwhile inherits that they wait. In this one another thread may
+    take a signal all the same, so handlers wait, too.
     """
+    came: list[int] = []
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
     try:
-        yield
+        with _handled(lambda number, _: came.append(number)):
+            yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if came:
+            signal.raise_signal(came[0])
 
 
 @contextmanager

@@ -132,7 +132,22 @@ def test_the_first_signal_is_a_flag_and_the_second_an_exception(number: signal.S
     assert [signal.getsignal(n) for n in signal.Signals] == before
 
 
-def test_a_signal_waits_where_it_is_deferred() -> None:
+@pytest.mark.parametrize("threads", [0, 4])
+def test_a_signal_waits_where_it_is_deferred(threads: int) -> None:
+    """Whichever thread the system has chosen to take it."""
+    over = threading.Event()
+    others = [threading.Thread(target=over.wait) for _ in range(threads)]
+    for thread in others:
+        thread.start()
+    try:
+        _defer_and_take()
+    finally:
+        over.set()
+        for thread in others:
+            thread.join()
+
+
+def _defer_and_take() -> None:
     with signals_raised(), caught_interrupt() as interrupt:
         with signals_deferred():
             os.kill(os.getpid(), signal.SIGTERM)

@@ -1,9 +1,8 @@
 """A run into the directory of an earlier one, ended at a moment by a signal or a full disk.
 
-    python -m benchmarks.killed.ended_run PLAN.json OUTCOME.json
-
-A disk that can be filled is mounted for that, for which the process needs a mount namespace of its
-own: `unshare -m`.
+Takes two arguments: a file with the plan, and one to write what became of it, both JSON. A disk
+that can be filled is mounted for that, for which the process needs a mount namespace of its own:
+`unshare -m`.
 """
 
 from __future__ import annotations

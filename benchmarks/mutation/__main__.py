@@ -31,9 +31,11 @@ from benchmarks.parser import (
     output_file,
     some_of,
 )
+from benchmarks.section import END, around, begin, write_between
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 
+_NAME = "mutation"
 _ROOT = Path(__file__).parents[2]
 _SURVIVORS = Path(__file__).with_name("survivors.json")
 
@@ -41,6 +43,8 @@ _SURVIVORS = Path(__file__).with_name("survivors.json")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line; returns the exit status."""
     options = _parser().parse_args(arguments)
+    if options.into is not None:
+        around(options.into, _NAME)
     seed = secrets.randbelow(2**32) if options.seed is None else options.seed
     print(f"seed {seed}", flush=True)
     results = read_results(options.json, lambda case: Mutant(**case).name, "mutation")
@@ -65,7 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     results[mutant.name] = _result(mutant, copy)
                     write_results(options.json, results)
     told = {m: r for m, r in results.items() if r["case"]["module"] in options.modules}
-    _print_table(told)
+    _print_results(told)
+    print(f"\n{_table(told, seed).text()}")
+    if options.into is not None:
+        write_between(options.into, _NAME, _table(told, seed).text())
     return 0
 
 
@@ -85,7 +92,7 @@ def _result(mutant: Mutant, copy: Path) -> dict[str, Any]:
     return {"case": asdict(mutant), "said": said, "seconds": round(spent, 1), "change": lines}
 
 
-def _print_table(results: Mapping[str, dict[str, Any]]) -> None:
+def _table(results: Mapping[str, dict[str, Any]], seed: int) -> Table:
     rows = []
     for name in MODULES:
         said = [r["said"] for r in results.values() if r["case"]["module"] == name]
@@ -94,8 +101,14 @@ def _print_table(results: Mapping[str, dict[str, Any]]) -> None:
         counts = [said.count(word) for word in (CAUGHT, TIMED_OUT, SURVIVED)]
         noticed = 100.0 * (counts[0] + counts[1]) / len(said)
         rows.append([name, len(said), *counts, noticed])
+    whole = [sum(row[k] for row in rows) for k in range(1, 5)]
+    if rows:
+        rows.append(["all", *whole, 100.0 * (whole[1] + whole[2]) / whole[0]])
     header = ["module", "mutants", CAUGHT, TIMED_OUT, SURVIVED, "noticed, %"]
-    print(Table("Mutants that tests notice", header, rows).text())
+    return Table(f"Mutants that tests notice, seed {seed}", header, rows)
+
+
+def _print_results(results: Mapping[str, dict[str, Any]]) -> None:
     why = json.loads(_SURVIVORS.read_text(encoding="utf-8"))
     for name in sorted(n for n, r in results.items() if r["said"] == SURVIVED):
         print(f"\n{name}\n  " + "\n  ".join(results[name]["change"]))
@@ -122,6 +135,12 @@ def _parser() -> argparse.ArgumentParser:
         type=output_file,
         default=Path("out/mutation.json"),
         help="where results are kept; a study goes on from there",
+    )
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the table between {begin(_NAME)} and {END}",
     )
     return parser
 

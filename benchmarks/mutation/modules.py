@@ -21,12 +21,24 @@ class Module:
 
 
 _MODELS = "drake_dress/models"
-# What stands between commands and a person, what ends a run, what says that an arm is in its
-# sleeve, the solver of the control loop, and the regression by which causes are named.
+# What stands between commands and a person, what is believed and what ends a run, what says that an
+# arm is in its sleeve, the solver of the control loop, and the regression by which causes are
+# named.
 MODULES = {
     "safety": Module((f"{_MODELS}/control/safety.py",), ("tests/models/control/test_safety.py",)),
     "supervision": Module(
-        (f"{_MODELS}/supervision/supervision.py", f"{_MODELS}/supervision/watch.py"),
+        tuple(
+            f"{_MODELS}/supervision/{name}.py"
+            for name in (
+                "supervision",
+                "watch",
+                "order",
+                "person_pose",
+                "person_belief",
+                "garment_shape",
+                "garment_belief",
+            )
+        ),
         ("tests/models/supervision",),
     ),
     "linking": Module(

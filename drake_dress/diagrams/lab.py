@@ -125,8 +125,8 @@ def run_lab(
             capsule_radius=[c.radius for c in station.person.capsules],
             estimate_garment=meshes.belief,
             bases=arm_bases(station.robots),
+            results=RUN_FILES[1:],
         ) as writer:
-            remove_results(out, RUN_FILES[1:])
             lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
             heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer)
         interrupt = ended if isinstance(ended, Interrupt) else None

@@ -28,7 +28,7 @@ from drake_dress.diagrams.hardware_station import (
 from drake_dress.diagrams.pace import SteadyPace
 from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
 from drake_dress.errors import UserError
-from drake_dress.file_output import RUN_FILES, claimed, remove_results
+from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog
@@ -93,8 +93,8 @@ def run_scenario(
             estimate_garment=p.garments.belief,
             bases=arm_bases(p.station.robots),
             estimated=isinstance(p.station, HardwareStation),
+            results=RUN_FILES[1:],
         ) as writer:
-            remove_results(out, RUN_FILES[1:])
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
             ending = _simulate(dressing, simulator, scenario.duration, realtime_rate)

@@ -30,6 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.file_output import remove_results
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES, Side
@@ -148,6 +149,8 @@ class RunLogWriter:
         bases: X_WB (4,4) of each arm, where samples have arms.
         estimated: whether garment and person are as they were estimated, since truth is not known;
             there is no contact then.
+        results: names of files beside the log that an earlier run may have left; they are removed
+            before its log is replaced, so that nothing of one run ever stands beside the other's.
 
     Raises:
         UserError: the file cannot be written.
@@ -169,10 +172,12 @@ class RunLogWriter:
         flush_period: float = _FLUSH_PERIOD,
         bases: Mapping[Side, npt.ArrayLike] | None = None,
         estimated: bool = False,
+        results: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
         try:
             self._lock: int | None = locked(self.path)
+            remove_results(self.path.parent, results)
             self._file = _open(self.path, "w")
         except BlockingIOError as error:
             message = "cannot be written: another run writes it, or something reads it"

@@ -32,7 +32,8 @@ class MadeUp:
     decoy: it does what weight does and a little that was seen besides, but what refining changes
     with it is larger than all of that. Effects act `during` those samples only, by steady
     offsets, while cloth touches the person. Refining the scenario changes markers by `numerics`, m;
-    what was measured is off the refined one by `off`, m. Both stay for about 0.4 s.
+    what was measured is off the refined one by `off`, m. Both stay for about 0.4 s. With `apart`
+    the decoy also does something that was not seen, m where it is as strong as the truth.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class MadeUp:
         truth=TRUTH,
         numerics=0.0,
         off=0.0,
+        apart=0.0,
     ):
         time = np.arange(SAMPLES) * 0.02
         self.told_at = []
@@ -56,6 +58,9 @@ class MadeUp:
             np.random.default_rng(7).normal(0.0, 1.0, (COUNT, SAMPLES, MARKERS, 3))
             * besides
             / TRUTH
+        )
+        self._apart = (
+            np.random.default_rng(8).normal(0.0, 1.0, (COUNT, SAMPLES, MARKERS, 3)) * apart / TRUTH
         )
         self._touching = np.zeros(SAMPLES)
         self._touching[during] = 1.0
@@ -105,7 +110,7 @@ class MadeUp:
     def _marker(self, level, i, added, decoy):
         steeper = 1.0 if level == "screening" else self._steeper
         marker = self._base[i] + steeper * (added + decoy) * self._slope[i]
-        marker = marker + decoy * self._besides[i]
+        marker = marker + decoy * (self._besides[i] + self._apart[i])
         if level == "scenario" and decoy != 0.0:
             marker = marker + 2.0 * self._touching[:, None, None] * self._other
         if level in ("screening", "scenario"):

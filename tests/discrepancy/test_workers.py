@@ -56,7 +56,7 @@ def test_processes_end_with_whoever_began_them() -> None:
         "if __name__ == '__main__':\n"
         "    workers = Workers(600.0, 1)\n"
         "    workers._pool.submit(time.sleep, 600.0)\n"
-        "    print(*workers._pool._processes, flush=True)\n"
+        "    print(workers._pool._processes[0].pid, flush=True)\n"
         "    time.sleep(2.0)\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
