@@ -160,8 +160,8 @@ def _nothing_there(rng: Rng, source: Path) -> _Mutated:
 
 def _unknown_key(rng: Rng, source: Path) -> _Mutated:
     content = _whole(source)
-    path, value = _pick(rng, _leaves(content))
-    path = tuple(p for p in path if not isinstance(p, int))
+    named = [leaf for leaf in _leaves(content) if all(isinstance(p, str) for p in leaf[0])]
+    path, value = _pick(rng, named)
     name = path[-1]
     k = int(rng.integers(len(name)))
     wrong = _pick(
