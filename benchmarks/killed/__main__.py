@@ -32,7 +32,8 @@ from drake_dress.errors import UserError
 
 _NAME = "killed"
 _ROOT = Path(__file__).parents[2]
-_SCENARIO = _ROOT / "scenarios" / "dummy_standing.yaml"
+# its seed draws the dressing, so that files of two runs are never alike
+_SCENARIO = _ROOT / "scenarios" / "dummy_varied.yaml"
 # A run of some ten seconds, of which five are the simulation.
 _SETTINGS = [
     "duration=8",

@@ -59,8 +59,7 @@ def problems(
     if old:
         return wrong
     if "run.h5" not in now:
-        if now or end.told[0] > 0.0:
-            wrong.append(f"no log, beside {', '.join(now) or 'nothing'}")
+        wrong.append(f"no log of either run, beside {', '.join(now) or 'nothing'}")
         return wrong
     wrong += _log_problems(folder, seed, end)
     if "summary.json" in now:

@@ -175,28 +175,32 @@ class RunLogWriter:
         results: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
+        # before anything of an earlier run is touched: a run that cannot begin costs none of it
+        self._reserve = reserved(self.path.parent, _RESERVE + _BESIDE)
+        if self._reserve is None and os.access(self.path.parent, os.W_OK):
+            raise self._no_room()
         try:
             self._lock: int | None = locked(self.path)
             remove_results(self.path.parent, results)
             self._file = _open(self.path, "w")
         except BlockingIOError as error:
+            self._release()
             message = "cannot be written: another run writes it, or something reads it"
             raise UserError(str(path), "", message) from error
         except OSError as error:
+            self._release()
             raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
-        self._reserve = reserved(self.path.parent, _RESERVE)
         try:
             if self._reserve is None:
                 raise OSError
+            os.ftruncate(self._reserve, _RESERVE)
             keep_room(self._lock, 0, _BESIDE)
         except OSError as error:
             self._release()
             self._file.close()
             os.close(self._lock)
             self.path.unlink()
-            least = (_RESERVE + _BESIDE) >> 20
-            message = f"no room on the disk, expected {least} MB at least"
-            raise UserError(str(path), "", message) from error
+            raise self._no_room() from error
         self._unflushed = 0  # bytes
         self._flush_period = flush_period
         self._count = self._count_opened = 0
@@ -502,6 +506,10 @@ class RunLogWriter:
             self._file.attrs.modify(COMPLETE, True)
         finally:
             self._file.close()
+
+    def _no_room(self) -> UserError:
+        least = (_RESERVE + _BESIDE) >> 20
+        return UserError(str(self.path), "", f"no room on the disk, expected {least} MB at least")
 
     def _release(self) -> None:
         """Gives back what was kept back on the disk."""

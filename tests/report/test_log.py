@@ -486,3 +486,21 @@ def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
             radius=np.ones(6),
         )  # fmt: skip
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_for_which_there_is_no_room_costs_nothing_of_the_one_before(
+    tmp_path, garment, monkeypatch
+):
+    def none(*_):
+        raise OSError(28, "No space left on device")
+
+    before = {"run.h5": b"a log", "summary.json": b"a summary"}
+    for name, content in before.items():
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr(os, "posix_fallocate", none)
+    with pytest.raises(UserError, match="no room on the disk"):
+        RunLogWriter(
+            tmp_path / "run.h5", garment=garment, scenario_text="", version="", seed=0,
+            radius=np.ones(6), results=["summary.json"],
+        )  # fmt: skip
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
