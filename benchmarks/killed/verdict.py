@@ -84,6 +84,7 @@ def _log_problems(folder: Path, seed: int, end: Ended) -> list[str]:
     if len(time) > 1 and np.any(np.diff(time) <= 0.0):
         return ["time does not increase"]
     until = end.wall if end.acted is None else end.acted
-    if until - end.told[1] > _FLUSHED and (not len(time) or time[-1] < end.told[0] - 0.1):
+    due = end.told[0] > 0.0 and until - end.told[1] > _FLUSHED
+    if due and (not len(time) or time[-1] < end.told[0] - 0.1):
         return [f"log ends at {time[-1] if len(time) else 0.0:.1f} s, {end.told[0]:g} s was told"]
     return []
