@@ -36,7 +36,7 @@ from benchmarks.parser import (
 )
 from benchmarks.section import END, around, begin, write_between
 from drake_dress import __version__
-from drake_dress.discrepancy.results import write_text
+from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
 _NAME = "inputs"

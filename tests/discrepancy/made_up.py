@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from drake_dress.discrepancy.candidates import Candidate, Probe
 from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.effects.fabric import StretchStiffness
@@ -22,6 +23,21 @@ def lasting(rng, memory=20):
     for t in range(1, SAMPLES):
         found[:, t] = decay * found[:, t - 1] + np.sqrt(1.0 - decay**2) * fresh[:, t]
     return found
+
+
+def probe_of(lab, effects):
+    """Returns what takes the place of `search.probe`: a column for each of some effects."""
+
+    def probe(experiment, comparison, progress=None):
+        columns = []
+        for e in effects:
+            (told,) = lab.tell([("screening", [e])])
+            column = comparison.whitening.vector(told) - comparison.vector["screening"]
+            candidate = Candidate(e.NAME, (Probe(e, "added", -np.inf),))
+            columns.append((candidate, column[:, None]))
+        return columns
+
+    return probe
 
 
 class MadeUp:

@@ -24,14 +24,14 @@ import pytest
 
 from drake_dress.discrepancy import search
 from drake_dress.discrepancy.attribution import compare
-from drake_dress.discrepancy.candidates import NEED_CONTACT, Candidate, Probe
+from drake_dress.discrepancy.candidates import NEED_CONTACT
 from drake_dress.discrepancy.commands import explain_files, write_dataset
 from drake_dress.discrepancy.search import Search
 from drake_dress.models.effects.fabric import StretchStiffness
 from drake_dress.models.effects.mass import SurfaceDensity
 from drake_dress.models.effects.registry import EFFECTS
 from tests.discrepancy.data import SCENARIO
-from tests.discrepancy.made_up import DECOY, TRUTH, MadeUp
+from tests.discrepancy.made_up import DECOY, TRUTH, MadeUp, probe_of
 from tests.drawing import drawn_seed
 
 # Half of the scenario's nodes and free motions only, so that a case takes a minute.
@@ -80,17 +80,8 @@ def test_the_rules_separate_good_tools_from_bad_ones_as_often_as_is_said():
 def causes_made_up(lab, monkeypatch):
     """Returns the names of causes that a search among two effects finds, rivals among them."""
     comparison = compare(lab)
-
-    def probe(experiment, comparison, progress=None):
-        columns = []
-        for effect in (SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY)):
-            (told,) = lab.tell([("screening", [effect])])
-            column = comparison.whitening.vector(told) - comparison.vector["screening"]
-            candidate = Candidate(effect.NAME, (Probe(effect, "added", -np.inf),))
-            columns.append((candidate, column[:, None]))
-        return columns
-
-    monkeypatch.setattr(search, "probe", probe)
+    effects = (SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY))
+    monkeypatch.setattr(search, "probe", probe_of(lab, effects))
     found = Search(lab, comparison, np.random.default_rng(0), lambda _: None, None).run()
     named = {n.name for n in found.named}
     return named if found.rival is None else named | {found.rival[0].name}

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from drake_dress.discrepancy import search
-from drake_dress.discrepancy.candidates import Candidate, Probe
 from drake_dress.discrepancy.explanation import explain
 from drake_dress.models.effects.fabric import StretchStiffness
 from drake_dress.models.effects.mass import SurfaceDensity
-from tests.discrepancy.made_up import DECOY, NOISE, MadeUp
+from tests.discrepancy.made_up import DECOY, NOISE, MadeUp, probe_of
 
 EFFECTS = (SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY))
 
@@ -18,16 +17,7 @@ def explained(monkeypatch):
     """Returns what is found in a made-up lab, among some effects."""
 
     def run(lab, effects=EFFECTS):
-        def probe(experiment, comparison, progress=None):
-            columns = []
-            for e in effects:
-                (told,) = lab.tell([("screening", [e])])
-                column = comparison.whitening.vector(told) - comparison.vector["screening"]
-                candidate = Candidate(e.NAME, (Probe(e, "added", -np.inf),))
-                columns.append((candidate, column[:, None]))
-            return columns
-
-        monkeypatch.setattr(search, "probe", probe)
+        monkeypatch.setattr(search, "probe", probe_of(lab, effects))
         return explain(lab)
 
     return run

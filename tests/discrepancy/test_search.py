@@ -5,11 +5,10 @@ import pytest
 
 from drake_dress.discrepancy import search
 from drake_dress.discrepancy.attribution import compare
-from drake_dress.discrepancy.candidates import Candidate, Probe
 from drake_dress.discrepancy.search import Search
 from drake_dress.models.effects.fabric import StretchStiffness
 from drake_dress.models.effects.mass import SurfaceDensity
-from tests.discrepancy.made_up import DECOY, TRUTH, MadeUp
+from tests.discrepancy.made_up import DECOY, TRUTH, MadeUp, probe_of
 
 WEIGHT, STIFFNESS = SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY)
 
@@ -20,17 +19,7 @@ def found(monkeypatch):
 
     def run(lab, *effects):
         comparison = compare(lab)
-
-        def probe(experiment, comparison, progress=None):
-            columns = []
-            for e in effects:
-                (told,) = lab.tell([("screening", [e])])
-                column = comparison.whitening.vector(told) - comparison.vector["screening"]
-                candidate = Candidate(e.NAME, (Probe(e, "added", -np.inf),))
-                columns.append((candidate, column[:, None]))
-            return columns
-
-        monkeypatch.setattr(search, "probe", probe)
+        monkeypatch.setattr(search, "probe", probe_of(lab, effects))
         rng = np.random.default_rng(0)
         return Search(lab, comparison, rng, lambda _: None, None).run()
 

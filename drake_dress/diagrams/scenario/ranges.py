@@ -1,7 +1,9 @@
 """Which words and numbers a scenario's values may be."""
 
 import re
+from dataclasses import fields
 
+from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.load import WELD_RANGE
@@ -86,16 +88,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "coat.scale": (0.7, 1.4),
     **{
         f"coat.{name}": (0.0, 3.0)  # m; together they are checked as the coat is made
-        for name in (
-            "body_length",
-            "chest",
-            "shoulder_width",
-            "sleeve_length",
-            "armhole_girth",
-            "cuff_girth",
-            "collar_height",
-            "front_opening",
-        )
+        for name in (entry.name for entry in fields(Coat) if entry.default is None)
     },
     **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
     **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
