@@ -290,8 +290,11 @@ def _other_number(word: str) -> str:
     base = _OTHER_BASE.fullmatch(word)
     if base:
         sign, letter, digits = base.groups()
+        digits = digits.replace("_", "")
+        if not digits:
+            return f"{word} is a number without digits or text, expected '{word}'"
         try:
-            number = int(sign + digits.replace("_", ""), _BASES[letter])
+            number = int(sign + digits, _BASES[letter])
         except ValueError:
             return ""
         if _LEAST <= number <= _MOST:

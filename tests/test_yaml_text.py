@@ -144,6 +144,7 @@ WORDS = st.text("0123456789+-._:eExob", min_size=1, max_size=8).filter(lambda w:
 @given(WORDS)
 @example(".0_")
 @example("1__0.")
+@example("0b_")
 def test_what_is_read_is_what_a_reader_of_yaml_1_1_has(word: str) -> None:
     """Or it is refused; but for exponents, which 1.1 takes for text where 1.2 has numbers."""
     text = f"a: {word}"
