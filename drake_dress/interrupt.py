@@ -7,14 +7,21 @@ have it.
 
 from __future__ import annotations
 
+import _thread
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
+# s from a signal that came inside an import to the next look whether it is over.
+_LATER = 0.05
+_IMPORTS = "<frozen importlib._bootstrap>"
 
 
 class Terminated(KeyboardInterrupt):
@@ -80,13 +87,40 @@ def caught_interrupt() -> Iterator[Interrupt]:
 
 @contextmanager
 def signals_raised() -> Iterator[None]:
-    """Has SIGTERM and SIGHUP raise an exception, as SIGINT does, so that files are closed."""
+    """Has signals that end a command raise an exception, so that files are closed.
 
-    def on_signal(number: int, _frame: object) -> None:
-        raise Terminated(number)
+    Inside an import they wait for its end: modules take an exception there for a failure of what
+    they load, and tell it as that.
+    """
+    over = False
 
-    with _handled(on_signal, _ENDING[1:]):
-        yield
+    def send_later(number: int) -> None:
+        time.sleep(_LATER)
+        if not over:
+            os.kill(os.getpid(), number)
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        if _importing(frame):
+            # A thread of `threading` would take locks that the interrupted code may hold.
+            _thread.start_new_thread(send_later, (number,))
+            return
+        interrupt = Interrupt()
+        interrupt.number = number
+        raise interrupt.error()
+
+    try:
+        with _handled(on_signal):
+            yield
+    finally:
+        over = True
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == _IMPORTS:
+            return True
+        frame = frame.f_back
+    return False
 
 
 @contextmanager

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -130,6 +132,28 @@ def test_the_first_signal_is_a_flag_and_the_second_an_exception(number: signal.S
             time.sleep(1.0)
     assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
     assert [signal.getsignal(n) for n in signal.Signals] == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_inside_an_import_comes_after_it(
+    number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A module may take an exception for a failure of what it loads; here it would hide it."""
+    inner = f"import os\nos.kill(os.getpid(), {int(number)})\ncame = len(range(1000))\n"
+    (tmp_path / "interrupted_inner.py").write_text(inner)
+    outer = "try:\n    import interrupted_inner\nexcept BaseException as error:\n"
+    outer += "    raise ImportError('initialization failed') from error\n"
+    (tmp_path / "interrupted_outer.py").write_text(outer)
+    monkeypatch.syspath_prepend(tmp_path)
+    try:
+        with pytest.raises(KeyboardInterrupt) as raised, signals_raised():
+            module = importlib.import_module("interrupted_outer")
+            assert module.interrupted_inner.came == 1000
+            time.sleep(5.0)
+        assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
+    finally:
+        for name in ("interrupted_outer", "interrupted_inner"):
+            sys.modules.pop(name, None)
 
 
 @pytest.mark.parametrize("threads", [0, 4])
