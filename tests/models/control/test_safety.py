@@ -287,6 +287,86 @@ def test_workspace_is_reached_and_not_left() -> None:
     assert Verdict.WORKSPACE in arms.seen
 
 
+def test_full_speed_lasts_until_ordinary_braking_stops_at_the_border() -> None:
+    box = START.mean(axis=0) + np.array([[-1.0, -1.0, -1.0], [0.2, 1.0, 1.0]])
+    arms = Arms(replace(LIMITS, workspace=box))
+    velocity = arms.ask(LIMITS.max_speed * X, duration=1.5)[:, 0, 0]
+    room = box[1, 0] - np.array(arms.path)[1:, 0, 0]
+    # of what is left after a step, another step at that speed is needed to begin braking
+    needed = LIMITS.max_speed**2 / (2.0 * LIMITS.max_acceleration) + LIMITS.max_speed * DT
+    free = (room > needed) & (np.arange(len(room)) > 20)
+    assert free.sum() > 20
+    np.testing.assert_allclose(velocity[free], LIMITS.max_speed)
+    assert 0.0 <= room[-1] < 1e-4
+    assert np.diff(velocity).min() >= -LIMITS.max_acceleration * DT - 1e-12
+
+
+@pytest.mark.parametrize(
+    ("limits", "measured", "back", "flag"),
+    [
+        ({"workspace": START.mean(axis=0) + [[-1.0] * 3, [-0.05, 1.0, 1.0]]}, 0.0, -X, "WORKSPACE"),
+        (
+            {"workspace": START.mean(axis=0) + [[0.05, -1, -1], [1.0, 1.0, 1.0]]},
+            0.0,
+            X,
+            "WORKSPACE",
+        ),
+        ({"largest_distance": 0.5}, 0.0, -Y, "DISTANCE"),
+        # each has half of what is left
+        ({"least_distance": 0.7}, 0.0, 0.5 * Y, "DISTANCE"),
+        ({}, -0.2 * X, -X, "LEAD"),
+    ],
+)
+def test_a_limit_of_place_that_is_broken_is_made_good_slowly(
+    limits: dict[str, object], measured: np.ndarray, back: np.ndarray, flag: str
+) -> None:
+    arms = Arms(replace(LIMITS, **limits))
+    for _ in range(20):
+        arms.ask(NOTHING, position=arms.state.position + measured)
+        assert all(Verdict[flag] in verdict for verdict in arms.verdicts)
+    mirrored = np.array([[1.0], [-1.0 if flag == "DISTANCE" else 1.0]])
+    expected = LIMITS.relax_speed * back * mirrored
+    np.testing.assert_allclose(arms.state.velocity, expected, atol=1e-9)
+
+
+def test_distances_that_are_broken_end_where_they_may_be() -> None:
+    for limits, apart in (({"largest_distance": 0.55}, 0.55), ({"least_distance": 0.65}, 0.65)):
+        arms = Arms(replace(LIMITS, **limits))
+        arms.ask(NOTHING, duration=8.0)
+        left, right = arms.state.position
+        assert np.linalg.norm(left - right) == pytest.approx(apart, abs=1e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_what_was_cut_is_told_and_nothing_else(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arms = Arms(replace(LIMITS, stop_time=60.0))
+    arms.ask(0.1 * rng.normal(size=3), duration=0.2)
+    last = arms.state.velocity.copy()
+    wanted = 0.2 * rng.normal(size=(2, 3))
+    force = rng.choice([0.5, 0.9, 1.0, 1.5]) * LIMITS.hard_force * X
+    arms.ask(wanted, force)
+    slowed = LIMITS.max_acceleration * DT * (1.0 + 1e-6)
+    for i, verdict in enumerate(arms.verdicts):
+        assert (Verdict.SPEED in verdict) == (np.linalg.norm(wanted[i]) > LIMITS.max_speed)
+        assert (Verdict.ACCELERATION in verdict) == (np.linalg.norm(wanted[i] - last[i]) > slowed)
+        changed = np.linalg.norm(arms.state.velocity[i] - last[i])
+        assert (Verdict.BRAKING in verdict) == (changed > slowed)
+        rest = Verdict.WORKSPACE | Verdict.DISTANCE | Verdict.PERSON | Verdict.STALE
+        assert not verdict & (rest | Verdict.INVALID | Verdict.UNMEASURED | Verdict.HELD)
+
+
+def test_all_reasons_to_stand_still_are_told_together() -> None:
+    arms = Arms()
+    arms.ask(NOTHING, -(LIMITS.hard_force + 5.0) * X, duration=2.0 * LIMITS.stop_time)
+    hidden = arms.state.position + [[np.nan, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    arms.ask(np.full(3, np.inf), -LIMITS.hard_force * X, stamp=-9.0, position=hidden)
+    both = Verdict.STOPPED | Verdict.STALE | Verdict.INVALID
+    assert arms.verdicts[0] & (both | Verdict.UNMEASURED) == both | Verdict.UNMEASURED
+    assert arms.verdicts[1] & (both | Verdict.UNMEASURED) == both
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_grippers_keep_their_distances(sign: float) -> None:
     arms = Arms(replace(LIMITS, least_distance=0.2, largest_distance=0.8))
