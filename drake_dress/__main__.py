@@ -6,7 +6,7 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -30,6 +30,12 @@ from drake_dress.yaml_text import plain_value
 FAILED, UNUSABLE = 1, 2
 # Ports that a program may open without being root.
 _PORTS = 1024, 65535
+# Simulated seconds per second; slower, and Ctrl-C would wait for minutes.
+_RATES = 0.02, 1e3
+# Of a hidden effect, by what matters.
+_SIZES = 1e-3, 1e3
+# Beyond these a marker is anywhere in the room, m, and a gripper at what it can carry, N.
+_MOST_MARKER_NOISE, _MOST_FORCE_NOISE = 1.0, 100.0
 # By name, what each measures; the first is the default.
 BENCHMARKS = {
     "cloth": "accuracy and speed of the garment, beside other simulators where installed",
@@ -228,11 +234,21 @@ def _parser() -> argparse.ArgumentParser:
         "--scenario", metavar="SCENARIO.yaml", help="default: measured.yaml of the program's own"
     )
     hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
-    hidden.add_argument("--size", type=_rate, default=1.0, help="of the effect; default 1")
+    hidden.add_argument("--size", type=_size, default=1.0, help="of the effect; default 1")
     hidden.add_argument(
-        "--marker-noise", type=_rate, default=1e-3, metavar="M", help="default 1e-3"
+        "--marker-noise",
+        type=_noise(_MOST_MARKER_NOISE),
+        default=1e-3,
+        metavar="M",
+        help="default 1e-3",
     )
-    hidden.add_argument("--force-noise", type=_rate, default=0.05, metavar="N", help="default 0.05")
+    hidden.add_argument(
+        "--force-noise",
+        type=_noise(_MOST_FORCE_NOISE),
+        default=0.05,
+        metavar="N",
+        help="default 0.05",
+    )
     hidden.set_defaults(command=_dataset_measured)
 
     verbs.add_parser(
@@ -328,7 +344,7 @@ def _dataset_measured(options: argparse.Namespace) -> int:
         options.set,
         options.size,
         sensors,
-        options.motions.split(",") if options.motions else USUAL,
+        USUAL if options.motions is None else options.motions.split(","),
     )
     return 0
 
@@ -373,9 +389,32 @@ def _number(text: str) -> int | float:
 
 def _rate(text: str) -> float:
     value = float(_number(text))
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
+    if value != 0.0 and not _RATES[0] <= value <= _RATES[1]:
+        raise argparse.ArgumentTypeError(
+            f"{text} is out of range, expected 0 or {_RATES[0]:g} to {_RATES[1]:g}"
+        )
     return value
+
+
+def _size(text: str) -> float:
+    value = float(_number(text))
+    if not _SIZES[0] <= value <= _SIZES[1]:
+        raise argparse.ArgumentTypeError(
+            f"{text} is out of range, expected {_SIZES[0]:g} to {_SIZES[1]:g}"
+        )
+    return value
+
+
+def _noise(most: float) -> Callable[[str], float]:
+    """Returns a reader of a standard deviation from 0 to `most`."""
+
+    def noise(text: str) -> float:
+        value = float(_number(text))
+        if not 0.0 <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 to {most:g}")
+        return value
+
+    return noise
 
 
 def _whole(text: str) -> int:

@@ -17,6 +17,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
@@ -57,16 +58,18 @@ class WorkerPool(Executor):
         self._killed = False
         # Python waits at its end for processes, which ignore the signal that it sends them.
         atexit.register(_kill_all, weakref.WeakMethod(self.kill))
+        pipes = []
         for _ in range(max_workers):
             pipe, other = context.Pipe()
-            process = context.Process(
-                target=_serve, args=(other, os.getpid(), initializer, tuple(initargs))
-            )
-            # A process that is told half of what to do would complain.
-            with signals_deferred():
-                process.start()
+            process = context.Process(target=_serve, args=(other, os.getpid()))
+            start_process(process)
             other.close()
             self._processes.append(process)
+            pipes.append(pipe)
+        for pipe, process in zip(pipes, self._processes, strict=True):
+            # Of one that has ended already, the first call tells.
+            with contextlib.suppress(OSError):
+                pipe.send((initializer, tuple(initargs)))
             self._free.put((pipe, process))
 
     @property
@@ -119,6 +122,18 @@ class WorkerPool(Executor):
         raise result
 
 
+def start_process(process: BaseProcess) -> None:
+    """Starts a process to which no signal comes before it leaves signals to this one.
+
+    Ctrl-C and `timeout` send them to all processes of a group. What the process is given should be
+    small: this one waits for ever where it has more to write than a pipe holds and the reader ends.
+    """
+    # Its own start lets SIGINT and SIGTERM through again, so it has to come first.
+    resource_tracker.ensure_running()
+    with signals_deferred():
+        process.start()
+
+
 def end_with(parent: int) -> None:
     """Has this process end with its parent, however that ends, and leave signals to it."""
     for number in _ENDING:
@@ -142,13 +157,12 @@ def _kill_all(kill: weakref.WeakMethod[Callable[[], None]]) -> None:
             method()
 
 
-def _serve(
-    pipe: Connection,
-    parent: int,
-    initializer: Callable[..., object] | None,
-    initargs: tuple[Any, ...],
-) -> None:
+def _serve(pipe: Connection, parent: int) -> None:
     end_with(parent)
+    try:
+        initializer, initargs = pipe.recv()
+    except (EOFError, OSError):
+        return
     if initializer is not None:
         initializer(*initargs)
     while True:

@@ -90,3 +90,42 @@ def test_an_error_of_the_file_system_is_one_line(
         monkeypatch.setattr(run, "run_scenario", broken)
         assert main(["run", "scenarios/dummy_standing.yaml", "--out", str(tmp_path)]) == 1
         assert capsys.readouterr().err.count("\n") == 1
+
+
+OPTIONS = [
+    *(["run", "s.yaml", "--realtime-rate", bad] for bad in ("nan", "-1", "1e-9", "1e300", "x")),
+    *(["dataset", "measured", "--hide", bad] for bad in ("", "wind+wind", "nothing+wind", "wnd")),
+    *(["dataset", "measured", "--hide", "wind", "--size", bad] for bad in ("0", "1e5", "nan")),
+    ["dataset", "measured", "--hide", "air_drag", "--size", "900"],
+    *(
+        ["dataset", "measured", "--hide", "wind", "--motions", m]
+        for m in ("", "sway,", "lift,lift")
+    ),
+    *(["dataset", "measured", "--hide", "wind", "--marker-noise", bad] for bad in ("2", "-1e-3")),
+    ["dataset", "measured", "--hide", "wind", "--force-noise", "1e300"],
+    *(
+        ["calibrate", ".", "--board", f"7x5:0.03:0.022:{dictionary}"]
+        for dictionary in ("", "ArucoDetector", "DICT_0X0_1", "_native", "DICT_")
+    ),
+    # more squares than the dictionary has markers for
+    *(
+        ["calibrate", ".", "--board", f"{size}:0.03:0.022:DICT_4X4_50"]
+        for size in ("11x10", "9e9x3")
+    ),
+    *(["calibrate", ".", "--board", f"7x5:{sizes}:DICT_4X4_50"] for sizes in ("nan:0.02", "0:0")),
+]
+
+
+@pytest.mark.parametrize("words", OPTIONS, ids=" ".join)
+def test_an_option_that_cannot_be_is_told_before_any_work(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = [] if words[0] == "calibrate" else ["--out", str(tmp_path / "out")]
+    try:
+        status = main([*words, *out])
+    except SystemExit as error:
+        status = int(error.code or 0)
+    captured = capsys.readouterr()
+    assert status == 2 and captured.out == ""
+    assert words[-2] in captured.err and captured.err.count("\n") == 1, captured.err
+    assert not list((tmp_path / "out").glob("*"))

@@ -100,6 +100,41 @@ def test_a_program_that_forgets_its_processes_ends_all_the_same() -> None:
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=60)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_the_whole_group_reaches_no_process_that_begins(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """Though the first process that is spawned has Python let these signals through again."""
+    code = (
+        "import os, signal, sys\n"
+        "from multiprocessing import get_context\n"
+        "from drake_dress.worker_pool import start_process\n"
+        "def blocked(pipe):\n"
+        "    pipe.send(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
+        "if __name__ == '__main__':\n"
+        "    here, there = get_context('spawn').Pipe()\n"
+        "    process = get_context('spawn').Process(target=blocked, args=(there,))\n"
+        "    start_process(process)\n"
+        f"    sys.exit({int(number)} not in here.recv())\n"
+    )
+    program = tmp_path / "program.py"
+    program.write_text(code)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, program], env=environment, check=True, timeout=60)
+
+
+@pytest.mark.parametrize("large", [10, 10_000_000])
+def test_a_process_that_ends_at_its_beginning_is_told(large: int) -> None:
+    """However much it was to be given, which nobody reads."""
+    with WorkerPool(1, initializer=end_after, initargs=(bytes(large),)) as pool:
+        with pytest.raises(BrokenProcessPool, match="exit 3"):
+            pool.submit(abs, 1).result(60.0)
+
+
+def end_after(_: bytes) -> None:
+    os._exit(3)
+
+
 def forever(parent: int) -> None:
     from drake_dress.worker_pool import end_with
 

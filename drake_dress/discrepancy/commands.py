@@ -125,7 +125,10 @@ def write_dataset(
         raise UserError("--seed", "", f"is {seed}, expected 0 or more")
     for name in motions:
         if name not in MOTIONS:
-            raise UserError("--motions", name, f"is no motion, expected {', '.join(MOTIONS)}")
+            named = name or "an empty name"
+            raise UserError("--motions", named, f"is no motion, expected {', '.join(MOTIONS)}")
+        if motions.count(name) > 1:
+            raise UserError("--motions", name, "stands twice, expected it once")
     scenario = load_scenario(scenario_file, overrides)
     seeds = [seed, *hide.encode()]
     rng = np.random.default_rng(seeds)

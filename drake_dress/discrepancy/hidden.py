@@ -38,7 +38,7 @@ def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[
         size: factor on how strong it is.
 
     Raises:
-        UserError: there is no such effect.
+        UserError: there is no such effect, or it cannot be so large.
     """
     if what == RANDOM:
         what = str(rng.choice([NOTHING, *SIZES]))
@@ -51,7 +51,12 @@ def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[
             listed = f"expected one of {', '.join(ALL_SIZES)}"
             expected = f"did you mean {near[0]}?" if near else listed
             raise UserError("--hide", name, f"is no effect that can be hidden, {expected}")
-    return [draw_effect(name, rng, size) for name in names]
+        if names.count(name) > 1:
+            raise UserError("--hide", name, "stands twice, expected it once")
+    try:
+        return [draw_effect(name, rng, size) for name in names]
+    except ValueError as error:
+        raise UserError("--size", f"{size:g}", f"at this size {error}") from None
 
 
 def _between(low: float, high: float, both: bool = False) -> Callable[..., float]:

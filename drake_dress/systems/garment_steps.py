@@ -6,6 +6,7 @@ the two it is makes no difference to the numbers.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 from dataclasses import dataclass
@@ -15,12 +16,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from drake_dress.interrupt import signals_deferred
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.systems.shared_memory import SharedMemory
-from drake_dress.worker_pool import end_with, kill_at_exit
+from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 
 FloatArray = npt.NDArray[np.float64]
 # The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
@@ -123,14 +123,16 @@ class StepsBeside:
         self._pipe, other = context.Pipe()
         self._process = context.Process(
             target=_serve,
-            args=(cloth, surroundings, shared, other, os.getpid()),
+            args=(shared, other, os.getpid()),
             daemon=True,
             name="garment",
         )
-        with signals_deferred():
-            self._process.start()
+        start_process(self._process)
         kill_at_exit(self._process)
         other.close()
+        # Of a process that has ended already, the first step tells.
+        with contextlib.suppress(OSError):
+            self._pipe.send((cloth, surroundings))
         self._under_way = False
         self._place = 0
         self._last: ClothState | None = None
@@ -217,10 +219,12 @@ def _copy(source: ClothState, target: ClothState) -> None:
         getattr(target, name)[:] = getattr(source, name)
 
 
-def _serve(
-    cloth: Integrator, surroundings: Surroundings, shared: _Shared, pipe: Connection, parent: int
-) -> None:
+def _serve(shared: _Shared, pipe: Connection, parent: int) -> None:
     end_with(parent)
+    try:
+        cloth, surroundings = pipe.recv()
+    except (EOFError, OSError):
+        return
     places, around = shared.states(), shared.around()
     place, state = 0, places[0]
     while True:

@@ -51,17 +51,22 @@ class Board:
             CalibrationError: there is no such dictionary, or no such board.
         """
         number = getattr(cv2.aruco, self.dictionary, None)
-        if number is None:
+        # the module has other names, too
+        if not self.dictionary.startswith("DICT_") or not isinstance(number, int):
             raise CalibrationError(f"dictionary {self.dictionary!r} is none of OpenCV's")
         if min(self.columns, self.rows) < 3 or not 0.0 < self.marker < self.square:
             raise CalibrationError(
                 "no such board, expected 3 × 3 squares at least and markers smaller than squares"
             )
+        dictionary = cv2.aruco.getPredefinedDictionary(number)
+        needed, there = self.columns * self.rows // 2, len(dictionary.bytesList)
+        if needed > there:
+            raise CalibrationError(
+                f"{self.columns} × {self.rows} squares need {needed} markers, of which "
+                f"{self.dictionary} has {there}"
+            )
         return cv2.aruco.CharucoBoard(
-            (self.columns, self.rows),
-            self.square,
-            self.marker,
-            cv2.aruco.getPredefinedDictionary(number),
+            (self.columns, self.rows), self.square, self.marker, dictionary
         )
 
     def picture(self, pixels_per_square: int) -> Image:

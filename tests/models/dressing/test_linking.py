@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drake_dress.models.dressing.coordinates import ArmAxis
-from drake_dress.models.dressing.linking import _aside, _height, arm_linking_number, linking_number
+from drake_dress.models.dressing.linking import (
+    _apex,
+    _aside,
+    _height,
+    arm_linking_number,
+    linking_number,
+)
 from drake_dress.models.dressing.linking import _distance as _distance_of_points
 
 FloatArray = npt.NDArray[np.float64]
@@ -61,6 +67,19 @@ def test_ring_centred_on_the_arm_counts_once_in_every_frame(nodes: int) -> None:
         rotation = Rotation.random(random_state=seed).as_matrix()
         moved = [points @ rotation.T for points in (loop, *ARM)]
         assert arm_linking_number(*moved) == 1
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.2])
+def test_apex_of_the_fan_is_next_to_the_centre_but_not_on_the_arm(radius: float) -> None:
+    line = np.stack([HAND, ELBOW, SHOULDER, INTERIOR])
+    for seed in range(30):
+        rotation = Rotation.random(random_state=seed).as_matrix()
+        center = HAND + (0.2 + 0.02 * seed) * (ELBOW - HAND)
+        loop, turned = ring(center, ELBOW - HAND, radius) @ rotation.T, line @ rotation.T
+        apex = _apex(loop, turned)
+        assert np.linalg.norm(apex - loop.mean(axis=0)) < 2e-6 * radius
+        for p, q in zip(turned[:-1], turned[1:], strict=True):
+            assert _aside(apex, p, q) / np.linalg.norm(q - p) > 1e-7 * radius
 
 
 def test_ring_at_the_elbow_counts_once_not_per_limb() -> None:

@@ -221,6 +221,20 @@ def test_a_tracker_that_freezes_is_told_and_one_without_noise_is_not(seed: int) 
     assert judged(noisy + [noisy[-1]] * 40 + noisy)[-1] is Fault.NONE
 
 
+def test_one_repeated_estimate_of_a_slow_sensor_is_not_frozen() -> None:
+    """However long its period is: a rounded number may come twice."""
+    slow = 2.0 * BOUNDS.frozen_time
+    points = [person(REST, REST) + 1e-6 * k for k in range(40)]
+    repeated = [*points, points[-1], points[-1]]
+    track: PersonTrack | None = None
+    for k, p in enumerate(repeated):
+        finding, track = judge_person(p, k * slow, track, BOUNDS)
+        assert not finding.fault & Fault.FROZEN
+    for k in range(len(repeated), len(repeated) + 4):
+        finding, track = judge_person(points[-1], k * slow, track, BOUNDS)
+    assert finding.fault & Fault.FROZEN
+
+
 def test_a_frozen_hand_is_told_by_name() -> None:
     rng = np.random.default_rng(0)
     track, held, found = None, None, None
