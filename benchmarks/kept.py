@@ -47,7 +47,7 @@ def write_results(path: Path, results: Mapping[str, dict[str, Any]]) -> None:
 def seed_range(text: str) -> range:
     """Returns the seeds that A-B or A means, for argparse."""
     first, _, last = text.partition("-")
-    try:
-        return range(int(first), int(last or first) + 1)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9") from None
+    last = last or first
+    if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):
+        raise argparse.ArgumentTypeError(f"{text!r} is no range such as 0-9")
+    return range(int(first), int(last) + 1)

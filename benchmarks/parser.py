@@ -44,6 +44,28 @@ def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
     return parse
 
 
+def number_between(low: float, high: float) -> Callable[[str], float]:
+    """Returns what parses a number from `low` to `high`, for argparse."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is none of {low:g} to {high:g}")
+        return value
+
+    return parse
+
+
+def seed_number(text: str) -> int:
+    """Returns what may begin a draw, for argparse."""
+    if not text.isdecimal() or int(text) >= 2**63:
+        raise argparse.ArgumentTypeError(f"{text!r} is no seed, expected 0 to 2^63 - 1")
+    return int(text)
+
+
 def at_least_one(text: str) -> int:
     """Returns a count, for argparse."""
     if not text.isdecimal() or int(text) < 1:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import _thread
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -90,7 +91,8 @@ def signals_raised() -> Iterator[None]:
     """Has signals that end a command raise an exception, so that files are closed.
 
     Inside an import they wait for its end: modules take an exception there for a failure of what
-    they load, and tell it as that.
+    they load, and tell it as that. Where an exception is swallowed, as in `__del__` or when memory
+    is collected, it is raised again a little later.
     """
     over = False
 
@@ -100,6 +102,8 @@ def signals_raised() -> Iterator[None]:
             os.kill(os.getpid(), number)
 
     def on_signal(number: int, frame: FrameType | None) -> None:
+        if over:
+            return
         if _importing(frame):
             # A thread of `threading` would take locks that the interrupted code may hold.
             _thread.start_new_thread(send_later, (number,))
@@ -108,11 +112,23 @@ def signals_raised() -> Iterator[None]:
         interrupt.number = number
         raise interrupt.error()
 
+    usual = sys.unraisablehook
+
+    def on_swallowed(swallowed: sys.UnraisableHookArgs) -> None:
+        if isinstance(swallowed.exc_value, KeyboardInterrupt):
+            number = interrupt_of(swallowed.exc_value).number
+            _thread.start_new_thread(send_later, (number,))
+        else:
+            usual(swallowed)
+
     try:
         with _handled(on_signal):
+            sys.unraisablehook = on_swallowed
             yield
+            over = True
     finally:
         over = True
+        sys.unraisablehook = usual
 
 
 def _importing(frame: FrameType | None) -> bool:

@@ -112,6 +112,12 @@ OPTIONS = [
         ["calibrate", ".", "--board", f"{size}:0.03:0.022:DICT_4X4_50"]
         for size in ("11x10", "9e9x3")
     ),
+    *(["bench", "hardware", "--seeds", bad] for bad in ("5-2", "-1-2", "a", "1-b", "")),
+    *(["bench", "dressing", "--seeds", bad] for bad in ("5-2", "x")),
+    *(["bench", "hardware", option, "nan"] for option in ("--rate", "--fault-rate", "--minutes")),
+    *(["bench", "hardware", "--rate", bad] for bad in ("0", "-1", "inf")),
+    *(["bench", name, "--seed", "-1"] for name in ("explain", "inputs", "killed", "mutation")),
+    *(["bench", "local", option, "x"] for option in ("--seed", "--problems")),
     *(["calibrate", ".", "--board", f"7x5:{sizes}:DICT_4X4_50"] for sizes in ("nan:0.02", "0:0")),
 ]
 
@@ -120,7 +126,7 @@ OPTIONS = [
 def test_an_option_that_cannot_be_is_told_before_any_work(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = [] if words[0] == "calibrate" else ["--out", str(tmp_path / "out")]
+    out = [] if words[0] in ("calibrate", "bench") else ["--out", str(tmp_path / "out")]
     try:
         status = main([*words, *out])
     except SystemExit as error:

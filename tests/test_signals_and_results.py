@@ -156,6 +156,29 @@ def test_a_signal_inside_an_import_comes_after_it(
             sys.modules.pop(name, None)
 
 
+class Ends:
+    """Sends a signal to this process when nobody knows it any more."""
+
+    def __init__(self, number: signal.Signals) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        os.kill(os.getpid(), self.number)
+        len(range(1000))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_whose_exception_is_swallowed_comes_again(
+    number: signal.Signals, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt) as raised, signals_raised():
+        Ends(number)
+        time.sleep(5.0)
+    assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
+    assert sys.unraisablehook is before and "Traceback" not in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("threads", [0, 4])
 def test_a_signal_waits_where_it_is_deferred(threads: int) -> None:
     """Whichever thread the system has chosen to take it."""

@@ -23,9 +23,11 @@ from benchmarks.kept import read_results, write_results
 from benchmarks.parser import (
     INTERRUPTED,
     OneLineParser,
+    at_least_one,
     exit_with,
     output_file,
     output_folder,
+    seed_number,
     some_of,
 )
 from benchmarks.section import END, around, begin, write_between
@@ -160,8 +162,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="GROUP,…",
         help=", ".join(GROUPS),
     )
-    parser.add_argument("--draws", type=int, help="of each; default 4, 40, 20, 10 and 4")
-    parser.add_argument("--seed", type=int, default=1000, help="of the first draw")
+    parser.add_argument("--draws", type=at_least_one, help="of each; default 4, 40, 20, 10 and 4")
+    parser.add_argument("--seed", type=seed_number, default=1000, help="of the first draw")
     parser.add_argument(
         "--size",
         type=_numbers,
@@ -173,7 +175,11 @@ def _parser() -> argparse.ArgumentParser:
         "--noise", type=_numbers, default=[1e-3], metavar="M,…", help="of markers, m; as --size"
     )
     parser.add_argument(
-        "--beside", type=int, default=1, metavar="N", help="draws at further sizes and noises"
+        "--beside",
+        type=at_least_one,
+        default=1,
+        metavar="N",
+        help="draws at further sizes and noises",
     )
     parser.add_argument(
         "--into",
@@ -184,7 +190,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--cache", type=output_folder, default=Path("out/bench-explain"), metavar="DIR"
     )
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases side by side")
+    parser.add_argument(
+        "--jobs", type=at_least_one, default=1, metavar="N", help="cases side by side"
+    )
     parser.add_argument("--plot", type=output_file, metavar="FILE", help="reliability, SVG")
     parser.add_argument(
         "--kept", action="store_true", help="run nothing; tables of what the file of --json holds"

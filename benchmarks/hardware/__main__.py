@@ -22,7 +22,7 @@ from benchmarks.hardware.parts import PARTS, Case, Conditions, run
 from benchmarks.hardware.tables import tables, tell
 from benchmarks.hardware.two_processes import available
 from benchmarks.kept import seed_range
-from benchmarks.parser import OneLineParser, at_least_one, exit_with, some_of
+from benchmarks.parser import OneLineParser, at_least_one, exit_with, number_between, some_of
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
 from drake_dress.shipped import shipped_scenario
@@ -108,16 +108,23 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="of the commands, half a minute each; default 5",
     )
-    parser.add_argument("--rate", type=float, default=0.35, help="of the dressing; default 0.35")
+    parser.add_argument(
+        "--rate",
+        type=number_between(0.02, 10.0),
+        default=0.35,
+        help="of the dressing; default 0.35",
+    )
     parser.add_argument(
         "--fault-rate",
-        type=float,
+        type=number_between(0.02, 10.0),
         default=1.0,
         metavar="RATE",
         help="of the faults; default 1. A lab that does not keep up with it is not judged: "
         "slow machines take 0.5",
     )
-    parser.add_argument("--minutes", type=float, default=20.0, help="of the soak; default 20")
+    parser.add_argument(
+        "--minutes", type=number_between(0.1, 1e4), default=20.0, help="of the soak; default 20"
+    )
     # what is measured here are two processes on two cores
     add_study_options(parser, _NAME, jobs=1)
     return parser

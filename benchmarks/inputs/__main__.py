@@ -32,6 +32,7 @@ from benchmarks.parser import (
     at_least_one,
     exit_with,
     output_file,
+    seed_number,
     some_of,
 )
 from benchmarks.section import END, around, begin, write_between
@@ -160,7 +161,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--cases", type=at_least_one, default=300, metavar="N", help="default 300")
     parser.add_argument(
-        "--seed", type=int, metavar="S", help="of all that is drawn; default: a new one, printed"
+        "--seed",
+        type=seed_number,
+        metavar="S",
+        help="of all that is drawn; default: a new one, printed",
     )
     parser.add_argument("--case", type=int, metavar="K", help="this one alone, of the same seed")
     parser.add_argument(

@@ -25,7 +25,7 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.killed.ended_run import Ended, Plan
 from benchmarks.killed.verdict import fingerprints, problems
-from benchmarks.parser import OneLineParser, at_least_one, exit_with
+from benchmarks.parser import OneLineParser, at_least_one, exit_with, seed_number
 from benchmarks.scenario_run import run_scenario
 from benchmarks.study import add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
@@ -194,7 +194,7 @@ def _parser() -> argparse.ArgumentParser:
         "--moments", type=at_least_one, default=100, metavar="N", help="default 100"
     )
     parser.add_argument(
-        "--seed", type=int, metavar="S", help="of the moments; default: a new one, printed"
+        "--seed", type=seed_number, metavar="S", help="of the moments; default: a new one, printed"
     )
     add_study_options(parser, _NAME)
     return parser

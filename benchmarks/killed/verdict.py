@@ -17,6 +17,8 @@ from drake_dress.report.log import RunLog
 FILES = ("run.h5", "summary.json", "report.html", "replay.html")
 # Samples are flushed about once a second; what is being flushed at the end may be lost, s.
 _FLUSHED = 3.0
+# What a run says when nothing is left to write.
+_WRITTEN = "log, report and replay: "
 # Exit statuses that a terminated run may have: as for other programs, or whole before it.
 _AFTER_TERMINATION = (143, 0, 1)
 
@@ -46,8 +48,8 @@ def problems(
     if "Traceback" in end.words:
         wrong.append("traceback")
     if how == "terminate" and end.acted is not None and end.status not in _AFTER_TERMINATION:
-        # before the run could take a signal, the system ends it
-        if end.status != -15 or end.told[0] > 0.0:
+        # before the run could take a signal, and when all is written, the system ends it
+        if end.status != -15 or (end.told[0] > 0.0 and _WRITTEN not in end.words):
             wrong.append(f"exit status {end.status} after SIGTERM")
     now = fingerprints(folder)
     old = [name for name, digest in now.items() if earlier.get(name) == digest]

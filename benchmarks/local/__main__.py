@@ -19,7 +19,7 @@ from rich.progress import track
 from benchmarks.cloth.table import Table
 from benchmarks.local.problems import random_problem
 from benchmarks.local.recorded import read_problems
-from benchmarks.parser import OneLineParser, output_file
+from benchmarks.parser import OneLineParser, at_least_one, output_file, seed_number
 from drake_dress.discrepancy.results import write_json
 from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
@@ -60,8 +60,10 @@ class Trial:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Solves the problems and prints a table; returns 0, or 2 for bad arguments."""
     parser = OneLineParser(prog="drake-dress bench local", description=__doc__)
-    parser.add_argument("--problems", type=int, default=1000, metavar="N", help="that are drawn")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--problems", type=at_least_one, default=1000, metavar="N", help="that are drawn"
+    )
+    parser.add_argument("--seed", type=seed_number, default=0)
     parser.add_argument(
         "--recorded", type=Path, metavar="FILE.npz", help="problems that came up in runs"
     )

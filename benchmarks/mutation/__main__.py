@@ -29,6 +29,7 @@ from benchmarks.parser import (
     at_least_one,
     exit_with,
     output_file,
+    seed_number,
     some_of,
 )
 from benchmarks.section import END, around, begin, write_between
@@ -122,7 +123,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--mutants", type=at_least_one, default=200, help="of all modules together")
-    parser.add_argument("--seed", type=int, help="of the draw; a new one by default")
+    parser.add_argument("--seed", type=seed_number, help="of the draw; a new one by default")
     parser.add_argument(
         "--modules",
         type=some_of(tuple(MODULES)),
