@@ -3,7 +3,8 @@
     drake-dress bench killed --moments 100 --json killed.json
 
 Each run writes to a directory in which an earlier one left its files. Whenever it ends, what was
-written before has to be readable, and no file of one run may stand beside those of the other.
+written before has to be readable, and no file of one run may stand beside those of the other. `group` is
+SIGTERM to all processes of a run at once, as Ctrl-C and `timeout` send signals.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _SETTINGS = [
     "plant.time_step=0.01",
     "controller.spacing=0.06",
 ]
-HOW = ("kill", "terminate", "disk_full")
+HOW = ("kill", "terminate", "disk_full", "group")
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ that can be filled is mounted for that, for which the process needs a mount name
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import signal
@@ -36,7 +37,8 @@ class Plan:
         out: folder to run in; the earlier files are copied there first.
         settings: KEY=VALUE.
         seed: of the run.
-        how: `kill`, `terminate` or `disk_full`; empty: it is left alone.
+        how: `kill`, `terminate`, `disk_full`, or `group`: SIGTERM to its processes, of which it has
+            several, and once more to the first; empty: it is left alone.
         moment: since the process began, s.
         timeout: s.
     """
@@ -83,10 +85,18 @@ def play(plan: Plan) -> Ended:
     for path in Path(plan.earlier).iterdir():
         shutil.copy(path, place / path.name)
     command = [sys.executable, "-m", "drake_dress", "run", plan.scenario, "--no-meshcat"]
-    command += ["--one-process", "--out", str(place), "--seed", str(plan.seed)]
+    command += ["--out", str(place), "--seed", str(plan.seed)]
+    if plan.how != "group":
+        command.append("--one-process")
     command += [word for value in plan.settings for word in ("--set", value)]
     begin = time.monotonic()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
     lines: list[str] = []
     told = [0.0, 0.0]
 
@@ -108,10 +118,14 @@ def play(plan: Plan) -> Ended:
             acted = now
             if plan.how == "disk_full":
                 fill(place / "filler")
+            elif plan.how == "group":
+                # as `timeout` does
+                process.terminate()
+                os.killpg(process.pid, signal.SIGTERM)
             else:
                 process.send_signal(signal.SIGKILL if plan.how == "kill" else signal.SIGTERM)
         if now > plan.timeout:
-            process.kill()
+            os.killpg(process.pid, signal.SIGKILL)
     wall = time.monotonic() - begin
     listener.join()
     if place != out:

@@ -15,6 +15,8 @@ from drake_dress.report.log import RunLog
 
 # What runs write.
 FILES = ("run.h5", "summary.json", "report.html", "replay.html")
+# Signals that are answered; with the log's end, report and replay a run ends within, s.
+_ANSWERED, _SOON = ("terminate", "group"), 60.0
 # Samples are flushed about once a second; what is being flushed at the end may be lost, s.
 _FLUSHED = 3.0
 # What a run says when nothing is left to write.
@@ -47,7 +49,9 @@ def problems(
     wrong = []
     if "Traceback" in end.words:
         wrong.append("traceback")
-    if how == "terminate" and end.acted is not None and end.status not in _AFTER_TERMINATION:
+    if how in _ANSWERED and end.acted is not None and end.wall - end.acted > _SOON:
+        wrong.append(f"ended {end.wall - end.acted:.0f} s after SIGTERM")
+    if how in _ANSWERED and end.acted is not None and end.status not in _AFTER_TERMINATION:
         # before the run could take a signal, and when all is written, the system ends it
         if end.status != -15 or (end.told[0] > 0.0 and _WRITTEN not in end.words):
             wrong.append(f"exit status {end.status} after SIGTERM")

@@ -59,3 +59,11 @@ def test_a_lost_log_a_traceback_and_a_wrong_status_are_told(tmp_path: Path) -> N
     assert len(found) == 3
     (out / "run.h5").write_bytes(b"no log")
     assert any("cannot be read" in p for p in problems(out, {}, 2, "terminate", told))
+
+
+def test_a_run_that_does_not_end_at_a_signal_is_told(tmp_path: Path) -> None:
+    out = run_of(tmp_path / "out", 2)
+    hangs = Ended(status=143, words="", wall=300.0, acted=9.0, told=(0.0, 0.0))
+    assert any("291 s after" in p for p in problems(out, {}, 2, "group", hangs))
+    ends = Ended(status=143, words="", wall=11.0, acted=9.0, told=(0.0, 0.0))
+    assert problems(out, {}, 2, "group", ends) == []
