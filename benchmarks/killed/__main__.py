@@ -3,8 +3,9 @@
     drake-dress bench killed --moments 100 --json killed.json
 
 Each run writes to a directory in which an earlier one left its files. Whenever it ends, what was
-written before has to be readable, and no file of one run may stand beside those of the other. `group` is
-SIGTERM to all processes of a run at once, as Ctrl-C and `timeout` send signals.
+written before has to be readable, and no file of one run may stand beside those of the other.
+
+`group` is SIGTERM to all processes of a run at once, as Ctrl-C and `timeout` send signals.
 """
 
 from __future__ import annotations
