@@ -188,11 +188,24 @@ def _scatter2(normals: list[FloatArray], rights: list[FloatArray]) -> float:
 def _bounded(
     normal: FloatArray, right: FloatArray, low: FloatArray | float, high: FloatArray | float
 ) -> FloatArray:
-    """Returns x (k,) between bounds with least ½ xᵀ normal x − rightᵀ x."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    """Returns x (k,) between bounds with least ½ xᵀ normal x − rightᵀ x.
+
+    Where nothing is known of a coefficient, it is the value between its bounds nearest to zero.
+    """
+    low, high = np.broadcast_to(low, right.shape), np.broadcast_to(high, right.shape)
+    x: FloatArray = np.array(low, dtype=np.float64)
+    # the solver wants room between bounds
+    free = low < high
+    if not free.any():
+        return x
+    right = (right - normal[:, ~free] @ x[~free])[free]
+    normal, low, high = normal[np.ix_(free, free)], low[free], high[free]
+    information = np.diag(normal)
+    scale = np.sqrt(np.where(information > 0.0, information, 1.0))
     factor = np.linalg.cholesky(normal / np.outer(scale, scale) + _RIDGE * np.eye(len(scale)))
-    low, high = low * scale, np.maximum(high * scale, low * scale + 1e-12)
-    found: FloatArray = (
-        lsq_linear(factor.T, np.linalg.solve(factor, right / scale), (low, high)).x / scale
+    # an active set method ends on bounds, not near them
+    found = lsq_linear(
+        factor.T, np.linalg.solve(factor, right / scale), (low * scale, high * scale), "bvls"
     )
-    return found
+    x[free] = np.clip(found.x / scale, low, high)
+    return x

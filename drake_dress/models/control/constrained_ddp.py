@@ -145,7 +145,8 @@ def solve_constrained_ddp(
     on_x = _about(of_x.matrix @ b, of_x.offset + of_x.matrix @ p.start, of_x.radius, 1)
     on_v = _about(of_v.matrix, of_v.offset, of_v.radius, 0)
     if state_multiplier is not None:
-        on_x.multiplier[:] = state_multiplier
+        # those of the start are passed over
+        on_x.multiplier[1:] = state_multiplier[1:]
     if input_multiplier is not None:
         on_v.multiplier[:] = input_multiplier
     u = np.empty((steps + 1, m))

@@ -26,6 +26,32 @@ def drawn(seed: int) -> LocalProblem:
     return random_problem(np.random.default_rng(seed))[0]
 
 
+def drawn_of_size(seed: int, steps: int, n: int, m: int) -> LocalProblem:
+    """Returns a problem of other sizes, with bounds that some way obeys."""
+    rng = np.random.default_rng(seed)
+    b, start = rng.normal(0.0, 0.5, (n, m)), rng.normal(0.0, 0.3, n)
+    obeying = rng.normal(0.0, 0.2, (steps, m))
+    way = start + np.cumsum(np.vstack([np.zeros(n), obeying @ b.T]), axis=0)
+
+    def about(z: np.ndarray, count: int) -> NormBounds:
+        matrix = rng.normal(0.0, 1.0, (len(z), count, 3, z.shape[1]))
+        offset = rng.normal(0.0, 0.1, (len(z), count, 3))
+        needed = NormBounds(matrix, offset, np.empty(matrix.shape[:2])).norms(z)
+        return NormBounds(matrix, offset, 1.01 * needed + rng.uniform(0.01, 0.5, needed.shape))
+
+    return LocalProblem(
+        start=start,
+        input_matrix=b,
+        state_weight=rng.uniform(0.0, 2.0, (steps + 1, n)),
+        state_target=way + rng.normal(0.0, 1.0, n),
+        input_weight=10.0 ** rng.uniform(-2.0, 0.0, (steps, m)),
+        input_target=rng.normal(0.0, 0.3, (steps, m)),
+        state_bounds=about(way, 2),
+        input_bounds=about(obeying, 1),
+        price=1e4,
+    )
+
+
 def unbounded(problem: LocalProblem) -> LocalProblem:
     """Returns the problem without its bounds."""
 
@@ -57,17 +83,13 @@ def slope(p: LocalProblem, s: LocalSolution) -> np.ndarray:
     return by_input + later @ p.input_matrix
 
 
-@given(seed=seeds)
-@settings(max_examples=40, deadline=None)
-def test_the_conditions_of_optimality_hold(seed: int) -> None:
-    p = drawn(seed)
-    s = solve_constrained_ddp(p)
+def assert_optimal(p: LocalProblem, s: LocalSolution) -> None:
     assert s.converged
     assert s.violation < 1e-6
     assert s.state_multiplier.min() >= 0.0
     assert s.input_multiplier.min() >= 0.0
     typical = np.abs(slope(unbounded(p), replace_multipliers(s))).max()
-    assert np.abs(slope(p, s)).max() < 1e-5 * typical
+    assert np.abs(slope(p, s)).max() < 1e-5 * typical + 1e-12
     # a bound with a multiplier is met
     for bounds, z, multiplier in (
         (p.state_bounds, s.x, s.state_multiplier),
@@ -75,6 +97,13 @@ def test_the_conditions_of_optimality_hold(seed: int) -> None:
     ):
         excess = bounds.excess(z)
         assert np.all(np.abs(excess[multiplier > 1e-6 * typical]) < 1e-5)
+
+
+@given(seed=seeds)
+@settings(max_examples=40, deadline=None)
+def test_the_conditions_of_optimality_hold(seed: int) -> None:
+    p = drawn(seed)
+    assert_optimal(p, solve_constrained_ddp(p))
 
 
 def replace_multipliers(s: LocalSolution) -> LocalSolution:
@@ -290,3 +319,160 @@ def test_the_null_space_hands_a_bound_to_the_step_before() -> None:
     np.testing.assert_allclose(np.linalg.norm(s.x[-1, 6:9] + [0.3, 0.0, 0.0]), 0.01, atol=1e-6)
     assert np.sum(np.linalg.norm(s.v[:, :3], axis=1) > 0.3199) > steps // 2
     assert s.cost == pytest.approx(solve_cone_programme(p)[0].cost, rel=1e-5)
+
+
+sizes = st.tuples(st.integers(1, 8), st.integers(1, 7), st.integers(1, 5))
+
+
+@given(seed=seeds, size=sizes)
+@settings(max_examples=30, deadline=None)
+def test_they_hold_whatever_the_numbers_of_steps_states_and_inputs(
+    seed: int, size: tuple[int, int, int]
+) -> None:
+    p = drawn_of_size(seed, *size)
+    s = solve_constrained_ddp(p)
+    assert_optimal(p, s)
+    again = solve_constrained_ddp(p, s.v, s.state_multiplier, s.input_multiplier)
+    assert_optimal(p, again)
+    assert again.cost == pytest.approx(s.cost, rel=1e-6)
+
+
+def assert_gains_lead_to_the_optimum(p: LocalProblem, s: LocalSolution, seed: int) -> None:
+    """The law v + K δx, from a start that is a little off, is the optimum from there."""
+    gain = feedback_gains(p, s)
+    assert gain.shape == (p.horizon, p.input_matrix.shape[1], len(p.start))
+    small = 1e-6
+    way = small * np.random.default_rng(seed).normal(0.0, 1.0, len(p.start))
+    pairs = []
+    for off in (way, -way):
+        best = solve_constrained_ddp(
+            replace(p, start=p.start + off), s.v, s.state_multiplier, s.input_multiplier
+        )
+        dx, dv = off, []
+        for of_step in gain:
+            dv.append(of_step @ dx)
+            dx = dx + p.input_matrix @ dv[-1]
+        pairs.append((np.array(dv), best.v))
+    by_law, by_optimum = (
+        (plus - minus) / (2.0 * small) for plus, minus in zip(*pairs, strict=True)
+    )
+    np.testing.assert_allclose(by_law, by_optimum, atol=2e-3 * np.abs(by_optimum).max())
+
+
+@given(seed=seeds)
+@settings(max_examples=8, deadline=None)
+def test_gains_lead_to_the_optimum_from_where_the_state_is_instead(seed: int) -> None:
+    p, s = strict(drawn(seed))
+    assert_gains_lead_to_the_optimum(p, s, seed)
+
+
+@given(seed=seeds, size=sizes)
+@settings(max_examples=20, deadline=None)
+def test_so_they_do_whatever_the_sizes(seed: int, size: tuple[int, int, int]) -> None:
+    p, s = strict(drawn_of_size(seed, *size))
+    assert_gains_lead_to_the_optimum(p, s, seed)
+
+
+@given(seed=seeds)
+@settings(max_examples=8, deadline=None)
+def test_a_multiplier_is_what_a_wider_bound_saves(seed: int) -> None:
+    p, s = strict(drawn(seed))
+    warm = s.v, s.state_multiplier, s.input_multiplier
+    small = 1e-6
+
+    def saved(name: str, multiplier: np.ndarray) -> float:
+        bounds, costs = getattr(p, name), []
+        for sign in (1.0, -1.0):
+            radius = bounds.radius.copy()
+            radius[np.unravel_index(multiplier.argmax(), multiplier.shape)] += sign * small
+            q = replace(p, **{name: replace(bounds, radius=radius)})
+            costs.append(solve_constrained_ddp(q, *warm).cost)
+        return (costs[1] - costs[0]) / (2.0 * small)
+
+    for name, multiplier in (
+        ("state_bounds", s.state_multiplier),
+        ("input_bounds", s.input_multiplier),
+    ):
+        assert saved(name, multiplier) == pytest.approx(multiplier.max(), rel=1e-3, abs=1e-5)
+
+
+@given(
+    seed=seeds,
+    limits=st.builds(
+        Settings,
+        warm_sweeps=st.integers(0, 4),
+        max_sweeps=st.integers(0, 20),
+        max_halvings=st.integers(1, 12),
+        max_interior_steps=st.sampled_from([0, 1, 9, 120]),
+    ),
+    has_guess=st.booleans(),
+    is_warm=st.booleans(),
+)
+@settings(max_examples=40, deadline=None)
+def test_whatever_it_ends_with_is_reported_as_it_is(
+    seed: int, limits: Settings, has_guess: bool, is_warm: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    p = drawn(seed)
+    guess = rng.normal(0.0, 0.1, p.input_weight.shape) if has_guess else None
+    multipliers = [
+        rng.uniform(0.0, 1.0, b.radius.shape) if is_warm else None
+        for b in (p.state_bounds, p.input_bounds)
+    ]
+    given_ones = [p.state_bounds.radius, p.input_bounds.radius, guess, *multipliers]
+    before = [None if a is None else a.copy() for a in given_ones]
+    s = solve_constrained_ddp(p, guess, *multipliers, limits)
+    # what was handed in is as it was
+    for a, was in zip(given_ones, before, strict=True):
+        assert a is None or np.array_equal(a, was)
+    assert s.v.shape == p.input_weight.shape and np.isfinite(s.v).all()
+    np.testing.assert_array_equal(s.x, p.states(s.v))
+    assert s.cost == p.cost(s.v)
+    assert s.violation == p.violation(s.v)
+    for bounds, multiplier in (
+        (p.state_bounds, s.state_multiplier),
+        (p.input_bounds, s.input_multiplier),
+    ):
+        assert multiplier.shape == bounds.radius.shape
+        assert multiplier.min() >= 0.0
+        assert not multiplier[np.isinf(bounds.radius)].any()
+    # the start is not up to anyone
+    assert not s.state_multiplier[0].any()
+    most, of_guess = limits.max_interior_steps, limits.max_interior_steps // 3
+    assert s.interior_steps <= most + of_guess * has_guess
+    assert s.sweeps <= limits.max_sweeps + limits.warm_sweeps * is_warm
+    if not is_warm and most == 0:
+        assert not s.converged
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("is_warm", [False, True])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("name", ["start", "state_target", "input_target"])
+def test_what_has_no_optimum_is_answered_by_standing_still(
+    name: str, value: float, is_warm: bool
+) -> None:
+    p = drawn(2)
+    broken = getattr(p, name).copy()
+    broken[-1] = value
+    s = solve_constrained_ddp(p)
+    warm = (s.v, s.state_multiplier, s.input_multiplier) if is_warm else ()
+    told = solve_constrained_ddp(replace(p, **{name: broken}), *warm)
+    assert not told.converged
+    for out in (told.v, told.state_multiplier, told.input_multiplier):
+        assert not out.any()
+
+
+@given(seed=seeds, price=st.sampled_from([1e-3, 1e-2, 0.1, 1.0]))
+@settings(max_examples=10, deadline=None)
+def test_bounds_are_exceeded_that_cost_more_than_their_price(seed: int, price: float) -> None:
+    p = replace(drawn(seed), price=price)
+    s, (exact, _) = solve_constrained_ddp(p), solve_cone_programme(p, spills=True)
+    assert exact.converged
+
+    def total(v: np.ndarray) -> float:
+        return p.cost(v) + price * p.spilled(v)
+
+    assert total(s.v) == pytest.approx(total(exact.v), rel=1e-5)
+    for multiplier in (s.state_multiplier, s.input_multiplier):
+        assert multiplier.max() <= price * (1.0 + 1e-6)
