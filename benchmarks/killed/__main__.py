@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.kept import read_results
 from benchmarks.killed.ended_run import Ended, Plan
 from benchmarks.killed.verdict import fingerprints, problems
 from benchmarks.parser import OneLineParser, at_least_one, exit_with, seed_number
@@ -75,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, 1 if something was lost or mixed, 2 for bad arguments, 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
-    seed = secrets.randbelow(10**6) if options.seed is None else options.seed
+    seed = _kept_seed(options) if options.seed is None else options.seed
     print(f"seed {seed}", flush=True)
     if subprocess.run(["unshare", "-m", "true"], check=False).returncode:
         raise UserError("bench", _NAME, "no mount namespace, expected the right to unshare")
@@ -91,6 +92,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         results, stopped = carry_out(options, _NAME, Case, cases, ended, _tables, _tell)
     wrong = any(r["summary"]["wrong"] for r in results if "summary" in r)
     return exit_status(results, stopped) or int(wrong)
+
+
+def _kept_seed(options: argparse.Namespace) -> int:
+    """Returns the seed of what is kept and only to be shown; else a new one."""
+    if options.kept and options.json is not None:
+        for result in read_results(options.json, lambda case: Case(**case).name, _NAME).values():
+            return int(result["case"]["seed"])
+    return secrets.randbelow(10**6)
 
 
 @cache
