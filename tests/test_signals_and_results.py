@@ -38,6 +38,14 @@ controller: {spacing: 0.06, global_mpc: {horizon: 3, max_iterations: 2}}
 """
 
 
+@pytest.fixture(autouse=True)
+def hanging_up_ends() -> Iterator[None]:
+    """Has SIGHUP do what it usually does, also where tests were begun under nohup."""
+    usual = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, usual)
+
+
 @pytest.fixture(scope="module")
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("scenario") / "short.yaml"
