@@ -234,17 +234,19 @@ def _parser() -> argparse.ArgumentParser:
         "--scenario", metavar="SCENARIO.yaml", help="default: measured.yaml of the program's own"
     )
     hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
-    hidden.add_argument("--size", type=_size, default=1.0, help="of the effect; default 1")
+    hidden.add_argument(
+        "--size", type=_between(*_SIZES), default=1.0, help="of the effect; default 1"
+    )
     hidden.add_argument(
         "--marker-noise",
-        type=_noise(_MOST_MARKER_NOISE),
+        type=_between(0.0, _MOST_MARKER_NOISE),
         default=1e-3,
         metavar="M",
         help="default 1e-3",
     )
     hidden.add_argument(
         "--force-noise",
-        type=_noise(_MOST_FORCE_NOISE),
+        type=_between(0.0, _MOST_FORCE_NOISE),
         default=0.05,
         metavar="N",
         help="default 0.05",
@@ -396,25 +398,18 @@ def _rate(text: str) -> float:
     return value
 
 
-def _size(text: str) -> float:
-    value = float(_number(text))
-    if not _SIZES[0] <= value <= _SIZES[1]:
-        raise argparse.ArgumentTypeError(
-            f"{text} is out of range, expected {_SIZES[0]:g} to {_SIZES[1]:g}"
-        )
-    return value
+def _between(low: float, high: float) -> Callable[[str], float]:
+    """Returns a reader of a number from `low` to `high`."""
 
-
-def _noise(most: float) -> Callable[[str], float]:
-    """Returns a reader of a standard deviation from 0 to `most`."""
-
-    def noise(text: str) -> float:
+    def number(text: str) -> float:
         value = float(_number(text))
-        if not 0.0 <= value <= most:
-            raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 to {most:g}")
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"{text} is out of range, expected {low:g} to {high:g}"
+            )
         return value
 
-    return noise
+    return number
 
 
 def _whole(text: str) -> int:
