@@ -164,15 +164,18 @@ def _run_all(
 ) -> bool:
     with caught_interrupt() as stop, ThreadPoolExecutor(jobs) as pool:
         pending = {pool.submit(run, case): case for case in new}
-        for number, future in enumerate(as_completed(pending), 1):
-            result = future.result()
-            kept[pending[future].name] = result
-            if path is not None:
-                # what failed to run is run again
-                write_results(path, {name: r for name, r in kept.items() if "summary" in r})
-            ended = result.get("problem") or tell(result["summary"])
-            print(f"{number}/{len(new)} {pending[future].name}: {ended}", flush=True)
-            if stop.is_set():
-                pool.shutdown(wait=False, cancel_futures=True)
-                break
+        try:
+            for number, future in enumerate(as_completed(pending), 1):
+                result = future.result()
+                kept[pending[future].name] = result
+                if path is not None:
+                    # what failed to run is run again
+                    write_results(path, {name: r for name, r in kept.items() if "summary" in r})
+                ended = result.get("problem") or tell(result["summary"])
+                print(f"{number}/{len(new)} {pending[future].name}: {ended}", flush=True)
+                if stop.is_set():
+                    break
+        finally:
+            # after a second signal, too: leaving the pool would wait for all that was not begun
+            pool.shutdown(wait=False, cancel_futures=True)
     return stop.is_set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -53,7 +54,7 @@ class Reaction:
         within: from its start until both grippers hold, s; None where they do not.
         ends: what the run ends with; None where it goes on.
         waits: of it, what the run waits by this machine's clock before there is a fault, s.
-        told: what the run's log must tell of it; None where nothing is asked.
+        told: a pattern of what the run's log must tell of it; None where nothing is asked.
         lasting: of the fault, s.
     """
 
@@ -123,7 +124,7 @@ BELIEFS = {
     "person_y_up": _refused("person", "coordinates are y up"),
     "person_huge": _refused("person", "shoulder width"),
     "person_limb": _refused("person", "left forearm"),
-    "person_jump": _refused("person", "moved 0.2"),
+    "person_jump": _refused("person", r"moved 0\.(19|2)"),
     "person_offset": _refused("person", "from where the scenario's person has them"),
     "person_frozen": _refused("person", "the same to the last bit", _FROZEN, _LASTING_FROZEN),
     "garment_zero": _refused("garment", "as lost points written as zero"),
@@ -138,8 +139,9 @@ BELIEFS = {
     "garment_frozen": _refused(
         "garment", "the same to the last bit", _FROZEN_GARMENT, _LASTING_FROZEN
     ),
-    "mode_unknown": Reaction(_ARMS, _HOLD, None, told="robot_mode is 0 (kOther)"),
-    "joint_leap": Reaction(_ARMS, _HOLD, "speed limit", told="joint 1 moved 0.3"),
+    "mode_unknown": Reaction(_ARMS, _HOLD, None, told=r"robot_mode is 0 \(kOther\)"),
+    # by 0.3 rad from where the joint is by then
+    "joint_leap": Reaction(_ARMS, _HOLD, "speed limit", told=r"joint 1 moved 0\.(29|30|31)"),
     "utime_zero": Reaction(_ALL, _HOLD, None, told="utime is 0 after"),
     "second_sender": Reaction(_ALL, _HOLD, "time back", told="a second sender on the channel"),
 }
@@ -269,7 +271,7 @@ def untold(events: Sequence[str], stated: Reaction) -> list[str]:
         return ["arms were never permitted to move"]
     lines = lines[lines.index("arms may move") + 1 :]
     wrong = []
-    if stated.told is not None and not any(stated.told in line for line in lines):
+    if stated.told is not None and not any(re.search(stated.told, line) for line in lines):
         wrong.append(f"does not tell {stated.told!r}")
     if stated.within is None and "arms hold" in lines:
         wrong.append(f"arms hold after {lines[max(0, lines.index('arms hold') - 1)]!r}")
