@@ -11,7 +11,7 @@ from drake_dress.errors import UserError
 from drake_dress.file_output import output_file as output_file
 from drake_dress.file_output import output_folder as output_folder
 
-UNUSABLE, INTERRUPTED = 2, 130
+UNUSABLE = 2
 
 
 class OneLineParser(argparse.ArgumentParser):

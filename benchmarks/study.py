@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import Any, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
 from benchmarks.kept import read_results, write_results
-from benchmarks.parser import INTERRUPTED, at_least_one, output_file, output_folder, some_of
+from benchmarks.parser import at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
+from benchmarks.side_by_side import completed
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.report.summary import read_summary
 
@@ -76,8 +76,8 @@ def carry_out(
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
     tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
     tell: Callable[[dict[str, Any]], str] = dressed,
-) -> tuple[list[dict[str, Any]], bool]:
-    """Runs what is missing, prints the tables; returns the results and whether Ctrl-C ended it.
+) -> tuple[list[dict[str, Any]], int | None]:
+    """Runs what is missing and prints the tables.
 
     Args:
         options: those of `add_study_options`.
@@ -87,6 +87,9 @@ def carry_out(
         run: a case, with the folder to keep it in and further settings.
         tables: of results.
         tell: how a case ended, from its summary, in a few words.
+
+    Returns:
+        The results, and the exit status if a signal ended the study.
     """
     if options.into:
         around(options.into, benchmark)
@@ -95,7 +98,7 @@ def carry_out(
         kept = read_results(options.json, lambda case: case_type(**case).name, benchmark)
     missing = [case for case in cases if case.name not in kept]
     print(f"{len(cases)} runs, {len(missing)} of them not run yet", flush=True)
-    stopped = False
+    stopped = None
     if not options.kept:
         stopped = _run_all(
             missing,
@@ -113,9 +116,9 @@ def carry_out(
     return results, stopped
 
 
-def exit_status(results: Sequence[dict[str, Any]], stopped: bool) -> int:
-    """Returns 130 after Ctrl-C, 1 if a run could not be used."""
-    return INTERRUPTED if stopped else int(any("problem" in result for result in results))
+def exit_status(results: Sequence[dict[str, Any]], stopped: int | None) -> int:
+    """Returns the status of the signal that ended the study, 1 if a run could not be used, or 0."""
+    return int(any("problem" in result for result in results)) if stopped is None else stopped
 
 
 @contextmanager
@@ -161,21 +164,13 @@ def _run_all(
     jobs: int,
     path: Path | None,
     tell: Callable[[dict[str, Any]], str],
-) -> bool:
-    with caught_interrupt() as stop, ThreadPoolExecutor(jobs) as pool:
-        pending = {pool.submit(run, case): case for case in new}
-        try:
-            for number, future in enumerate(as_completed(pending), 1):
-                result = future.result()
-                kept[pending[future].name] = result
-                if path is not None:
-                    # what failed to run is run again
-                    write_results(path, {name: r for name, r in kept.items() if "summary" in r})
-                ended = result.get("problem") or tell(result["summary"])
-                print(f"{number}/{len(new)} {pending[future].name}: {ended}", flush=True)
-                if stop.is_set():
-                    break
-        finally:
-            # after a second signal, too: leaving the pool would wait for all that was not begun
-            pool.shutdown(wait=False, cancel_futures=True)
-    return stop.is_set()
+) -> int | None:
+    with caught_interrupt() as stop:
+        for number, (case, result) in enumerate(completed(run, new, jobs, stop), 1):
+            kept[case.name] = result
+            if path is not None:
+                # what failed to run is run again
+                write_results(path, {name: r for name, r in kept.items() if "summary" in r})
+            ended = result.get("problem") or tell(result["summary"])
+            print(f"{number}/{len(new)} {case.name}: {ended}", flush=True)
+    return stop.status if stop.is_set() else None

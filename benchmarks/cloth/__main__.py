@@ -16,7 +16,7 @@ from typing import Any
 
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
-from benchmarks.parser import INTERRUPTED, OneLineParser, at_least_one, output_file, output_folder
+from benchmarks.parser import OneLineParser, at_least_one, output_file, output_folder
 from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if name in results:
                 for file in scene_module(name).write_figures(results[name], options.png):
                     print(f"wrote {file}")
-    return INTERRUPTED if interrupted else 0
+    return stop.status if interrupted else 0
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -21,7 +21,6 @@ from benchmarks.explain.cases import COARSE, Case, make, study
 from benchmarks.explain.tables import reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import (
-    INTERRUPTED,
     OneLineParser,
     at_least_one,
     exit_with,
@@ -72,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_between(options.into, _NAME, shown)
     if options.plot:
         write_text(options.plot, reliability_plot(results))
-    return INTERRUPTED if stop.is_set() else 0
+    return stop.status if stop.is_set() else 0
 
 
 def name_of(case: dict[str, Any]) -> str:

@@ -17,7 +17,6 @@ import secrets
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
@@ -27,7 +26,6 @@ from benchmarks.inputs.measurements import prepare
 from benchmarks.inputs.trials import Outcome, Result
 from benchmarks.inputs.worker import KINDS, Worker
 from benchmarks.parser import (
-    INTERRUPTED,
     OneLineParser,
     at_least_one,
     exit_with,
@@ -36,6 +34,7 @@ from benchmarks.parser import (
     some_of,
 )
 from benchmarks.section import END, around, begin, write_between
+from benchmarks.side_by_side import completed
 from drake_dress import __version__
 from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
@@ -50,7 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Carries out the cases and prints a table.
 
     Returns:
-        0, 1 if a case did not end as it has to, 2 for bad arguments, 130 after Ctrl-C.
+        0, 1 if a case did not end as it has to, 2 for bad arguments, 128 and its number after a
+        signal that ends a command.
     """
     options = _parser().parse_args(arguments)
     if options.into is not None:
@@ -73,12 +73,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_text(options.json, _as_json(results, seed))
     if options.into is not None:
         write_between(options.into, _NAME, shown)
-    return INTERRUPTED if stopped else int(bool(failures))
+    return int(bool(failures)) if stopped is None else stopped
 
 
 def _run(
     seed: int, chosen: Sequence[int], kinds: Sequence[str], base: Path, jobs: int
-) -> tuple[list[Result], bool]:
+) -> tuple[list[Result], int | None]:
     idle: SimpleQueue[Worker] = SimpleQueue()
     workers = [Worker(kinds, base, LIMIT) for _ in range(min(jobs, len(chosen)))]
     for worker in workers:
@@ -92,19 +92,15 @@ def _run(
             idle.put(worker)
 
     results: list[Result] = []
-    with caught_interrupt() as stop, ThreadPoolExecutor(len(workers)) as pool:
-        pending = [pool.submit(one, index) for index in chosen]
-        for future in as_completed(pending):
-            results.append(future.result())
+    with caught_interrupt() as stop:
+        for _, result in completed(one, chosen, len(workers), stop):
+            results.append(result)
             if len(results) % 100 == 0:
                 wrong = sum(r.problem is not None for r in results)
                 print(f"{len(results)}/{len(chosen)}, {wrong} not as they have to be", flush=True)
-            if stop.is_set():
-                pool.shutdown(wait=False, cancel_futures=True)
-                break
     for worker in workers:
         worker.close()
-    return sorted(results, key=lambda r: r.index), stop.is_set()
+    return sorted(results, key=lambda r: r.index), stop.status if stop.is_set() else None
 
 
 def table(results: Sequence[Result], seed: int) -> Table:

@@ -24,7 +24,6 @@ from benchmarks.mutation.modules import MODULES
 from benchmarks.mutation.mutants import Mutant, all_mutants, change, draw, mutated
 from benchmarks.mutation.trial import CAUGHT, SURVIVED, TIMED_OUT, copied, tried
 from benchmarks.parser import (
-    INTERRUPTED,
     OneLineParser,
     at_least_one,
     exit_with,
@@ -66,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 for mutant in todo:
                     if stop.is_set():
                         print("interrupted: what was done is kept", file=sys.stderr)
-                        return INTERRUPTED
+                        return stop.status
                     results[mutant.name] = _result(mutant, copy)
                     write_results(options.json, results)
     told = {m: r for m, r in results.items() if r["case"]["module"] in options.modules}
