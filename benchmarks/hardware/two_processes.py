@@ -36,7 +36,7 @@ class Plan:
         rate: simulated seconds per second.
         kill_at: SIGKILL to the run, s after the first command.
         fill_at: when the run's disk is filled, s after the first command.
-        timeout: for the lab to open, and then for all of it, s.
+        timeout: for all of it, s.
         sampled: whether memory is sampled, each second from the first command on.
         report: whether report and replay are written beside log and summary.
     """
@@ -81,13 +81,10 @@ def play(plan: Plan) -> Outcome:
     Raises:
         RuntimeError: they could not be started.
     """
-    # not by the process that only starts others, which would take seconds to import it
-    from drake_dress.diagrams.lab import OPEN
-
     with tempfile.TemporaryDirectory() as place:
         paper, answer = Path(place) / "plan.json", Path(place) / "outcome.json"
         paper.write_text(json.dumps(asdict(plan)), encoding="utf-8")
-        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer} '{OPEN}'"
+        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer}"
         done = subprocess.run(
             ["unshare", "-nm", "sh", "-c", inside],
             cwd=_ROOT,
@@ -116,7 +113,7 @@ def play_usable(plan: Plan) -> Outcome:
     return done
 
 
-def _inside(plan: Plan, lab_open: str) -> Outcome:
+def _inside(plan: Plan) -> Outcome:
     out = Path(plan.out)
     run_out = out / "run"
     run_out.mkdir(parents=True, exist_ok=True)
@@ -146,13 +143,8 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
             env=environment,
         )
 
-    process = {"lab": started("lab")}
-    opening = time.monotonic()
-    while lab_open not in (out / "lab.log").read_text() and process["lab"].poll() is None:
-        time.sleep(_POLL)
-        if time.monotonic() - opening > plan.timeout:
-            process["lab"].kill()
-    process["run"] = started("run")
+    # at once: the run waits for the lab, and each takes seconds to load
+    process = {name: started(name) for name in words}
     memory: dict[str, list[float]] = {"lab": [], "run": []}
     begin, begun, filled = time.monotonic(), None, False
     while any(p.poll() is None for p in process.values()):
@@ -220,4 +212,4 @@ def memory_of(pid: int) -> float:
 
 if __name__ == "__main__":
     given = Plan(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given, sys.argv[3]))), encoding="utf-8")
+    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given))), encoding="utf-8")

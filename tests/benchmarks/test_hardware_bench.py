@@ -201,7 +201,11 @@ def test_what_cannot_be_believed_is_a_part_of_its_own(
         (["person: coordinates are in mm: …", "arms hold"], "person_mm", ["do not move on"]),
         (["person: not finite", "arms hold", "arms may move"], "person_mm", ["does not tell"]),
         ([], "person_mm", ["does not tell", "do not hold", "do not move on"]),
-        (["left arm: robot_mode is 0 (kOther), …", "arms hold", "arms may move"], "mode_unknown", []),
+        (
+            ["left arm: robot_mode is 0 (kOther), …", "arms hold", "arms may move"],
+            "mode_unknown",
+            [],
+        ),
         (["left arm: joint 1 moved 0.299 rad in 0.005 s", "arms hold"], "joint_leap", []),
         (["left arm: joint 1 moved 0.199 rad", "arms hold"], "joint_leap", ["does not tell"]),
         (["person: a repeated or late message is dropped"], "reordered", []),
