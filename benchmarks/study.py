@@ -76,6 +76,7 @@ def carry_out(
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
     tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
     tell: Callable[[dict[str, Any]], str] = dressed,
+    said: str = "",
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Runs what is missing and prints the tables.
 
@@ -87,6 +88,7 @@ def carry_out(
         run: a case, with the folder to keep it in and further settings.
         tables: of results.
         tell: how a case ended, from its summary, in a few words.
+        said: above the tables, such as which seeds they are of.
 
     Returns:
         The results, and the exit status if a signal ended the study.
@@ -97,6 +99,8 @@ def carry_out(
     if options.json is not None:
         kept = read_results(options.json, lambda case: case_type(**case).name, benchmark)
     missing = [case for case in cases if case.name not in kept]
+    if said:
+        print(said)
     print(f"{len(cases)} runs, {len(missing)} of them not run yet", flush=True)
     stopped = None
     if not options.kept:
@@ -109,7 +113,7 @@ def carry_out(
             tell,
         )
     results = [kept[case.name] for case in cases if case.name in kept]
-    shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
+    shown = "\n\n".join(filter(None, (said, *(t.text() for t in tables(results) if t.rows))))
     print(f"\n{shown}", flush=True)
     if options.into:
         write_between(options.into, benchmark, shown)

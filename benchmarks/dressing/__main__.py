@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
-from benchmarks.kept import seed_range
 from benchmarks.parser import OneLineParser, exit_with, output_file
+from benchmarks.seeds import add_seed_options, chosen_seeds
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
 from drake_dress.file_output import write_text
 
@@ -22,8 +22,9 @@ _NAME = "dressing"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    chosen = cases(options.methods, options.persons, options.coats, options.seeds)
-    results, stopped = carry_out(options, _NAME, Case, chosen, run, tables)
+    seeds, said = chosen_seeds(options)
+    chosen = cases(options.methods, options.persons, options.coats, seeds)
+    results, stopped = carry_out(options, _NAME, Case, chosen, run, tables, said=said)
     if options.plot:
         write_text(options.plot, figure(results))
     return exit_status(results, stopped)
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench dressing", description=__doc__)
     add_choices(parser, methods=METHODS, persons=PERSONS, coats=COATS)
-    parser.add_argument("--seeds", type=seed_range, default=range(13), metavar="A-B")
+    add_seed_options(parser, range(13))
     add_study_options(parser, _NAME)
     parser.add_argument(
         "--plot", type=output_file, metavar="FILE", help="s, l and force over time, SVG"

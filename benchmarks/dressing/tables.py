@@ -13,6 +13,7 @@ from benchmarks.statistics import wilson
 from drake_dress.drawing import as_svg, plain_settings
 from drake_dress.models.sides import SIDES
 from drake_dress.report.page import chart
+from drake_dress.report.summary import SuccessRules
 
 _COLOURS = {"full": "#0b7a5e", "global": "#2a5db0", "local": "#b0562a"}
 _WHAT = (("s", "s"), ("l", "l, m"), ("force", "gripper force, N"))
@@ -24,6 +25,7 @@ _HEADER = [
     "force 99 %, N",
     "largest force, N",
     "penetration, mm",
+    "both arms inside, s < 1.9",
     "real-time factor",
 ]
 _BESIDE = ["pairs", "both dressed", "full alone", "it alone", "neither", "longer by, s"]
@@ -36,6 +38,7 @@ _STAGES = [
     "after that, s",
     "lost again, runs",
 ]
+MIN_S = SuccessRules().min_s
 # A hand counts as in from when it stays in for so long, s.
 _LASTING = 2.0
 
@@ -113,8 +116,14 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         float(np.median([r["force_p99"] for r in results])) if results else None,
         max((s["max_gripper_force_N"] for s in summaries), default=None),
         max(penetration, default=None),
+        sum(map(_short_of_the_shoulder, summaries)),
         median("realtime_factor"),
     ]
+
+
+def _short_of_the_shoulder(summary: dict[str, Any]) -> bool:
+    inside = all(summary[f"arm_inside_{side}"] for side in SIDES)
+    return inside and not all((summary[f"s_{side}"] or 0.0) >= MIN_S for side in SIDES)
 
 
 def _beside(done: Sequence[dict[str, Any]], method: str) -> list[Any]:

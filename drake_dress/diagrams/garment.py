@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import fields, replace
 from pathlib import Path
 
 from drake_dress.diagrams.scenario import schema
+from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
-from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.coat import make_coat
 from drake_dress.models.garment.load import MeshOptions, Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 
-_SCALED = (
-    "body_length",
-    "chest",
-    "shoulder_width",
-    "sleeve_length",
-    "armhole_girth",
-    "cuff_girth",
-    "collar_height",
-    "neck_width",
-    "front_opening",
-)
 _MOST_KEPT = 4  # files that are kept in memory
 _kept: OrderedDict[tuple[object, ...], WholeGarment] = OrderedDict()
 
@@ -45,19 +34,7 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         with ShownWhenSlow(garment.mesh.file) as progress:
             whole = _read_once(base / garment.mesh.file, garment.mesh, progress)
             return whole.at_spacing(spacing, progress)
-    coat = garment.coat
-    parameters = COATS[coat.preset]
-    parameters = replace(
-        parameters, **{name: coat.scale * getattr(parameters, name) for name in _SCALED}
-    )
-    given = {
-        entry.name: getattr(coat, entry.name)
-        for entry in fields(coat)
-        if entry.name not in ("preset", "scale", "grasp") and getattr(coat, entry.name) is not None
-    }
-    if coat.grasp == "seam":
-        parameters = replace(parameters, grasp_count=0)
-    return make_coat(replace(parameters, **given), spacing, source="garment.coat")
+    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
 
 
 def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarment:
@@ -69,6 +46,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarmen
         path,
         MeshOptions(
             unit=mesh.unit,
+            scale=mesh.scale,
             up=mesh.up,
             weld=mesh.weld,
             leave_out=tuple(mesh.leave_out),

@@ -106,6 +106,8 @@ def _limits(summary: dict[str, Any], rules: SuccessRules, estimated: bool) -> st
         s = summary.get(f"s_{side}")
         met = s is not None and s >= rules.min_s
         rows.append((f"progress s, {side}", f"≥ {rules.min_s:g}", _figure(s, "{:.2f}"), met))
+        far = _figure(summary.get(f"armhole_to_shoulder_{side}_m"), "{:.1f} cm", 100.0)
+        rows.append((f"{side} armhole to shoulder, along the arm", "", far, None))
     for side in SIDES:
         inside = bool(summary.get(f"arm_inside_{side}"))
         number = summary.get(f"linking_number_{side}")

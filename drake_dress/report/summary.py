@@ -18,7 +18,8 @@ import numpy.typing as npt
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 from drake_dress.models.control.safety import Verdict
-from drake_dress.models.sides import SIDES
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arms import ArmMeasures, measure_arms
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
@@ -53,6 +54,7 @@ def summarize(
 ) -> dict[str, Any]:
     """Returns what `summary.json` holds; figures that do not exist are None.
 
+    `armhole_to_shoulder_left_m`, `…_right_m` are what is left of the way at the end, along the arm.
     Beyond the fixed keys: `linking_number_left`, `…_right` (final), `simulated_time_s`,
     `max_edge_strain_all`, `max_total_contact_force_N`. `max_edge_strain` is the 99th percentile
     over the edges of |length / rest length - 1|, at its worst sample; `max_edge_strain_all` the
@@ -85,6 +87,7 @@ def summarize(
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
     for k, side in enumerate(SIDES):
         summary[f"s_{side}"] = _number(s[-1, k]) if len(log) else None
+        summary[f"armhole_to_shoulder_{side}_m"] = _to_shoulder(log, side)
     for k, side in enumerate(SIDES):
         summary[f"arm_inside_{side}"] = bool(len(log)) and abs(int(m.linking[-1, k])) == 1
         summary[f"linking_number_{side}"] = int(m.linking[-1, k]) if len(log) else None
@@ -153,7 +156,9 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     for side in SIDES:
         s = log.dressing[side][-1, 0]
         if not s >= rules.min_s:
-            return f"{side} sleeve not on: s = {s:.2f} < {rules.min_s:g}"
+            far = _to_shoulder(log, side)
+            short = "" if far is None else f", armhole {100.0 * far:.1f} cm from the shoulder"
+            return f"{side} sleeve not on: s = {s:.2f} < {rules.min_s:g}{short}"
     for k, side in enumerate(SIDES):
         linking = int(m.linking[-1, k])
         if abs(linking) != 1:
@@ -176,6 +181,18 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         limit = f"{100 * m.edge_strain[i]:.1f} % > {100 * rules.max_edge_strain:g} %"
         return f"edges over-strained: 99th percentile {limit} at t = {log.time[i]:.2f} s"
     return None
+
+
+def _to_shoulder(log: RunLog, side: Side) -> float | None:
+    """Returns how far the armhole is from the shoulder at the end, along the arm, m."""
+    if not len(log):
+        return None
+    s = log.dressing[side][-1, 0]
+    k = 3 * SIDES.index(side)
+    shoulder, elbow, hand = log.joint_position[len(log) - 1][k : k + 3]
+    if not (np.isfinite(s) and np.isfinite([shoulder, elbow, hand]).all()):
+        return None
+    return ArmAxis(hand, elbow, shoulder).to_shoulder(float(s))
 
 
 def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:

@@ -10,7 +10,9 @@ from benchmarks.dressing.cases import _SCENARIOS, COATS, METHODS, PERSONS, VARIA
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.statistics import wilson
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
+from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.errors import UserError
+from drake_dress.models.garment.coat import make_coat
 
 
 def result(method="full", seed=0, success=True, reason=None, time=20.0):
@@ -25,6 +27,10 @@ def result(method="full", seed=0, success=True, reason=None, time=20.0):
         "summary": {
             "success": success,
             "reason": reason,
+            "arm_inside_left": True,
+            "arm_inside_right": reason is None or "s = 0.00" not in reason,
+            "s_left": 1.95 if success else 1.85,
+            "s_right": 2.0,
             "dressing_time_s": time if success else None,
             "max_gripper_force_N": 15.0,
             "max_penetration_m": 0.001,
@@ -58,6 +64,23 @@ def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
     assert {s.garment.coat.preset for s in drawn} == {coat}
     assert drawn[0].person.left_arm != drawn[1].person.left_arm
     assert drawn[0].plant.material.friction != drawn[1].plant.material.friction
+    for first, second in (
+        [asdict(s.person.measures) for s in drawn],
+        [asdict(coat_parameters(s.garment.coat)) for s in drawn],
+    ):
+        same = {name for name in first if first[name] == second[name]}
+        # where a gripper holds is no measure
+        assert same <= {"grasp_fraction", "grasp_count"}
+    for s in drawn:
+        make_coat(coat_parameters(s.garment.coat), 0.06)
+
+
+def test_both_arms_inside_below_the_shoulder_are_counted():
+    short = "left sleeve not on: s = 1.85 < 1.9"
+    results = [result(seed=k, success=k > 1, reason=short) for k in range(4)]
+    by_method = tables(results)[0]
+    assert by_method.rows[0][1:3] == [4, 2]
+    assert by_method.rows[0][-2] == 2
 
 
 def test_tables_count_what_was_dressed_and_say_why_not():
@@ -67,6 +90,7 @@ def test_tables_count_what_was_dressed_and_say_why_not():
     assert by_method.rows[0][:3] == ["full", 3, 3]
     assert by_method.rows[0][4] == 21.0
     assert by_method.rows[1][:3] == ["local", 1, 0]
+    assert [row[-2] for row in by_method.rows] == [0, 0]
     assert [row[0] for row in by_group.rows] == ["full, dummy, jacket", "local, dummy, jacket"]
     assert beside.rows == [["local", 1, 0, 1, 0, 0, None]]
     assert reasons.rows == [["local", "left sleeve not on", 1]]

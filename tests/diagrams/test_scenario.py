@@ -1,11 +1,15 @@
 import dataclasses
 import typing
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drake_dress.diagrams.behaviour import Behaviour
 from drake_dress.diagrams.build import behaviour, predictor, safety_limits
@@ -15,8 +19,9 @@ from drake_dress.diagrams.scenario import (
     load_scenario,
     resolved_yaml,
 )
+from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.scenario.ranges import range_of
-from drake_dress.diagrams.scenario.schema import Arm, Variation
+from drake_dress.diagrams.scenario.schema import Arm, Coat, Variation
 from drake_dress.diagrams.scenario.typed import check_ranges
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import LOOP_NAMES
@@ -190,6 +195,76 @@ def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:
     assert first.variation == Variation()
     assert abs(first.person.left_arm.abduction_deg - Arm().abduction_deg) <= 10.0
     assert 0.95 <= first.garment.coat.scale <= 1.05
+
+
+WIDTHS = st.fixed_dictionaries(
+    {
+        "coat_scale": st.floats(0.001, 0.05),
+        "coat_measures": st.floats(0.001, 0.03),
+        "person_scale": st.floats(0.001, 0.05),
+        "person_measures": st.floats(0.001, 0.03),
+    }
+)
+
+
+@settings(deadline=None, max_examples=25)
+@given(WIDTHS, st.integers(0, 2**32), st.booleans())
+def test_variation_acts_on_every_measure_and_within_its_width(
+    widths: dict[str, float], seed: int, given_measures: bool
+) -> None:
+    scenario = Scenario(seed=seed)
+    if given_measures:
+        scenario.garment.coat = Coat(preset="jacket", chest=1.2, armhole_girth=0.56, cuff_girth=0.3)
+    scenario.variation = Variation(**widths)
+    drawn = apply_variation(scenario)
+    for plain, varied, scale, own in (
+        (
+            asdict(coat_parameters(scenario.garment.coat)),
+            asdict(coat_parameters(drawn.garment.coat)),
+            widths["coat_scale"],
+            widths["coat_measures"],
+        ),
+        (
+            asdict(scenario.person.measures),
+            asdict(drawn.person.measures),
+            widths["person_scale"],
+            widths["person_measures"],
+        ),
+    ):
+        ratios = {}
+        for name, value in plain.items():
+            if name.startswith("grasp"):
+                assert varied[name] == value
+                continue
+            power = 3 if name.endswith("mass") else 1
+            ratios[name] = varied[name] / value
+            assert ratios[name] != 1.0
+            assert (1 - scale) ** power * (1 - own) <= ratios[name] * (1 + 1e-12)
+            assert ratios[name] <= (1 + scale) ** power * (1 + own) * (1 + 1e-12)
+        # each by itself
+        assert len(set(ratios.values())) == len(ratios)
+    assert load_scenario_text(resolved_yaml(drawn)) == drawn
+
+
+def load_scenario_text(text: str) -> Scenario:
+    with TemporaryDirectory() as folder:
+        return load_scenario(write(Path(folder), text))
+
+
+@pytest.mark.parametrize("measures", [{}, {"chest": 1.1, "sleeve_length": 0.6}])
+def test_scale_of_a_coat_acts_on_given_measures_too(measures: dict[str, float]) -> None:
+    plain = asdict(coat_parameters(Coat(**measures)))
+    large = asdict(coat_parameters(Coat(scale=1.1, **measures)))
+    for name, value in plain.items():
+        assert large[name] == pytest.approx(value if name.startswith("grasp") else 1.1 * value)
+
+
+def test_scale_of_a_mesh_file_is_drawn_with_the_coat_s(tmp_path: Path) -> None:
+    text = "garment: {mesh: {file: coat.obj, scale: 2.0}}\nvariation: {coat_scale: 0.1}"
+    drawn = apply_variation(load_scenario(write(tmp_path, text), seed=5))
+    assert drawn.garment.mesh is not None
+    assert drawn.garment.mesh.scale == pytest.approx(2.0 * drawn.garment.coat.scale)
+    assert drawn.garment.mesh.scale != 2.0
 
 
 def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None:

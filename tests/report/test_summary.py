@@ -106,7 +106,14 @@ def test_one_sleeve_is_no_success(summary_of, garment):
     samples = _dressed(garment)
     on = samples[-1].dressing
     samples[-1] = replace(samples[-1], dressing=on | {"left": (1.42, 0.0, 0.0)})
-    assert summary_of(samples)["reason"] == "left sleeve not on: s = 1.42 < 1.9"
+    summary = summary_of(samples)
+    left = summary["armhole_to_shoulder_left_m"]
+    assert summary["reason"].startswith("left sleeve not on: s = 1.42 < 1.9, armhole ")
+    assert f"{100.0 * left:.1f} cm from the shoulder" in summary["reason"]
+    shoulder, elbow, _ = samples[-1].joint_position[:3]
+    # the axis cuts the corner at a bent elbow by less than a twentieth
+    assert left == pytest.approx(0.58 * np.linalg.norm(shoulder - elbow), rel=0.05)
+    assert summary["armhole_to_shoulder_right_m"] == 0.0
 
 
 def test_force_at_one_sample_breaks_the_rule(summary_of, garment):

@@ -1,4 +1,4 @@
-"""Reads scenarios, writes them whole, and draws what their seeds vary.
+"""Reads scenarios.
 
 The file is held against the schema's types, filled in by Drake, and then held against ranges and
 against itself.
@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import yaml
-from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+from pydrake.common.yaml import yaml_load_typed
 
 from drake_dress.diagrams.scenario.checks import (
     check_behaviour,
@@ -19,7 +17,7 @@ from drake_dress.diagrams.scenario.checks import (
     check_hardware,
     check_safety,
 )
-from drake_dress.diagrams.scenario.schema import Scenario, Variation
+from drake_dress.diagrams.scenario.schema import Scenario
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
 from drake_dress.text_file import read_text
@@ -56,35 +54,6 @@ def load_scenario(
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)
     return scenario
-
-
-def resolved_yaml(scenario: Scenario) -> str:
-    """Returns the whole scenario as YAML that loads to the same."""
-    return write_yaml(yaml.safe_load(yaml_dump_typed(scenario)))
-
-
-def apply_variation(scenario: Scenario) -> Scenario:
-    """Returns the scenario with what its seed draws written in and no variation left."""
-    drawn: Scenario = yaml_load_typed(schema=Scenario, data=resolved_yaml(scenario))
-    v, rng = scenario.variation, np.random.default_rng(scenario.seed)
-
-    def draw(width: float) -> float:
-        return float(width * rng.uniform(-1.0, 1.0))
-
-    for arm in (drawn.person.left_arm, drawn.person.right_arm):
-        arm.abduction_deg += draw(v.arm_angle_deg)
-        arm.extension_deg += draw(v.arm_angle_deg)
-        arm.elbow_deg = max(0.0, arm.elbow_deg + draw(v.arm_angle_deg))
-    drawn.garment.coat.scale *= 1.0 + draw(v.coat_scale)
-    stiffness = 1.0 + draw(v.plant_stiffness)
-    drawn.plant.material.stretch_stiffness *= stiffness
-    drawn.plant.material.bending_stiffness *= stiffness
-    drawn.plant.material.friction *= 1.0 + draw(v.plant_friction)
-    drawn.station.start.distance_behind += draw(v.start_offset)
-    drawn.station.start.height_offset += draw(v.start_offset)
-    drawn.station.start.lateral_offset += draw(v.start_offset)
-    drawn.variation = Variation()
-    return drawn
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import fields
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
-from drake_dress.models.garment.load import WELD_RANGE
+from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
@@ -93,6 +93,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
     **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
     "mesh.weld": WELD_RANGE,
+    "mesh.scale": SCALE_RANGE,
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
     "material.bending_stiffness": (0.0, 1.0),
@@ -200,6 +201,9 @@ _RANGES: dict[str, tuple[float, float]] = {
     "start.lateral_offset": (-1.0, 1.0),
     "variation.arm_angle_deg": (0.0, 45.0),
     "variation.coat_scale": (0.0, 0.3),
+    "variation.coat_measures": (0.0, 0.2),
+    "variation.person_scale": (0.0, 0.3),
+    "variation.person_measures": (0.0, 0.2),
     "variation.plant_stiffness": (0.0, 0.9),
     "variation.plant_friction": (0.0, 0.9),
     "variation.start_offset": (0.0, 0.3),

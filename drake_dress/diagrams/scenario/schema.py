@@ -10,10 +10,10 @@ from drake_dress.models.effects.registry import EFFECTS
 
 @dataclass
 class Coat:
-    """A parametric coat: a preset, scaled, with single measures replaced; m."""
+    """A parametric coat: a preset with single measures replaced, all of them scaled; m."""
 
     preset: str = "overcoat"
-    scale: float = 1.0  # on all lengths
+    scale: float = 1.0  # on all lengths, given ones too
     body_length: float | None = None  # shoulder tips to hem
     chest: float | None = None  # girth
     shoulder_width: float | None = None  # tip to tip
@@ -21,6 +21,8 @@ class Coat:
     armhole_girth: float | None = None
     cuff_girth: float | None = None
     collar_height: float | None = None
+    neck_width: float | None = None  # between the inner ends of the shoulder seams
+    shoulder_slope: float | None = None  # height of the seam's inner end above its outer end
     front_opening: float | None = None  # between the front edges, part of the chest girth
     # What each gripper holds: a patch of ten nodes, or the whole shoulder seam, as a hanger does;
     # the seam is the same at every spacing, a patch of nodes is not.
@@ -33,6 +35,7 @@ class Mesh:
 
     file: str = ""  # OBJ, PLY or STL, relative to the scenario
     unit: str = "m"  # of its coordinates
+    scale: float = 1.0  # on all coordinates, beside the unit
     # Axis of the file that points up. With z the garment faces +x, with y +z, with x +y; a minus
     # sign turns it upside down.
     up: str = "z"
@@ -458,7 +461,10 @@ class Variation:
     """What the seed draws, uniformly within ± these."""
 
     arm_angle_deg: float = 0.0  # on each arm's abduction, extension and elbow
-    coat_scale: float = 0.0  # relative
+    coat_scale: float = 0.0  # relative, on all lengths of the garment at once
+    coat_measures: float = 0.0  # relative, on each measure of the coat by itself
+    person_scale: float = 0.0  # relative, on all lengths of the body at once; masses as the cube
+    person_measures: float = 0.0  # relative, on each measure of the body by itself
     plant_stiffness: float = 0.0  # relative, on stretch and bending
     plant_friction: float = 0.0  # relative
     start_offset: float = 0.0  # m, on each of the three

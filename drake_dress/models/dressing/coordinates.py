@@ -143,6 +143,10 @@ class ArmAxis:
         direction: FloatArray = np.cos(phi) * self._u + np.sin(phi) * self._inward
         return direction
 
+    def to_shoulder(self, s: float) -> float:
+        """Returns the length of axis from `s`, limited to [0, 2], to the shoulder, m."""
+        return self._arc_length(s)[1]
+
     def coordinates(self, point: FloatArray) -> DressingCoordinates:
         """Returns (s, l, theta) of a point (3,): progress, distance to the axis, m, angle, rad.
 

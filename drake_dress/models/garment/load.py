@@ -37,6 +37,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 DIAGONAL_RANGE = (0.5, 3.0)  # of a garment's bounding box, m
 SPACING_RANGE = (0.005, 0.1)  # m
 WELD_RANGE = (0.0, 0.02)  # m
+SCALE_RANGE = (1e-4, 1e4)  # from tenths of a millimetre to tens of metres of life size
 
 # Is told what is being done, and which share of it is.
 Progress = Callable[[str, float], None]
@@ -60,6 +61,7 @@ class MeshOptions:
             per triangle, any of the copies may be named.
         grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
             nodes nearest to a point 3.5 cm inward of the armhole's highest node.
+        scale: of all coordinates, beside the unit.
     """
 
     unit: str = "m"
@@ -68,6 +70,7 @@ class MeshOptions:
     leave_out: Sequence[str] = ()
     loops: Mapping[str, Sequence[int]] | None = None
     grasp: Mapping[str, Sequence[int]] | None = None
+    scale: float = 1.0
 
     def check(self, source: str) -> None:
         """Raises UserError if an option is unknown or out of range."""
@@ -77,6 +80,9 @@ class MeshOptions:
         low, high = WELD_RANGE
         if not low <= self.weld <= high:
             raise UserError(source, "weld", f"is {self.weld} m, expected {low:g} to {high} m")
+        low, high = SCALE_RANGE
+        if not low <= self.scale <= high:
+            raise UserError(source, "scale", f"is {self.scale}, expected {low:g} to {high:g}")
         for key, given, allowed in (
             ("loops", self.loops, LOOP_NAMES),
             ("grasp", self.grasp, SIDES),
@@ -150,6 +156,7 @@ def load_garment(
     leave_out: Sequence[str] = (),
     loops: Mapping[str, Sequence[int]] | None = None,
     grasp: Mapping[str, Sequence[int]] | None = None,
+    scale: float = 1.0,
     progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
@@ -163,12 +170,14 @@ def load_garment(
         leave_out: names, or sizes such as `<0.05 m`.
         loops: nodes around openings.
         grasp: nodes held.
+        scale: of all coordinates, beside the unit.
         progress: is told what is being done, and which share of it is.
 
     Raises:
         UserError: see `read_garment` and `WholeGarment.at_spacing`.
     """
-    whole = read_garment(path, MeshOptions(unit, up, weld, leave_out, loops, grasp), progress)
+    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale)
+    whole = read_garment(path, options, progress)
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
 
@@ -191,7 +200,7 @@ def read_garment(
     progress("reading the garment", 0.0)
     raw = without_named(read_mesh(Path(path)), options.leave_out)
     progress("checking the garment", 0.3)
-    raw = duplicates_merged(raw.scaled(UNITS[options.unit]))
+    raw = duplicates_merged(raw.scaled(UNITS[options.unit] * options.scale))
     # first what holds in any unit, so that a wild node is not taken for a wrong unit
     check_plausible(raw)
     _check_size(raw, options.unit)
@@ -225,7 +234,7 @@ def _check_size(raw: RawMesh, unit: str) -> None:
         better = [
             name for name, factor in UNITS.items() if low <= diagonal * factor / UNITS[unit] <= high
         ]
-        hint = f"with {better[0]} it would fit" if better else "no unit fits: scale the file"
+        hint = f"with {better[0]} it would fit" if better else "no unit fits, a scale might"
         raise UserError(
             raw.source,
             "unit",

@@ -42,6 +42,12 @@ def test_axis_runs_from_hand_to_shoulder(seed: int) -> None:
     np.testing.assert_allclose(axis.G(-3.0), hand, atol=1e-12)
     np.testing.assert_allclose(axis.G(7.0), shoulder, atol=1e-12)
     np.testing.assert_allclose(axis.D(-1.0), axis.D(0.0))
+    assert axis.to_shoulder(2.0) == axis.to_shoulder(3.0) == 0.0
+    s = np.linspace(0.0, 2.0, 400)
+    steps = np.linalg.norm(np.diff(axis.points(s), axis=0), axis=1)
+    left = [axis.to_shoulder(value) for value in s]
+    np.testing.assert_allclose(-np.diff(left), steps, rtol=1e-3)
+    assert left[-1] == 0.0
     np.testing.assert_allclose(axis.D(3.0), axis.D(2.0))
     lower, upper = elbow - hand, shoulder - elbow
     np.testing.assert_allclose(axis.D(0.0), lower / np.linalg.norm(lower), atol=1e-12)

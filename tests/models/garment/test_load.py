@@ -49,6 +49,18 @@ def test_every_format_and_unit_gives_the_same_garment(tmp_path, coat, extension,
         assert np.linalg.norm(armhole.mean(axis=0) - true.mean(axis=0)) < 0.05
 
 
+def test_scale_beside_the_unit_brings_any_file_to_life_size(tmp_path, coat):
+    path = write(tmp_path / "coat.obj", 39.37 * coat.rest_position, coat.faces)
+    mesh = load_garment(path, unit="m", scale=1.0 / 39.37)
+    size = np.ptp(coat.rest_position, axis=0)
+    assert np.allclose(np.ptp(mesh.rest_position, axis=0), size, atol=1e-4)
+    mesh = load_garment(path, unit="cm", scale=100.0 / 39.37)
+    assert np.allclose(np.ptp(mesh.rest_position, axis=0), size, atol=1e-4)
+    message = refusal(path, unit="m")
+    assert "scale" in message
+    assert "expected 0.0001 to 10000" in refusal(path, unit="m", scale=0.0)
+
+
 def test_named_loops_and_grasp_are_kept_exactly(tmp_path, coat):
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces)
     grasp = {side: nodes.tolist() for side, nodes in coat.grasp.items()}

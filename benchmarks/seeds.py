@@ -1,0 +1,92 @@
+"""Which seeds a study runs: given ones, or ones drawn for a purpose.
+
+Seeds 0 to 99 are for development, 100 to 999 for choosing between variants, 1000 and above for
+reporting. A figure that is reported comes from seeds that nobody looked at before; so they are
+drawn, from a root that is printed and with which they can be drawn again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.kept import seed_range
+from benchmarks.parser import seed_number
+from drake_dress.errors import UserError
+
+PURPOSES = {"develop": range(100), "choose": range(100, 1000), "report": range(1000, 2**31)}
+_ROOTS = 10**6
+
+
+@dataclass(frozen=True)
+class Draw:
+    """So many seeds for a purpose of `PURPOSES`."""
+
+    purpose: str
+    count: int
+
+
+def draw_seeds(draw: Draw, root: int) -> list[int]:
+    """Returns different seeds of a purpose, sorted; with the same root, the same.
+
+    More seeds of a root hold those that fewer are: a study can be made longer.
+    """
+    among = PURPOSES[draw.purpose]
+    rng = np.random.default_rng([root, among.start])
+    drawn: dict[int, None] = {}
+    while len(drawn) < draw.count:
+        drawn[int(rng.integers(among.start, among.stop))] = None
+    return sorted(drawn)
+
+
+def draw_of(text: str) -> Draw:
+    """Returns the draw that PURPOSE:N means, for argparse."""
+    purpose, _, count = text.partition(":")
+    if purpose not in PURPOSES or not count.isdecimal():
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no draw, expected {', '.join(f'{p}:N' for p in PURPOSES)}"
+        )
+    most = min(len(PURPOSES[purpose]), 10**5)
+    if not 1 <= int(count) <= most:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to {most} seeds")
+    return Draw(purpose, int(count))
+
+
+def add_seed_options(parser: argparse.ArgumentParser, default: Sequence[int]) -> None:
+    """Adds `--seeds`, `--draw` and `--root`."""
+    named = parser.add_mutually_exclusive_group()
+    named.add_argument(
+        "--seeds",
+        type=seed_range,
+        default=default,
+        metavar="A-B",
+        help=f"default {default[0]}-{default[-1]}: seeds that the rules were made on",
+    )
+    named.add_argument(
+        "--draw",
+        type=draw_of,
+        metavar="PURPOSE:N",
+        help="seeds drawn to develop (0-99), choose (100-999) or report (1000 and above)",
+    )
+    parser.add_argument("--root", type=seed_number, help="of the draw; a new one by default")
+
+
+def chosen_seeds(options: argparse.Namespace) -> tuple[Sequence[int], str]:
+    """Returns the seeds of a study, and what is to be said of them above its tables.
+
+    Raises:
+        UserError: a root without a draw.
+    """
+    if options.draw is None:
+        if options.root is not None:
+            raise UserError("bench", "--root", "is of a draw, expected --draw PURPOSE:N with it")
+        first, last = options.seeds[0], options.seeds[-1]
+        return options.seeds, f"Seeds {first} to {last}."
+    root = secrets.randbelow(_ROOTS) if options.root is None else options.root
+    seeds = draw_seeds(options.draw, root)
+    said = f"Seeds drawn with `--draw {options.draw.purpose}:{len(seeds)} --root {root}`."
+    return seeds, said

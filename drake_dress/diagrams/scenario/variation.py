@@ -1,0 +1,67 @@
+"""Draws what a scenario's seed varies: pose, coat, person, fabric and start.
+
+Each group of keys has draws of its own, so that a width of one does not change what another draws.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+from pydrake.common.yaml import yaml_load_typed
+
+from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
+from drake_dress.diagrams.scenario.schema import Coat, Measures, Scenario, Variation
+from drake_dress.diagrams.scenario.text import resolved_yaml
+
+# Of the groups that came after the first, beside the seed.
+_COAT, _PERSON = 1, 2
+
+Draw = Callable[[float], float]
+
+
+def apply_variation(scenario: Scenario) -> Scenario:
+    """Returns the scenario with what its seed draws written in and no variation left."""
+    drawn: Scenario = yaml_load_typed(schema=Scenario, data=resolved_yaml(scenario))
+    v, draw = scenario.variation, _uniform(scenario.seed)
+    for arm in (drawn.person.left_arm, drawn.person.right_arm):
+        arm.abduction_deg += draw(v.arm_angle_deg)
+        arm.extension_deg += draw(v.arm_angle_deg)
+        arm.elbow_deg = max(0.0, arm.elbow_deg + draw(v.arm_angle_deg))
+    scale = 1.0 + draw(v.coat_scale)
+    drawn.garment.coat.scale *= scale
+    if drawn.garment.mesh is not None:
+        drawn.garment.mesh.scale *= scale
+    stiffness = 1.0 + draw(v.plant_stiffness)
+    drawn.plant.material.stretch_stiffness *= stiffness
+    drawn.plant.material.bending_stiffness *= stiffness
+    drawn.plant.material.friction *= 1.0 + draw(v.plant_friction)
+    drawn.station.start.distance_behind += draw(v.start_offset)
+    drawn.station.start.height_offset += draw(v.start_offset)
+    drawn.station.start.lateral_offset += draw(v.start_offset)
+    if v.coat_measures > 0.0:
+        _vary_coat(drawn.garment.coat, v.coat_measures, _uniform(scenario.seed, _COAT))
+    if v.person_scale > 0.0 or v.person_measures > 0.0:
+        _vary_person(drawn.person.measures, v, _uniform(scenario.seed, _PERSON))
+    drawn.variation = Variation()
+    return drawn
+
+
+def _vary_coat(coat: Coat, width: float, draw: Draw) -> None:
+    whole = coat_parameters(coat)
+    for name in COAT_MEASURES:
+        # given measures are scaled when the coat is made
+        setattr(coat, name, getattr(whole, name) / coat.scale * (1.0 + draw(width)))
+
+
+def _vary_person(measures: Measures, v: Variation, draw: Draw) -> None:
+    scale = 1.0 + draw(v.person_scale)
+    for entry in fields(measures):
+        # a body that is larger by a tenth in all lengths weighs a third more
+        whole = scale**3 if entry.name.endswith("mass") else scale
+        own = 1.0 + draw(v.person_measures)
+        setattr(measures, entry.name, getattr(measures, entry.name) * whole * own)
+
+
+def _uniform(*seed: int) -> Draw:
+    rng = np.random.default_rng(seed[0] if len(seed) == 1 else seed)
+    return lambda width: float(width * rng.uniform(-1.0, 1.0))
