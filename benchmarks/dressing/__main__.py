@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks.dressing.cases import COATS, METHODS, PERSONS, Case, cases, run
+from benchmarks.dressing.cases import COATS, METHODS, PERSONS, VARIATIONS, Case, cases, run
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.parser import OneLineParser, exit_with, output_file
 from benchmarks.seeds import add_seed_options, chosen_seeds
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     seeds, said = chosen_seeds(options)
-    chosen = cases(options.methods, options.persons, options.coats, seeds)
+    chosen = cases(options.methods, options.persons, options.coats, seeds, options.variation)
     results, stopped = carry_out(options, _NAME, Case, chosen, run, tables, said=said)
     if options.plot:
         write_text(options.plot, figure(results))
@@ -33,6 +33,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench dressing", description=__doc__)
     add_choices(parser, methods=METHODS, persons=PERSONS, coats=COATS)
+    parser.add_argument(
+        "--variation",
+        choices=tuple(VARIATIONS),
+        default="all",
+        help="what seeds draw: all measures, or the few of the first figures",
+    )
     add_seed_options(parser, range(13))
     add_study_options(parser, _NAME)
     parser.add_argument(

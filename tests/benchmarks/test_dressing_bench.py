@@ -6,7 +6,7 @@ from dataclasses import asdict
 import pytest
 
 from benchmarks.dressing import __main__ as bench
-from benchmarks.dressing.cases import _SCENARIOS, COATS, METHODS, PERSONS, VARIATION, Case, cases
+from benchmarks.dressing.cases import _SCENARIOS, COATS, METHODS, PERSONS, VARIATIONS, Case, cases
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.statistics import wilson
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
@@ -22,7 +22,7 @@ def result(method="full", seed=0, success=True, reason=None, time=20.0):
         series |= {f"s_{side}": [0.1 * k for k in range(count)]}
         series |= {f"l_{side}": [0.01] * count, f"force_{side}": [5.0] * count}
     return {
-        "case": asdict(Case(method, "dummy", "jacket", seed)),
+        "case": asdict(Case(method, "dummy", "jacket", seed, "all")),
         "status": int(not success),
         "summary": {
             "success": success,
@@ -56,7 +56,11 @@ def test_a_part_of_the_runs_is_a_fair_part_of_all_groups():
 @pytest.mark.parametrize("person", PERSONS)
 @pytest.mark.parametrize("coat", COATS)
 def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
-    settings = [f"garment.coat={COATS[coat]}", f"variation={VARIATION}", "controller.method=full"]
+    settings = [
+        f"garment.coat={COATS[coat]}",
+        f"variation={VARIATIONS['all']}",
+        "controller.method=full",
+    ]
     drawn = [
         apply_variation(load_scenario(_SCENARIOS / PERSONS[person], settings, seed))
         for seed in (0, 1)
