@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
-from drake_dress.models.cloth.layers.neighbours import Motion, PairFinder, Pairs, relative_motion
+from drake_dress.models.cloth.layers.motion import Motion, relative_motion
+from drake_dress.models.cloth.layers.neighbours import PairFinder, Pairs
 from drake_dress.models.cloth.layers.passes import (
     CROSSING,
     THIN,
@@ -165,8 +166,8 @@ class LayerSeparation:
         self.thickness = float(thickness)
         self._n = elements.node_count
         self._topology = make_topology(elements, rings)
-        self._finder = PairFinder(self._topology)
         self._edge = float(elements.edge_rest_length.mean())
+        self._finder = PairFinder(self._topology, self._edge)
         self._slack = max(self.thickness, _SLACK * self._edge)
         self._nothing_barred = np.zeros((self._n, 3))
 

@@ -2,12 +2,19 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.layers.closest import closest, offset, separation
-from drake_dress.models.cloth.layers.neighbours import PairFinder, relative_motion
+from drake_dress.models.cloth.layers.motion import relative_motion
+from drake_dress.models.cloth.layers.neighbours import PairFinder
 from drake_dress.models.cloth.layers.topology import make_topology
 from tests.models.cloth.layers.scenes import all_pairs, crumpled
+
+# About that of the crumpled sheets, m.
+EDGE = 0.02
+CRUMPLED = crumpled(3)
 
 
 def _sampled_distance(kind: int, corner: FloatArray) -> float:
@@ -79,7 +86,7 @@ def test_every_pair_that_may_come_near_is_found_once(rings: int) -> None:
         dx = rng.normal(scale=1.5e-3, size=x.shape) + np.cross([0.1, 0.2, -0.3], x) + 0.4
         topology = make_topology(e, rings)
         motion = relative_motion(topology, x, dx)
-        pairs = PairFinder(topology).find(x, motion, near)
+        pairs = PairFinder(topology, EDGE).find(x, motion, near)
         found = [
             (int(k), _key(int(k), n)) for k, n in zip(pairs.kind, pairs.node.tolist(), strict=True)
         ]
@@ -97,6 +104,29 @@ def test_every_pair_that_may_come_near_is_found_once(rings: int) -> None:
                 expected.add((kind, _key(kind, list(nodes))))
         assert len(expected) > 300
         assert set(found) == expected
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(1e-5, 3e-3),
+    st.floats(0.0, 0.3),
+)
+@settings(deadline=None, max_examples=20)
+def test_what_was_found_before_makes_no_difference(seed: int, size: float, turn: float) -> None:
+    x, e = CRUMPLED
+    topology = make_topology(e, 1)
+    keeps = PairFinder(topology, EDGE)
+    rng = np.random.default_rng(seed)
+    drift = rng.normal(size=x.shape)
+    for _ in range(8):
+        dx = size * (drift + 0.3 * rng.normal(size=x.shape))
+        dx += np.cross(turn * rng.normal(size=3), x) + rng.normal(size=3)
+        motion = relative_motion(topology, x, dx)
+        near = rng.uniform(4e-3, 6e-3)
+        kept, fresh = (f.find(x, motion, near) for f in (keeps, PairFinder(topology, EDGE)))
+        for name, values in vars(fresh).items():
+            np.testing.assert_array_equal(getattr(kept, name), values)
+        x = x + dx
 
 
 def _key(kind: int, nodes: list[int]) -> tuple[frozenset[int], frozenset[int]] | frozenset:
