@@ -210,7 +210,7 @@ def make_simulated_station(
     cloth = builder.AddNamedSystem(
         "cloth",
         ClothPlant(
-            _integrator(p, held),
+            plant_integrator(p),
             (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
             start,
             grippers,
@@ -410,8 +410,9 @@ def robots_at_start(
     return setup
 
 
-def _integrator(p: StationParameters, held: np.ndarray) -> Integrator:
-    """Returns what steps the plant's garment."""
+def plant_integrator(p: StationParameters) -> Integrator:
+    """Returns what steps the plant's garment, held by both grippers."""
+    held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
     scheme = Scheme(
         held,
         p.time_step,

@@ -1,0 +1,1 @@
+"""The plant's garment: how far it is from a finer reference, and what a step takes."""

@@ -1,0 +1,170 @@
+"""How far the plant's garment is from a finer reference, and what its steps take.
+
+    drake-dress bench plant --work out/plant --into docs/cloth.md
+
+Grippers and limbs are those of one dressing, which is run first. Parts of it, a second each, are
+stepped with half the spacing and a quarter of the step, and with each setting from the same states.
+What was run stays in the folder of `--work`; the reference alone takes a quarter of an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.cloth.table import Table
+from benchmarks.parser import OneLineParser, at_least_one, exit_with, output_file, output_folder
+from benchmarks.plant.accuracy import Part, Setting, compared, part_begins, reference_part
+from benchmarks.plant.motion import DressingMotion
+from benchmarks.scenario_run import run_scenario
+from benchmarks.section import END, around, begin, write_between
+from drake_dress.diagrams.scenario import Scenario, load_scenario
+from drake_dress.errors import UserError
+from drake_dress.file_output import write_text
+from drake_dress.interrupt import caught_interrupt
+from drake_dress.report.log import RunLog
+
+_NAME = "plant"
+_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+# Beside the scenario's own: the same mesh or the same step as the reference, longer steps, and
+# layers that collide.
+SETTINGS = (
+    Setting("plant", 0.02, 0.004),
+    Setting("plant, layers collide", 0.02, 0.004, self_collision=True),
+    Setting("reference's step", 0.02, 0.001),
+    Setting("reference's mesh", 0.01, 0.004),
+    Setting("steps of 2 ms", 0.02, 0.002),
+    Setting("steps of 6 ms", 0.02, 0.006),
+    Setting("steps of 8 ms", 0.02, 0.008),
+    Setting("steps of 10 ms", 0.02, 0.010),
+    Setting("mesh of 2.5 cm", 0.025, 0.004),
+    Setting("mesh of 3 cm", 0.03, 0.004),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs what is missing and prints the table; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    if options.into is not None:
+        around(options.into, _NAME)
+    scenario = load_scenario(options.scenario)
+    folder = options.scenario.parent
+    run = options.work / "run"
+    if not (run / "summary.json").exists():
+        print("a dressing is run, from which the motion is taken", flush=True)
+        _, problem = run_scenario(options.scenario, run, (), report=False)
+        if problem:
+            raise UserError("bench", "plant", problem)
+    motion = DressingMotion.read(run / "run.h5")
+    with caught_interrupt() as stop:
+        parts = []
+        for number, at in enumerate(part_begins(motion, options.parts), 1):
+            parts.append(_kept_part(options.work, scenario, folder, motion, float(at)))
+            print(f"reference: {number}/{options.parts}", flush=True)
+            if stop.is_set():
+                return stop.status
+        results: list[dict[str, Any]] = []
+        for setting in SETTINGS:
+            if options.only and setting.name not in options.only:
+                continue
+            for part in parts:
+                results += compared(setting, scenario, folder, motion, [part])
+                if stop.is_set():
+                    return stop.status
+            print(_line(_row(results, setting.name)), flush=True)
+    shown = _table(results).text()
+    print(f"\n{shown}")
+    if options.json is not None:
+        write_text(options.json, json.dumps(results, indent=1) + "\n")
+    if options.into is not None:
+        write_between(options.into, _NAME, shown)
+    return 0
+
+
+def _kept_part(
+    work: Path, scenario: Scenario, folder: Path, motion: DressingMotion, at: float
+) -> Part:
+    path = work / f"reference_{at:.3f}.npz"
+    if path.exists():
+        with np.load(path) as kept:
+            return Part(at, *(kept[k] for k in ("x", "v", "end", "grippers", "person")))
+    with RunLog.open(work / "run" / "run.h5") as log:
+        part = reference_part(scenario, folder, log, motion, at)
+    arrays = {k: v for k, v in vars(part).items() if k != "begin"}
+    unfinished = path.with_name("unfinished.npz")
+    np.savez_compressed(unfinished, **arrays)
+    unfinished.replace(path)
+    return part
+
+
+def _row(results: Sequence[dict[str, Any]], name: str) -> list[Any]:
+    mine = [r for r in results if r["case"]["name"] == name]
+    case = mine[0]["case"]
+
+    def median(key: str) -> float:
+        return float(np.median([r[key] for r in mine]))
+
+    return [
+        name,
+        100.0 * case["spacing"],
+        1e3 * case["time_step"],
+        median("mean_mm"),
+        float(np.mean([r["mean_mm"] for r in mine])),
+        median("p95_mm"),
+        median("grippers_N"),
+        median("person_N"),
+        median("iterations"),
+        median("mean_step_ms"),
+        median("mean_step_ms") / case["time_step"],
+    ]
+
+
+def _line(row: Sequence[Any]) -> str:
+    return f"{row[0]}: {row[3]:.1f} mm, {row[6]:.2f} N, {row[9]:.1f} ms a step"
+
+
+def _table(results: Sequence[dict[str, Any]]) -> Table:
+    names = list(dict.fromkeys(r["case"]["name"] for r in results))
+    header = [
+        "",
+        "spacing, cm",
+        "step, ms",
+        "nodes off, mm",
+        "mean of parts",
+        "95 % of nodes",
+        "on grippers, N",
+        "on person, N",
+        "iterations a step",
+        "ms a step",
+        "ms a second",
+    ]
+    return Table("Beside a reference", header, [_row(results, name) for name in names])
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="drake-dress bench plant",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
+    parser.add_argument("--parts", type=at_least_one, default=10, help="of the motion")
+    parser.add_argument("--only", action="append", metavar="NAME", help="a setting; all by default")
+    parser.add_argument("--work", type=output_folder, default=Path("out/plant"))
+    parser.add_argument("--json", type=output_file, metavar="FILE")
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the table between {begin(_NAME)} and {END}",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    exit_with(main)

@@ -1,0 +1,129 @@
+"""How far a garment is from a finer one after parts of a dressing's motion.
+
+The reference has half the spacing and a quarter of the step. It begins where the logged garment
+was, and is left alone for a while, in which it forgets the coarser mesh; then each garment that is
+compared begins from its state. Parts last a second: longer ones are decided by which way cloth
+buckles, where the reference departs from itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.plant.motion import DressingMotion
+from benchmarks.plant.replaying import Replayed, replay
+from drake_dress.diagrams.build import station_parameters
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.station import plant_integrator
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.transfer import barycentric_transfer
+from drake_dress.report.log import RunLog
+
+FloatArray = npt.NDArray[np.float64]
+
+# In which the reference forgets the mesh that it comes from, and of each part, s.
+_FORGETTING, _PART = 0.3, 1.0
+# Of the first part, s: before, the coat hangs still.
+_FIRST = 3.0
+_FINER, _SHORTER = 2.0, 4.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A garment that is compared; m and s."""
+
+    name: str
+    spacing: float
+    time_step: float
+    self_collision: bool = False
+
+    def of(self, scenario: Scenario, folder: Path) -> tuple[GarmentMesh, Integrator]:
+        """Returns the scenario's garment with it, and what steps it."""
+        plant = scenario.plant
+        before = (plant.time_step, plant.self_collision)
+        plant.time_step, plant.self_collision = self.time_step, self.self_collision
+        try:
+            mesh = build_garment(scenario.garment, self.spacing, folder)
+            return mesh, plant_integrator(station_parameters(scenario, mesh))
+        finally:
+            plant.time_step, plant.self_collision = before
+
+
+@dataclass(frozen=True)
+class Part:
+    """The reference at the begin and at the end of a part of the motion; (n,3) m and m/s."""
+
+    begin: float
+    x: FloatArray
+    v: FloatArray
+    end: FloatArray
+    grippers: FloatArray
+    person: FloatArray
+
+
+def part_begins(motion: DressingMotion, count: int) -> FloatArray:
+    """Returns when parts begin, s."""
+    return np.linspace(_FIRST, motion.time[-1] - _PART - _SHORTER * 0.01, count)
+
+
+def reference(scenario: Scenario) -> Setting:
+    """Returns what a scenario's plant is held against."""
+    p = scenario.plant
+    return Setting("reference", p.spacing / _FINER, p.time_step / _SHORTER, p.self_collision)
+
+
+def reference_part(
+    scenario: Scenario, folder: Path, log: RunLog, motion: DressingMotion, begin: float
+) -> Part:
+    """Returns the reference through one part."""
+    coarse = build_garment(scenario.garment, scenario.plant.spacing, folder)
+    mesh, cloth = reference(scenario).of(scenario, folder)
+    finer = barycentric_transfer(coarse, mesh)
+    sample = int(np.searchsorted(motion.time, begin - _FORGETTING))
+    x = finer @ log.garment_position(sample)
+    moved = log.garment_position(sample + 1) - log.garment_position(sample - 1)
+    v = finer @ (moved / (motion.time[sample + 1] - motion.time[sample - 1]))
+    start = float(motion.time[sample])
+    begun = replay(cloth, mesh, motion, x, v, start, begin - start).state
+    done = replay(cloth, mesh, motion, begun.x, begun.v, begin, _PART)
+    return Part(begin, begun.x, begun.v, done.state.x, done.grippers, done.person)
+
+
+def compared(
+    setting: Setting,
+    scenario: Scenario,
+    folder: Path,
+    motion: DressingMotion,
+    parts: Sequence[Part],
+) -> list[dict[str, Any]]:
+    """Returns for each part how far a garment is off, mm and N, and what its steps took, ms."""
+    fine, _ = reference(scenario).of(scenario, folder)
+    mesh, cloth = setting.of(scenario, folder)
+    coarser = barycentric_transfer(fine, mesh)
+    found = []
+    for part in parts:
+        done = replay(cloth, mesh, motion, coarser @ part.x, coarser @ part.v, part.begin, _PART)
+        found.append(_off(done, part, coarser @ part.end) | {"case": asdict(setting)})
+    return found
+
+
+def _off(done: Replayed, part: Part, end: FloatArray) -> dict[str, Any]:
+    distance = 1e3 * np.linalg.norm(done.state.x - end, axis=1)
+    return {
+        "begin": part.begin,
+        "mean_mm": float(distance.mean()),
+        "p95_mm": float(np.quantile(distance, 0.95)),
+        "grippers_N": float(np.linalg.norm(done.grippers - part.grippers, axis=1).mean()),
+        "person_N": float(np.linalg.norm(done.person - part.person)),
+        "step_ms": 1e3 * float(np.median(done.step)),
+        "mean_step_ms": 1e3 * float(done.step.mean()),
+        "iterations": done.iterations,
+    }

@@ -1,0 +1,87 @@
+"""Steps a garment through parts of a dressing's motion, from given states."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.plant.motion import DressingMotion
+from drake_dress.models.cloth.filtered_cg import SLIP, STICK
+from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A garment through one part of a motion.
+
+    Attributes:
+        state: at the end.
+        grippers: (2,3) mean force of the garment on left and right gripper over the part, N.
+        person: (3,) mean force of the garment on the person, N.
+        step: (K,) what the steps took, s.
+        iterations: mean of the linear solver's, a step.
+    """
+
+    state: ClothState
+    grippers: FloatArray
+    person: FloatArray
+    step: FloatArray
+    iterations: float
+
+
+def replay(
+    cloth: Integrator,
+    mesh: GarmentMesh,
+    motion: DressingMotion,
+    x: FloatArray,
+    v: FloatArray,
+    begin: float,
+    duration: float,
+) -> Replayed:
+    """Returns how the garment comes out of a part of the motion.
+
+    Args:
+        cloth: steps it.
+        mesh: of it; its grasp is held.
+        motion: of grippers and person.
+        x: (n,3) nodes at the begin, m.
+        v: (n,3) their velocities, m/s.
+        begin: of the part, s.
+        duration: of it, s.
+    """
+    h = cloth.time_step
+    side = np.repeat([0, 1], [len(mesh.grasp[s]) for s in SIDES])
+    offset = x[cloth.held] - motion.grippers_at(begin)[side]
+    state = ClothState.at_rest(x)
+    state = ClothState(state.x, v.copy(), state.mode, state.reaction, state.owner, state.solver)
+    count = round(duration / h)
+    pulled, pressed = np.zeros((2, 3)), np.zeros(3)
+    took, iterations = np.empty(count), []
+    for k in range(count):
+        now = begin + k * h
+        person = motion.person_at(now)
+        goal = motion.grippers_at(now + h)[side] + offset
+        held = (goal - state.x[cloth.held]) / h
+        start = time.perf_counter()
+        state, info = cloth.step(state, person, held)
+        took[k] = time.perf_counter() - start
+        iterations.append(getattr(info, "cg_iterations", np.nan))
+        for i in (0, 1):
+            pulled[i] -= state.reaction[cloth.held[side == i]].sum(axis=0)
+        touching = (state.mode == STICK) | (state.mode == SLIP)
+        pressed -= state.reaction[touching].sum(axis=0)
+    return Replayed(
+        state,
+        pulled / count,
+        pressed / count,
+        took,
+        float(np.mean(iterations)),
+    )
