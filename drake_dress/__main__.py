@@ -46,6 +46,7 @@ BENCHMARKS = {
     "inputs": "what becomes of drawn bad scenarios, garment files, measured logs and messages",
     "killed": "what runs leave that are killed, terminated or out of disk",
     "local": "constrained DDP beside the exact optimum",
+    "delay": "how long plans take on this machine",
     "plant": "how far the plant's garment is from a finer one, and what its steps take",
     "mutation": "faults put into central modules, and whether tests notice them",
 }

@@ -26,6 +26,7 @@ from drake_dress.diagrams.station import (
 from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.local_control import LocalController, constrained_ddp
 from drake_dress.models.control.local_model import LocalParameters
@@ -260,6 +261,7 @@ def controller_policy(
         committed_steps=round(g.delay / g.time_step),
         max_speed=g.max_speed,
         plans=c.method != "local",
+        budget=solve_budget(scenario),
         weights=Weights(**vars(g.weights)),
         tasks=TaskParameters(
             progress_rate=g.progress_step / g.time_step,
@@ -268,6 +270,14 @@ def controller_policy(
         ),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
+
+
+def solve_budget(scenario: schema.Scenario) -> Budget:
+    """Returns what a plan may take: work in simulation, time where the world does not wait."""
+    g = scenario.controller.global_mpc
+    if scenario.station.kind == "hardware":
+        return Budget(seconds=g.delay_share * g.delay)
+    return Budget(iterations=g.budget)
 
 
 # Between the joints that are predicted for the local controller, s.

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import h5py
 import numpy as np
 import numpy.typing as npt
+import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.hdf5_state import Hdf5State, look_at
@@ -251,6 +253,15 @@ class RunLog:
         """Returns (T,) s of the `global` or `local` controller, NaN where no solve ended."""
         name = f"/control/{controller}/solve_time"
         return self._read(name) if name in self.file else np.full(len(self), np.nan)
+
+    @cached_property
+    def plan_delay(self) -> float | None:
+        """From what a plan answers to its use, s, as the scenario has it; None where it does not."""
+        try:
+            scenario: Any = yaml.safe_load(self.scenario_text)
+            return float(scenario["controller"]["global_mpc"]["delay"])
+        except (yaml.YAMLError, KeyError, TypeError, ValueError):
+            return None
 
     def solves(self, controller: str) -> npt.NDArray[np.int64]:
         """Returns (T,) how many solves of it ended since the sample before.

@@ -199,6 +199,8 @@ def _pace(summary: dict[str, Any]) -> str:
         median = _figure(solve.get("median"), "{:.1f} ms")
         p99 = _figure(solve.get("p99"), "{:.1f} ms")
         rows.append((f"{name} controller", f"{rate}, solves {median} (median), {p99} (99 %)"))
+    late = summary.get("late_plans")
+    rows.append(("plans later than is modelled", _figure(late, "{:.0f} %", 100.0)))
     if "command_rate_hz" in summary:
         latency = summary["command_latency_ms"]
         rate = _figure(summary["command_rate_hz"], "{:.1f} Hz")

@@ -60,7 +60,8 @@ def summarize(
     over the edges of |length / rest length - 1|, at its worst sample; `max_edge_strain_all` the
     worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
-    time from which both sleeves stay on (s and linking number). `safety_cut_s` is, for each side
+    time from which both sleeves stay on (s and linking number). `late_plans` is the share of the
+    global controller's solves that took longer than the delay that is modelled. `safety_cut_s` is, for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
     where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
     sending of a status to the command that answers it), `start_up_s` (to the first command),
@@ -117,6 +118,7 @@ def summarize(
             "median": 1e3 * float(np.median(solve)) if len(solve) else None,
             "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
         }
+    summary["late_plans"] = _late_plans(log)
     summary["safety_cut_s"] = _safety_cuts(log)
     summary |= _command_figures(log) | _arm_figures(arms)
     return summary | {"seed": log.seed, "version": log.version}
@@ -193,6 +195,15 @@ def _to_shoulder(log: RunLog, side: Side) -> float | None:
     if not (np.isfinite(s) and np.isfinite([shoulder, elbow, hand]).all()):
         return None
     return ArmAxis(hand, elbow, shoulder).to_shoulder(float(s))
+
+
+def _late_plans(log: RunLog) -> float | None:
+    """Returns which share of the global solves took longer than is modelled."""
+    solve = log.solve_time("global")
+    solve = solve[np.isfinite(solve)]
+    if log.plan_delay is None or not len(solve):
+        return None
+    return float(np.mean(solve > log.plan_delay))
 
 
 def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:

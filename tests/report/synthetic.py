@@ -114,13 +114,19 @@ def stretched(sample: Sample, garment: GarmentMesh, factor: float) -> Sample:
     return replace(sample, garment_position=middle + factor * (position - middle))
 
 
-def write(path: Path, garment: GarmentMesh, samples: list[Sample], seed: int = 3) -> Path:
+def write(
+    path: Path,
+    garment: GarmentMesh,
+    samples: list[Sample],
+    seed: int = 3,
+    scenario: str = "seed: 3\n",
+) -> Path:
     """Writes samples to a log and returns its path."""
     _, _, radius = capsules(dressed_joints(garment))
     with RunLogWriter(
         path,
         garment=garment,
-        scenario_text="seed: 3\n",
+        scenario_text=scenario,
         version="0.0",
         seed=seed,
         radius=np.full(6, ARM_RADIUS),

@@ -34,6 +34,9 @@ KEYS = {
     "global_rate_hz",
     "local_rate_hz",
     "global_solve_ms",
+    "late_plans",
+    "armhole_to_shoulder_left_m",
+    "armhole_to_shoulder_right_m",
     "local_solve_ms",
     "seed",
     "version",
@@ -100,6 +103,14 @@ def test_what_safety_cut_is_summed_by_side_and_flag(summary_of, garment):
         "left": {"force": pytest.approx(1.0), "braking": pytest.approx(0.5)},
         "right": {},
     }
+
+
+@pytest.mark.parametrize(("delay", "late"), [("0.2", 1.0), ("0.4", 0.0), ("soon", None)])
+def test_plans_are_late_that_took_longer_than_was_modelled(tmp_path, garment, delay, late):
+    scenario = f"controller: {{global_mpc: {{delay: {delay}}}}}\n"
+    path = synthetic.write(tmp_path / "run.h5", garment, _dressed(garment), scenario=scenario)
+    with RunLog.open(path) as log:
+        assert summarize(log, wall_time=20.0)["late_plans"] == late
 
 
 def test_one_sleeve_is_no_success(summary_of, garment):

@@ -4,6 +4,7 @@ The file is held against the schema's types, filled in by Drake, and then held a
 against itself.
 """
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,14 @@ from drake_dress.diagrams.scenario.checks import (
     check_hardware,
     check_safety,
 )
-from drake_dress.diagrams.scenario.schema import Scenario
+from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
+from drake_dress.plan_delay import kept_plan_delay
 from drake_dress.text_file import read_text
 from drake_dress.yaml_text import read_yaml, write_yaml
+
+_DELAY, _MEASURED = "controller.global_mpc.delay", "measured"
 
 
 def load_scenario(
@@ -41,6 +45,7 @@ def load_scenario(
         _override(content, key, text)
     if seed is not None:
         content["seed"] = seed
+    _resolve_delay(source, content)
     content = typed(source, "", content, Scenario)
     try:
         scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))
@@ -83,8 +88,35 @@ def _override(content: dict[str, Any], key: str, text: str) -> None:
         place = place[name]
         if not isinstance(place, dict):
             raise UserError("--set", key, f"{name} holds a value, expected keys below it")
+    if key == _DELAY and value == _MEASURED:
+        place[last] = value
+        return
     hint = field_type("--set", ".".join(parents), last, schema)
     place[last] = typed("--set", key, value, hint)
+
+
+def _resolve_delay(source: str, content: dict[str, Any]) -> None:
+    """Writes the delay that plans have on this machine in place of the word that asks for it.
+
+    The scenario that is logged has the number, so that its run can be repeated anywhere.
+    """
+    place: Any = content
+    for name in _DELAY.split(".")[:-1]:
+        place = place.get(name) if isinstance(place, dict) else None
+    if not isinstance(place, dict) or place.get("delay") != _MEASURED:
+        return
+    seconds = kept_plan_delay()
+    if seconds is None:
+        raise UserError(
+            source,
+            _DELAY,
+            f"is {_MEASURED}, and nothing was measured on this machine; "
+            "run drake-dress bench delay first, or write a number of s",
+        )
+    step = place.get("time_step", GlobalMpc.time_step)
+    if not isinstance(step, int | float) or isinstance(step, bool) or not 0.0 < step < math.inf:
+        return  # told when types and ranges are looked at
+    place["delay"] = round(step * max(1, math.ceil(seconds / step - 1e-9)), 9)
 
 
 def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:

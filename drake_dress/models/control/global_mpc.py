@@ -18,6 +18,7 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.control.budget import Budget, Spending
 from drake_dress.models.control.corridor import Corridor, corridor_cost
 from drake_dress.models.dressing.sleeve import (
     Entry,
@@ -27,6 +28,8 @@ from drake_dress.models.dressing.sleeve import (
     sleeve_state,
     sleeve_state_vjp,
 )
+
+UNLIMITED = Budget()
 
 
 @dataclass(frozen=True)
@@ -106,10 +109,11 @@ class Plan:
         velocity: (N,2,3) of left and right gripper, m/s, world.
         cost: reached; initial_cost: of the start.
         iterations: accepted gradient steps; evaluations: rollouts.
-        reason: why the descent stopped: "small_step", "no_descent" or "iterations"; "no_plan" if
-            none was asked for.
+        reason: why the descent stopped: "small_step", "no_descent", "iterations" or "budget";
+            "no_plan" if none was asked for.
         armhole: (N,2,3) predicted armhole centres, m.
         force: (N,2) predicted gripper force, N.
+        work: iterations of linear solves that it took.
     """
 
     velocity: FloatArray
@@ -120,6 +124,7 @@ class Plan:
     reason: str
     armhole: FloatArray
     force: FloatArray
+    work: int = 0
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,10 @@ class _Rollout:
     reaction: list[FloatArray]
     sleeves: list[tuple[SleeveState, SleeveState]]
     force: FloatArray
+
+    def iterations(self) -> int:
+        """Returns those of the linear solves of its steps so far, those of gradients counted."""
+        return sum(tape.system.iterations for tape in self.tapes)
 
 
 class GlobalController:
@@ -187,8 +196,12 @@ class GlobalController:
         guess: FloatArray,
         committed_steps: int = 0,
         leftward: FloatArray | None = None,
+        budget: Budget = UNLIMITED,
     ) -> Plan:
-        """Returns the plan that gradient descent reaches from `guess`.
+        """Returns the plan that gradient descent reaches from `guess` within a budget.
+
+        The guess is rolled out whatever the budget is. What goes beyond is done where the budget
+        has as much left as the last such part took.
 
         Args:
             x: (n,3) garment now, m.
@@ -198,35 +211,47 @@ class GlobalController:
             guess: (N,2,3) velocities to start from, m/s.
             committed_steps: the first steps of `guess` that are on their way already and stay.
             leftward: (N,3) horizontal unit vectors to the person's left; None: nothing is level.
+            budget: of the solve.
         """
         h, n = self.cloth.time_step, self.horizon
+        spending = Spending(budget)
         velocity = _limited(guess, self.max_speed)
         now = self._rollout(x, v, velocity, targets, obstacles, leftward)
+        rolling = spending.charge(now.iterations())
+        descending = rolling
         initial, evaluations, iterations, reason = now.cost, 1, 0, "iterations"
         # A velocity at step j moves every later state: curvature of the position cost.
         remaining = np.arange(n, 0, -1.0)
         scale = 1.0 / (2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed))
         length = 1.0
         while iterations < self.max_iterations:
+            if not spending.allows(descending, rolling):
+                reason = "budget"
+                break
+            before = now.iterations()
             gradient = self._gradient(now, velocity, targets, obstacles, leftward)
+            descending = spending.charge(now.iterations() - before)
             gradient[:committed_steps] = 0.0
             descent = scale[:, None, None] * gradient
-            accepted = False
+            accepted = afforded = False
             for _ in range(5):
+                afforded = spending.allows(rolling)
+                if not afforded:
+                    break
                 trial_velocity = _limited(velocity - length * descent, self.max_speed)
                 moved = trial_velocity - velocity
                 if np.abs(moved).max() < 1e-3 * self.max_speed:
                     break
                 trial = self._rollout(x, v, trial_velocity, targets, obstacles, leftward)
+                rolling = spending.charge(trial.iterations())
                 evaluations += 1
                 if trial.cost < now.cost + 1e-4 * float(np.sum(gradient * moved)):
                     accepted = True
                     break
                 length *= 0.4
             if not accepted:
-                reason = (
-                    "small_step" if np.abs(moved).max() < 1e-3 * self.max_speed else "no_descent"
-                )
+                small = afforded and np.abs(moved).max() < 1e-3 * self.max_speed
+                reason = "small_step" if small else "no_descent" if afforded else "budget"
                 break
             gained = now.cost - trial.cost
             velocity, now = trial_velocity, trial
@@ -236,7 +261,15 @@ class GlobalController:
                 reason = "small_step"
                 break
         return Plan(
-            velocity, now.cost, initial, iterations, evaluations, reason, now.armhole, now.force
+            velocity,
+            now.cost,
+            initial,
+            iterations,
+            evaluations,
+            reason,
+            now.armhole,
+            now.force,
+            spending.iterations,
         )
 
     def _rollout(

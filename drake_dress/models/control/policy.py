@@ -9,6 +9,7 @@ import numpy as np
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.global_mpc import GlobalController, Plan, Weights
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
 from drake_dress.models.control.task_parameters import TaskParameters
@@ -34,6 +35,7 @@ class PolicyParameters:
         tasks: where sleeves are asked to go.
         plans: whether the garment is asked at all; if not, plans are to rest, and the local
             controller is left to itself.
+        budget: of a solve.
     """
 
     time_step: float = 0.1
@@ -45,6 +47,7 @@ class PolicyParameters:
     weights: Weights = field(default_factory=Weights)
     tasks: TaskParameters = field(default_factory=TaskParameters)
     plans: bool = True
+    budget: Budget = field(default_factory=Budget)
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,9 @@ class DressingPolicy:
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
         leftward = np.stack([heading(q).leftward for q in joints[1:]])
-        plan = self.controller.solve(x, v, targets, obstacles, guess, p.committed_steps, leftward)
+        plan = self.controller.solve(
+            x, v, targets, obstacles, guess, p.committed_steps, leftward, p.budget
+        )
         return replace(state, stages=stages, velocity=plan.velocity), Decision(
             plan, assignment, target
         )

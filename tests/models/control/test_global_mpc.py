@@ -10,8 +10,9 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.corridor import Corridor
-from drake_dress.models.control.global_mpc import GlobalController, SleeveTarget, Weights
+from drake_dress.models.control.global_mpc import GlobalController, Plan, SleeveTarget, Weights
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -120,6 +121,37 @@ def test_plan_lowers_its_cost_and_keeps_the_speed_limit(
     assert plan.cost < 0.9 * plan.initial_cost
     assert np.linalg.norm(plan.velocity, axis=2).max() <= 0.15 + 1e-12
     assert plan.reason in ("small_step", "no_descent", "iterations")
+
+
+def test_a_plan_is_as_good_as_its_budget_allows(
+    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
+) -> None:
+    """What is there when the budget is spent is used; more never makes a plan worse."""
+    controller, x, targets = setting
+    start = np.full((HORIZON, 2, 3), 0.01)
+
+    def solved(budget: Budget) -> Plan:
+        return controller.solve(
+            x, np.zeros_like(x), targets, [_beside(x[0])] * HORIZON, start, budget=budget
+        )
+
+    whole = solved(Budget())
+    assert whole.reason != "budget" and whole.evaluations > 3 and whole.work > 0
+    first = solved(Budget(iterations=1))
+    assert (first.reason, first.evaluations, first.iterations) == ("budget", 1, 0)
+    np.testing.assert_array_equal(first.velocity, start)
+    costs = [first.cost]
+    for share in np.linspace(0.2, 1.0, 9):
+        budget = Budget(iterations=int(share * whole.work))
+        plan = solved(budget)
+        again = solved(budget)
+        np.testing.assert_array_equal(plan.velocity, again.velocity)
+        assert plan.work <= max(first.work, 1.2 * share * whole.work)
+        costs.append(plan.cost)
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < costs[0]
+    np.testing.assert_array_equal(solved(Budget(iterations=10**9)).velocity, whole.velocity)
+    assert solved(Budget(seconds=0.0)).evaluations == 1
 
 
 def test_plan_turns_a_garment_back_that_is_on_edge(

@@ -55,7 +55,6 @@ class ConjugateGradientSystem(FilteredSystem):
         super().__init__(scheme, block)
         self._scheme = scheme
         self._factor: Factor = scheme.held_factor
-        self.iterations = 0
 
     def touch(self, nodes: IntArray) -> None:
         """See `StepSystem`."""

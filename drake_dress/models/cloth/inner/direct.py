@@ -82,6 +82,7 @@ class DirectSystem(FilteredSystem):
         if key not in self._factors:
             basis = self._free_rows(stick, slip, normal)
             self._factors[key] = basis, spla.splu(sp.csc_matrix(basis.T @ self._matrix @ basis))
+        self.iterations += 1
         basis, factor = self._factors[key]
         inner = factor.solve(basis.T @ (rhs.ravel() - self._matrix @ fixed.ravel()))
         z: FloatArray = fixed + (basis @ inner).reshape(-1, 3)

@@ -28,7 +28,13 @@ Unknown = Any
 
 
 class StepSystem(Protocol):
-    """The system of one step; made by `InnerIteration.at`, used for that step and its adjoint."""
+    """The system of one step; made by `InnerIteration.at`, used for that step and its adjoint.
+
+    Attributes:
+        iterations: of linear solves so far, forward and backward.
+    """
+
+    iterations: int
 
     def start(
         self,

@@ -68,6 +68,7 @@ class FilteredSystem(ABC):
         self._base = scheme
         self._block = block
         self._nodes = np.zeros(0, dtype=np.int32)
+        self.iterations = 0
 
     @abstractmethod
     def start(

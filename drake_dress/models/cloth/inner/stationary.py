@@ -145,6 +145,7 @@ class StationarySystem(FilteredSystem):
         still = np.zeros((len(self._held), 3))
         blank = np.zeros_like(rhs)
         unknown.steps, unknown.iterates = [], []
+        self.iterations += self._scheme.iterations
         for _ in range(self._scheme.iterations):
             unknown.iterates.append(z)
             correction, other = self._p.start((rhs - self.product(z), still), (blank, still))

@@ -1,0 +1,67 @@
+"""Measures how long plans take on this machine, and keeps it.
+
+    drake-dress bench delay
+
+`controller.global_mpc.delay: measured` takes what is kept: a delay that 95 % of the solves keep.
+Nothing else should run meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cloth.table import Table
+from benchmarks.parser import OneLineParser, exit_with
+from drake_dress.errors import UserError
+from drake_dress.plan_delay import SHARE, keep_plan_delay
+from drake_dress.report.log import RunLog
+
+_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a dressing and keeps its solve times' quantile; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    with tempfile.TemporaryDirectory() as out:
+        command = [sys.executable, "-m", "drake_dress", "run", str(options.scenario)]
+        command += ["--no-meshcat", "--no-report", "--out", out]
+        for item in options.set:
+            command += ["--set", item]
+        done = subprocess.run(command, stdout=subprocess.DEVNULL, text=True, check=False)
+        if done.returncode not in (0, 1):
+            return done.returncode
+        with RunLog.open(Path(out) / "run.h5") as log:
+            solve = log.solve_time("global")
+    solve = solve[np.isfinite(solve)]
+    try:
+        seconds, path = keep_plan_delay(solve)
+    except ValueError as error:
+        raise UserError("bench", "delay", str(error)) from None
+    at = [0.5, SHARE, 0.99]
+    row = [len(solve), *(float(1e3 * np.quantile(solve, q)) for q in at)]
+    header = ["solves", *(f"{100 * q:g} % within, ms" for q in at)]
+    print(Table("Solves of the global controller", header, [row]).text())
+    print(f"\nkept: {1e3 * seconds:.0f} ms in {path}")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="drake-dress bench delay",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    return parser
+
+
+if __name__ == "__main__":
+    exit_with(main)
