@@ -256,7 +256,7 @@ class RunLog:
 
     @cached_property
     def plan_delay(self) -> float | None:
-        """From what a plan answers to its use, s, as the scenario has it; None where it does not."""
+        """From what a plan answers to its use, s; None where the scenario does not say it."""
         try:
             scenario: Any = yaml.safe_load(self.scenario_text)
             return float(scenario["controller"]["global_mpc"]["delay"])

@@ -61,7 +61,8 @@ def summarize(
     worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
     time from which both sleeves stay on (s and linking number). `late_plans` is the share of the
-    global controller's solves that took longer than the delay that is modelled. `safety_cut_s` is, for each side
+    global controller's solves that took longer than the delay that is modelled. `safety_cut_s` is,
+    for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
     where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
     sending of a status to the command that answers it), `start_up_s` (to the first command),
