@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
+from benchmarks.cluster import completed_on
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import END, around, begin, write_between
 from benchmarks.side_by_side import completed
-from drake_dress.interrupt import caught_interrupt
+from drake_dress.errors import UserError
+from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.report.summary import read_summary
 
 
@@ -52,6 +55,14 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument(
         "--keep", type=output_folder, metavar="DIR", help="keep logs, reports and replays"
+    )
+    parser.add_argument(
+        "--keep-failures", action="store_true", help="keep those of runs that did not succeed"
+    )
+    parser.add_argument(
+        "--ray",
+        metavar="ADDRESS",
+        help="run on a Ray cluster: auto, its address, or local to start one here",
     )
     parser.add_argument("--json", type=output_file, metavar="FILE", help="results, resumed from")
     parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
@@ -103,15 +114,10 @@ def carry_out(
         print(said)
     print(f"{len(cases)} runs, {len(missing)} of them not run yet", flush=True)
     stopped = None
+    if options.keep_failures and options.keep is None:
+        raise UserError("bench", "--keep-failures", "expected --keep DIR with it")
     if not options.kept:
-        stopped = _run_all(
-            missing,
-            kept,
-            lambda c: run(c, options.keep, options.set),
-            options.jobs,
-            options.json,
-            tell,
-        )
+        stopped = _run_all(_Runs(run, options), missing, kept, tell)
     results = [kept[case.name] for case in cases if case.name in kept]
     shown = "\n\n".join(filter(None, (said, *(t.text() for t in tables(results) if t.rows))))
     print(f"\n{shown}", flush=True)
@@ -161,16 +167,68 @@ def run_case(
         return {"case": asdict(case), "status": status, "summary": summary, **look(out)}
 
 
+@dataclass(frozen=True)
+class _Runs(Generic[C]):
+    """Runs cases on this machine or on a cluster, and keeps the files that are wanted."""
+
+    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
+    options: argparse.Namespace
+
+    def completed(self, cases: Sequence[C], stop: Interrupt) -> Iterator[tuple[C, dict[str, Any]]]:
+        """Yields each case with its result as soon as it is done."""
+        keep, settings = self.options.keep, tuple(self.options.set)
+        if self.options.ray is None:
+            for case, result in completed(self._here, cases, self.options.jobs, stop):
+                if keep is not None and not self._keeps(result):
+                    shutil.rmtree(keep / case.name, ignore_errors=True)
+                yield case, result
+            return
+        afar = _Afar(self.run, settings, keep is not None, self.options.keep_failures)
+        bring = None if keep is None else self._bring
+        yield from completed_on(self.options.ray, afar, cases, stop, bring)
+
+    def _here(self, case: C) -> dict[str, Any]:
+        return self.run(case, self.options.keep, self.options.set)
+
+    def _keeps(self, result: dict[str, Any]) -> bool:
+        return not self.options.keep_failures or not _succeeded(result)
+
+    def _bring(self, case: C, files: Mapping[str, bytes]) -> None:
+        for name, content in files.items():
+            path = self.options.keep / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
+@dataclass(frozen=True)
+class _Afar(Generic[C]):
+    """Runs a case on a node; what is not kept is left out of its folder."""
+
+    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
+    settings: tuple[str, ...]
+    kept: bool
+    failures_only: bool
+
+    def __call__(self, case: C, folder: Path) -> dict[str, Any]:
+        result = self.run(case, folder if self.kept else None, self.settings)
+        if self.failures_only and _succeeded(result):
+            shutil.rmtree(folder / case.name, ignore_errors=True)
+        return result
+
+
+def _succeeded(result: dict[str, Any]) -> bool:
+    return bool(result.get("summary", {}).get("success", False))
+
+
 def _run_all(
+    runs: _Runs[C],
     new: Sequence[C],
     kept: dict[str, dict[str, Any]],
-    run: Callable[[C], dict[str, Any]],
-    jobs: int,
-    path: Path | None,
     tell: Callable[[dict[str, Any]], str],
 ) -> int | None:
+    path = runs.options.json
     with caught_interrupt() as stop:
-        for number, (case, result) in enumerate(completed(run, new, jobs, stop), 1):
+        for number, (case, result) in enumerate(runs.completed(new, stop), 1):
             kept[case.name] = result
             if path is not None:
                 # what failed to run is run again

@@ -10,6 +10,9 @@ import argparse
 from collections.abc import Sequence
 
 from benchmarks.dressing.cases import COATS, METHODS, PERSONS, VARIATIONS, Case, cases, run
+from benchmarks.dressing.drawn import drawn
+from benchmarks.dressing.page import study_page
+from benchmarks.dressing.parquet import write_table
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.parser import OneLineParser, exit_with, output_file
 from benchmarks.seeds import add_seed_options, chosen_seeds
@@ -25,6 +28,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     seeds, said = chosen_seeds(options)
     chosen = cases(options.methods, options.persons, options.coats, seeds, options.variation)
     results, stopped = carry_out(options, _NAME, Case, chosen, run, tables, said=said)
+    done = [r for r in results if "summary" in r]
+    if options.table:
+        write_table(options.table, done, drawn)
+    if options.page:
+        write_text(options.page, study_page(done, drawn, options.page))
     if options.plot:
         write_text(options.plot, figure(results))
     return exit_status(results, stopped)
@@ -41,6 +49,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_seed_options(parser, range(13))
     add_study_options(parser, _NAME)
+    parser.add_argument(
+        "--table", type=output_file, metavar="FILE", help="all runs with what was drawn, Parquet"
+    )
+    parser.add_argument(
+        "--page", type=output_file, metavar="FILE", help="maps of success, and failures, HTML"
+    )
     parser.add_argument(
         "--plot", type=output_file, metavar="FILE", help="s, l and force over time, SVG"
     )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.study import run_case
+from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
@@ -71,6 +72,21 @@ def cases(
     ]
 
 
+def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
+    """Returns KEY=VALUE for the scenario of a case."""
+    return [
+        f"controller.method={case.method}",
+        f"garment.coat={COATS[case.coat]}",
+        f"variation={VARIATIONS[case.variation]}",
+        *overrides,
+    ]
+
+
+def scenario_of(case: Case, overrides: Sequence[str] = ()) -> Scenario:
+    """Returns the scenario of a case, with its variation to draw."""
+    return load_scenario(_SCENARIOS / PERSONS[case.person], settings_of(case, overrides), case.seed)
+
+
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Returns what one run came to.
 
@@ -79,13 +95,14 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
         keep: folder for its log, report and replay; None to keep none.
         overrides: further KEY=VALUE for the scenario.
     """
-    settings = [
-        f"controller.method={case.method}",
-        f"garment.coat={COATS[case.coat]}",
-        f"variation={VARIATIONS[case.variation]}",
-        *overrides,
-    ]
-    return run_case(case, _SCENARIOS / PERSONS[case.person], keep, settings, case.seed, _measured)
+    return run_case(
+        case,
+        _SCENARIOS / PERSONS[case.person],
+        keep,
+        settings_of(case, overrides),
+        case.seed,
+        _measured,
+    )
 
 
 def _measured(out: Path) -> dict[str, Any]:

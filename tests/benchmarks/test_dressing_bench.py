@@ -6,7 +6,19 @@ from dataclasses import asdict
 import pytest
 
 from benchmarks.dressing import __main__ as bench
-from benchmarks.dressing.cases import _SCENARIOS, COATS, METHODS, PERSONS, VARIATIONS, Case, cases
+from benchmarks.dressing.cases import (
+    _SCENARIOS,
+    COATS,
+    METHODS,
+    PERSONS,
+    VARIATIONS,
+    Case,
+    cases,
+    scenario_of,
+)
+from benchmarks.dressing.drawn import drawn
+from benchmarks.dressing.page import MAPS, study_page
+from benchmarks.dressing.parquet import write_table
 from benchmarks.dressing.tables import figure, tables
 from benchmarks.statistics import wilson
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
@@ -99,6 +111,30 @@ def test_tables_count_what_was_dressed_and_say_why_not():
     assert beside.rows == [["local", 1, 0, 1, 0, 0, None]]
     assert reasons.rows == [["local", "left sleeve not on", 1]]
     assert figure(results).lstrip().startswith("<?xml")
+
+
+def test_a_study_has_a_page_and_a_table_of_all_runs(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    results = [
+        result(seed=k, success=k != 1, reason=None if k != 1 else "left <sleeve> not on: s = 1")
+        for k in range(6)
+    ]
+    kept = tmp_path / "runs" / "full-dummy-jacket-1-all"
+    kept.mkdir(parents=True)
+    (kept / "replay.html").write_text("")
+    page = study_page(results, drawn, tmp_path / "page.html")
+    assert "5 of 6 dressed" in page
+    assert page.count("<img") == len(MAPS)
+    assert 'href="runs/full-dummy-jacket-1-all/replay.html"' in page
+    assert "left &lt;sleeve&gt; not on" in page
+    write_table(tmp_path / "runs.parquet", results, drawn)
+    table = pq.read_table(tmp_path / "runs.parquet").to_pylist()
+    assert [row["seed"] for row in table] == list(range(6))
+    for row, r in zip(table, results, strict=True):
+        scenario = apply_variation(scenario_of(Case(**r["case"])))
+        assert row["success"] == r["summary"]["success"]
+        assert row["drawn.fabric_friction"] == scenario.plant.material.friction
+        assert row["drawn.body_upper_arm_length"] == scenario.person.measures.upper_arm_length
 
 
 def test_methods_are_held_against_full_where_all_else_is_the_same():

@@ -3,15 +3,14 @@
 Each group of keys has draws of its own, so that a width of one does not change what another draws.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
-from pydrake.common.yaml import yaml_load_typed
 
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
 from drake_dress.diagrams.scenario.schema import Coat, Measures, Scenario, Variation
-from drake_dress.diagrams.scenario.text import resolved_yaml
 
 # Of the groups that came after the first, beside the seed.
 _COAT, _PERSON = 1, 2
@@ -21,7 +20,7 @@ Draw = Callable[[float], float]
 
 def apply_variation(scenario: Scenario) -> Scenario:
     """Returns the scenario with what its seed draws written in and no variation left."""
-    drawn: Scenario = yaml_load_typed(schema=Scenario, data=resolved_yaml(scenario))
+    drawn = copy.deepcopy(scenario)
     v, draw = scenario.variation, _uniform(scenario.seed)
     for arm in (drawn.person.left_arm, drawn.person.right_arm):
         arm.abduction_deg += draw(v.arm_angle_deg)

@@ -1,0 +1,43 @@
+"""What a run's seed drew: the numbers by which runs of a study differ."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from benchmarks.dressing.cases import Case, scenario_of
+from drake_dress.diagrams.scenario import Scenario, apply_variation
+from drake_dress.diagrams.scenario.coat import coat_parameters
+
+
+def drawn(case: Case) -> dict[str, float]:
+    """Returns the measures, angles and values of a run by their names, in SI units and degrees."""
+    scenario = _scenario(replace(case, seed=0))
+    return values(apply_variation(replace(scenario, seed=case.seed)))
+
+
+@lru_cache
+def _scenario(case: Case) -> Scenario:
+    return scenario_of(case)
+
+
+def values(scenario: Scenario) -> dict[str, float]:
+    """Returns what varies between scenarios whose variation is drawn."""
+    found: dict[str, float] = {}
+    for side in ("left", "right"):
+        arm = getattr(scenario.person, f"{side}_arm")
+        for name in ("abduction_deg", "extension_deg", "elbow_deg"):
+            found[f"{side}_{name}"] = getattr(arm, name)
+    found |= {f"body_{k}": v for k, v in _numbers(scenario.person.measures).items()}
+    coat = _numbers(coat_parameters(scenario.garment.coat))
+    found |= {f"coat_{k}": v for k, v in coat.items() if not k.startswith("grasp")}
+    fabric = scenario.plant.material
+    found |= {f"fabric_{k}": getattr(fabric, k) for k in ("stretch_stiffness", "friction")}
+    found |= {f"start_{k}": v for k, v in _numbers(scenario.station.start).items()}
+    return found
+
+
+def _numbers(entry: Any) -> dict[str, float]:
+    return {f.name: float(getattr(entry, f.name)) for f in dataclasses.fields(entry)}
