@@ -452,3 +452,22 @@ def test_start_outside_the_limits_of_place_is_told() -> None:
     assert "0.600 m apart" in str(replace(LIMITS, largest_distance=0.5).broken_at(START))
     box = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.3]])
     assert "outside the workspace" in str(replace(LIMITS, workspace=box).broken_at(START))
+
+
+@pytest.mark.parametrize("gripper", [0, 1])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("beyond", "broken"), [(-0.31, True), (0.31, True), (0.29, False), (-0.29, False)]
+)
+def test_a_start_beyond_any_side_of_the_workspace_is_told(
+    gripper: int, axis: int, beyond: float, broken: bool
+) -> None:
+    at = np.array([[0.0, 0.2, 1.0], [0.0, -0.2, 1.0]])
+    box = np.stack([at.min(axis=0) - 0.3, at.max(axis=0) + 0.3])
+    limits = SafetyLimits(workspace=box, least_distance=0.01)
+    assert limits.broken_at(at) is None
+    edge = box[0, axis] + 0.3 if beyond < 0.0 else box[1, axis] - 0.3
+    at[gripper, axis] = edge + beyond
+    told = limits.broken_at(at)
+    assert (told is not None) == broken
+    assert told is None or "outside the workspace" in told
