@@ -1,5 +1,6 @@
 """An estimate is believed if the person that is described can be so, and only then."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points, shoulder_joint
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.fault import Fault
@@ -147,7 +149,14 @@ def test_a_limb_is_told_with_its_length_and_bounds() -> None:
 
 def test_an_elbow_that_bends_backward_is_told() -> None:
     points = person(np.array([0.3, 0.0, np.pi, 1.5]), REST)
-    assert "left arm's " in refused(points)
+    told = refused(points)
+    found = re.search(r"left arm's (\w+) (-?\d+)°, expected (-?\d+) to (-?\d+)°", told)
+    assert found is not None, told
+    angle, low, high = map(int, found.groups()[1:])
+    # wider than the joint's limits: by a supple person's room, and by what errors of points turn
+    limit = np.degrees([bound[JOINT_NAMES.index(found[1])] for bound in (LOW, HIGH)])
+    assert limit[0] - 180.0 < low < limit[0] - 9.0 and limit[1] + 9.0 < high < limit[1] + 180.0
+    assert not low <= angle <= high
 
 
 @settings(max_examples=20, deadline=None)
