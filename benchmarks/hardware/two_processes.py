@@ -22,7 +22,11 @@ from benchmarks.parser import UNUSABLE
 _ROOT = Path(__file__).parents[2]
 _NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
 _BEGUN = "commands come"
+# as drake_dress.diagrams.lab says it, which this process need not import
+_OPEN = "the lab is open"
 _POLL = 0.02
+# For which a lab is left alone whose run has ended before any command, s.
+_ALONE = 5.0
 
 
 @dataclass(frozen=True)
@@ -147,15 +151,20 @@ def _inside(plan: Plan) -> Outcome:
     process = {name: started(name) for name in words}
     memory: dict[str, list[float]] = {"lab": [], "run": []}
     begin, begun, filled = time.monotonic(), None, False
+    alone_since, sent_away = None, False
     while any(p.poll() is None for p in process.values()):
         time.sleep(_POLL)
         now = time.monotonic()
         if now - begin > plan.timeout:
             for p in process.values():
                 p.kill()
-        if process["run"].poll() is not None and begun is None and now - begin > 5.0:
-            # it did not come so far; the lab need not wait for it
-            process["lab"].send_signal(signal.SIGINT)
+        if process["run"].poll() is not None and begun is None:
+            # it did not come so far; the lab, once it is open, need not wait for it
+            if alone_since is None and _OPEN in (out / "lab.log").read_text():
+                alone_since = now
+            if alone_since is not None and now - alone_since > _ALONE and not sent_away:
+                sent_away = True
+                process["lab"].send_signal(signal.SIGINT)
         if begun is None and _BEGUN in (out / "lab.log").read_text():
             begun = now
         if begun is not None and plan.kill_at is not None and now - begun >= plan.kill_at:
