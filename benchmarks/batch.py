@@ -59,7 +59,7 @@ def settled(spacing: float, limbs: Obstacles) -> State:
     """Returns the jacket of a mean edge length, m, after it was lowered on `limbs`."""
     mesh = make_coat(COATS["jacket"], spacing)
     elements = make_elements(mesh.rest_position, mesh.faces)
-    held = np.concatenate([mesh.grasp["left"], mesh.grasp["right"]]).astype(np.int32)
+    held = mesh.held
     motion = np.tile(_STEP * _LOWERING, (len(held), 1))
     cloth = ExplicitBiasCloth(elements, Material(), _STEP, held)
     x, v = mesh.rest_position, np.zeros_like(mesh.rest_position)

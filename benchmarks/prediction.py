@@ -199,7 +199,7 @@ def _cloth(run: Run, belief: GarmentMesh, variant: Variant) -> ExplicitBiasCloth
         make_elements(belief.rest_position, belief.faces),
         material(run.scenario.controller.material),
         variant.time_step,
-        np.concatenate([belief.grasp[side] for side in SIDES]),
+        belief.held,
         tolerance=1e-2,
         iterations=variant.iterations,
     )

@@ -14,6 +14,7 @@ def run_scenario(
     overrides: Sequence[str] = (),
     seed: int | None = None,
     report: bool = True,
+    one_process: bool = True,
 ) -> tuple[int, str]:
     """Returns the exit status, and why the run could not be used (empty where it could).
 
@@ -23,10 +24,12 @@ def run_scenario(
         overrides: KEY=VALUE for the scenario.
         seed: of the run; None for the scenario's own.
         report: whether report and replay are written beside log and summary.
+        one_process: whether it leaves other cores to runs beside it.
     """
     command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
-    # others run beside it
-    command += ["--one-process", "--out", str(out)]
+    command += ["--out", str(out)]
+    if one_process:
+        command.append("--one-process")
     if not report:
         command.append("--no-report")
     if seed is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 from drake_dress.errors import UserError
@@ -13,6 +14,16 @@ END = "<!-- end -->"
 def begin(benchmark: str) -> str:
     """Returns the mark before the part of a benchmark."""
     return f"<!-- bench {benchmark} -->"
+
+
+def add_into_option(parser: argparse.ArgumentParser, benchmark: str) -> None:
+    """Adds `--into`, the file in which a benchmark's tables stand between marks."""
+    parser.add_argument(
+        "--into",
+        type=Path,
+        metavar="FILE.md",
+        help=f"put the tables between {begin(benchmark)} and {END}",
+    )
 
 
 def write_between(path: Path, benchmark: str, text: str) -> None:

@@ -16,7 +16,7 @@ from benchmarks.cluster import completed_on
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
-from benchmarks.section import END, around, begin, write_between
+from benchmarks.section import add_into_option, around, write_between
 from benchmarks.side_by_side import completed
 from drake_dress.errors import UserError
 from drake_dress.interrupt import Interrupt, caught_interrupt
@@ -66,12 +66,7 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
     )
     parser.add_argument("--json", type=output_file, metavar="FILE", help="results, resumed from")
     parser.add_argument("--kept", action="store_true", help="run nothing; tables of what is there")
-    parser.add_argument(
-        "--into",
-        type=Path,
-        metavar="FILE.md",
-        help=f"put the tables between {begin(benchmark)} and {END}",
-    )
+    add_into_option(parser, benchmark)
 
 
 def dressed(summary: dict[str, Any]) -> str:
@@ -117,7 +112,8 @@ def carry_out(
     if options.keep_failures and options.keep is None:
         raise UserError("bench", "--keep-failures", "expected --keep DIR with it")
     if not options.kept:
-        stopped = _run_all(_Runs(run, options), missing, kept, tell)
+        each = _Run(run, options.set, options.keep is not None, options.keep_failures)
+        stopped = _run_all(each, missing, kept, options, tell)
     results = [kept[case.name] for case in cases if case.name in kept]
     shown = "\n\n".join(filter(None, (said, *(t.text() for t in tables(results) if t.rows))))
     print(f"\n{shown}", flush=True)
@@ -168,52 +164,39 @@ def run_case(
 
 
 @dataclass(frozen=True)
-class _Runs(Generic[C]):
-    """Runs cases on this machine or on a cluster, and keeps the files that are wanted."""
+class _Run(Generic[C]):
+    """Runs a case, here or on a node; of one that succeeded files may be left out."""
 
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
-    options: argparse.Namespace
-
-    def completed(self, cases: Sequence[C], stop: Interrupt) -> Iterator[tuple[C, dict[str, Any]]]:
-        """Yields each case with its result as soon as it is done."""
-        keep, settings = self.options.keep, tuple(self.options.set)
-        if self.options.ray is None:
-            for case, result in completed(self._here, cases, self.options.jobs, stop):
-                if keep is not None and not self._keeps(result):
-                    shutil.rmtree(keep / case.name, ignore_errors=True)
-                yield case, result
-            return
-        afar = _Afar(self.run, settings, keep is not None, self.options.keep_failures)
-        bring = None if keep is None else self._bring
-        yield from completed_on(self.options.ray, afar, cases, stop, bring)
-
-    def _here(self, case: C) -> dict[str, Any]:
-        return self.run(case, self.options.keep, self.options.set)
-
-    def _keeps(self, result: dict[str, Any]) -> bool:
-        return not self.options.keep_failures or not _succeeded(result)
-
-    def _bring(self, case: C, files: Mapping[str, bytes]) -> None:
-        for name, content in files.items():
-            path = self.options.keep / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-
-
-@dataclass(frozen=True)
-class _Afar(Generic[C]):
-    """Runs a case on a node; what is not kept is left out of its folder."""
-
-    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
-    settings: tuple[str, ...]
+    settings: Sequence[str]
     kept: bool
     failures_only: bool
 
-    def __call__(self, case: C, folder: Path) -> dict[str, Any]:
-        result = self.run(case, folder if self.kept else None, self.settings)
-        if self.failures_only and _succeeded(result):
+    def __call__(self, case: C, folder: Path | None) -> dict[str, Any]:
+        folder = folder if self.kept else None
+        result = self.run(case, folder, self.settings)
+        if folder is not None and self.failures_only and _succeeded(result):
             shutil.rmtree(folder / case.name, ignore_errors=True)
         return result
+
+
+def _completed(
+    run: _Run[C], cases: Sequence[C], options: argparse.Namespace, stop: Interrupt
+) -> Iterator[tuple[C, dict[str, Any]]]:
+    """Yields each case with its result as soon as it is done, on this machine or on a cluster."""
+    keep: Path | None = options.keep
+    if options.ray is None:
+        yield from completed(lambda case: run(case, keep), cases, options.jobs, stop)
+        return
+
+    def bring(case: C, files: Mapping[str, bytes]) -> None:
+        assert keep is not None
+        for name, content in files.items():
+            path = keep / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+    yield from completed_on(options.ray, run, cases, stop, None if keep is None else bring)
 
 
 def _succeeded(result: dict[str, Any]) -> bool:
@@ -221,14 +204,15 @@ def _succeeded(result: dict[str, Any]) -> bool:
 
 
 def _run_all(
-    runs: _Runs[C],
+    run: _Run[C],
     new: Sequence[C],
     kept: dict[str, dict[str, Any]],
+    options: argparse.Namespace,
     tell: Callable[[dict[str, Any]], str],
 ) -> int | None:
-    path = runs.options.json
+    path = options.json
     with caught_interrupt() as stop:
-        for number, (case, result) in enumerate(runs.completed(new, stop), 1):
+        for number, (case, result) in enumerate(_completed(run, new, options, stop), 1):
             kept[case.name] = result
             if path is not None:
                 # what failed to run is run again

@@ -32,7 +32,7 @@ def overcoat(spacing: float) -> GarmentMesh:
 
 def grasp(mesh: GarmentMesh) -> IntArray:
     """Returns (20,) the held nodes: the left gripper's ten, then the right one's."""
-    return np.concatenate([mesh.grasp["left"], mesh.grasp["right"]]).astype(np.int32)
+    return mesh.held
 
 
 def sheet(columns: int, spacing: float) -> tuple[FloatArray, IntArray]:

@@ -9,8 +9,6 @@ Nothing else should run meanwhile.
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +17,7 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.parser import OneLineParser, exit_with
+from benchmarks.scenario_run import run_scenario
 from drake_dress.errors import UserError
 from drake_dress.plan_delay import SHARE, keep_plan_delay
 from drake_dress.report.log import RunLog
@@ -30,13 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a dressing and keeps its solve times' quantile; returns the exit status."""
     options = _parser().parse_args(arguments)
     with tempfile.TemporaryDirectory() as out:
-        command = [sys.executable, "-m", "drake_dress", "run", str(options.scenario)]
-        command += ["--no-meshcat", "--no-report", "--out", out]
-        for item in options.set:
-            command += ["--set", item]
-        done = subprocess.run(command, stdout=subprocess.DEVNULL, text=True, check=False)
-        if done.returncode not in (0, 1):
-            return done.returncode
+        _, problem = run_scenario(
+            options.scenario, Path(out), options.set, report=False, one_process=False
+        )
+        if problem:
+            raise UserError("bench", "delay", problem)
         with RunLog.open(Path(out) / "run.h5") as log:
             solve = log.solve_time("global")
     solve = solve[np.isfinite(solve)]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -40,4 +39,4 @@ def values(scenario: Scenario) -> dict[str, float]:
 
 
 def _numbers(entry: Any) -> dict[str, float]:
-    return {f.name: float(getattr(entry, f.name)) for f in dataclasses.fields(entry)}
+    return {f.name: float(getattr(entry, f.name)) for f in fields(entry)}

@@ -29,7 +29,7 @@ from benchmarks.parser import (
     seed_number,
     some_of,
 )
-from benchmarks.section import END, around, begin, write_between
+from benchmarks.section import add_into_option, around, write_between
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
@@ -180,12 +180,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="draws at further sizes and noises",
     )
-    parser.add_argument(
-        "--into",
-        type=Path,
-        metavar="FILE.md",
-        help=f"put the tables between {begin(_NAME)} and {END}",
-    )
+    add_into_option(parser, _NAME)
     parser.add_argument(
         "--cache", type=output_folder, default=Path("out/bench-explain"), metavar="DIR"
     )

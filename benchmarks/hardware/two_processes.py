@@ -22,8 +22,6 @@ from benchmarks.parser import UNUSABLE
 _ROOT = Path(__file__).parents[2]
 _NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
 _BEGUN = "commands come"
-# as drake_dress.diagrams.lab says it, which this process need not import
-_OPEN = "the lab is open"
 _POLL = 0.02
 # For which a lab is left alone whose run has ended before any command, s.
 _ALONE = 5.0
@@ -85,10 +83,13 @@ def play(plan: Plan) -> Outcome:
     Raises:
         RuntimeError: they could not be started.
     """
+    # not by the process that only starts others, which would take seconds to import it
+    from drake_dress.diagrams.lab import OPEN
+
     with tempfile.TemporaryDirectory() as place:
         paper, answer = Path(place) / "plan.json", Path(place) / "outcome.json"
         paper.write_text(json.dumps(asdict(plan)), encoding="utf-8")
-        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer}"
+        inside = f"{_NETWORK} && exec {sys.executable} -m {__spec__.name} {paper} {answer} '{OPEN}'"
         done = subprocess.run(
             ["unshare", "-nm", "sh", "-c", inside],
             cwd=_ROOT,
@@ -117,7 +118,7 @@ def play_usable(plan: Plan) -> Outcome:
     return done
 
 
-def _inside(plan: Plan) -> Outcome:
+def _inside(plan: Plan, lab_open: str) -> Outcome:
     out = Path(plan.out)
     run_out = out / "run"
     run_out.mkdir(parents=True, exist_ok=True)
@@ -160,7 +161,7 @@ def _inside(plan: Plan) -> Outcome:
                 p.kill()
         if process["run"].poll() is not None and begun is None:
             # it did not come so far; the lab, once it is open, need not wait for it
-            if alone_since is None and _OPEN in (out / "lab.log").read_text():
+            if alone_since is None and lab_open in (out / "lab.log").read_text():
                 alone_since = now
             if alone_since is not None and now - alone_since > _ALONE and not sent_away:
                 sent_away = True
@@ -221,4 +222,4 @@ def memory_of(pid: int) -> float:
 
 if __name__ == "__main__":
     given = Plan(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given))), encoding="utf-8")
+    Path(sys.argv[2]).write_text(json.dumps(asdict(_inside(given, sys.argv[3]))), encoding="utf-8")

@@ -33,7 +33,7 @@ from benchmarks.parser import (
     seed_number,
     some_of,
 )
-from benchmarks.section import END, around, begin, write_between
+from benchmarks.section import add_into_option, around, write_between
 from benchmarks.side_by_side import completed
 from drake_dress import __version__
 from drake_dress.file_output import write_text
@@ -169,10 +169,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--jobs", type=at_least_one, default=2, metavar="N", help="default 2")
     parser.add_argument("--json", type=output_file, metavar="FILE", help="counts and failures")
-    parser.add_argument(
-        "--into", type=Path, metavar="FILE.md",
-        help=f"put the table between {begin(_NAME)} and {END}",
-    )  # fmt: skip
+    add_into_option(parser, _NAME)
     return parser
 
 

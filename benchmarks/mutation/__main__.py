@@ -31,7 +31,7 @@ from benchmarks.parser import (
     seed_number,
     some_of,
 )
-from benchmarks.section import END, around, begin, write_between
+from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 
@@ -136,12 +136,7 @@ def _parser() -> argparse.ArgumentParser:
         default=Path("out/mutation.json"),
         help="where results are kept; a study goes on from there",
     )
-    parser.add_argument(
-        "--into",
-        type=Path,
-        metavar="FILE.md",
-        help=f"put the table between {begin(_NAME)} and {END}",
-    )
+    add_into_option(parser, _NAME)
     return parser
 
 

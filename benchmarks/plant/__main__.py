@@ -19,14 +19,24 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.parser import OneLineParser, at_least_one, exit_with, output_file, output_folder
-from benchmarks.plant.accuracy import Part, Setting, compared, part_begins, reference_part
+from benchmarks.plant.accuracy import (
+    Part,
+    Setting,
+    compared,
+    part_begins,
+    reference,
+    reference_part,
+)
 from benchmarks.plant.motion import DressingMotion
 from benchmarks.scenario_run import run_scenario
-from benchmarks.section import END, around, begin, write_between
-from drake_dress.diagrams.scenario import Scenario, load_scenario
+from benchmarks.section import add_into_option, around, write_between
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.report.log import RunLog
 
 _NAME = "plant"
@@ -61,10 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if problem:
             raise UserError("bench", "plant", problem)
     motion = DressingMotion.read(run / "run.h5")
+    fine = reference(scenario).of(scenario, folder)
+    coarse = build_garment(scenario.garment, scenario.plant.spacing, folder)
     with caught_interrupt() as stop:
         parts = []
         for number, at in enumerate(part_begins(motion, options.parts), 1):
-            parts.append(_kept_part(options.work, scenario, folder, motion, float(at)))
+            parts.append(_kept_part(options.work, fine, coarse, motion, float(at)))
             print(f"reference: {number}/{options.parts}", flush=True)
             if stop.is_set():
                 return stop.status
@@ -72,8 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for setting in SETTINGS:
             if options.only and setting.name not in options.only:
                 continue
-            for part in parts:
-                results += compared(setting, scenario, folder, motion, [part])
+            for result in compared(setting, scenario, folder, fine[0], motion, parts):
+                results.append(result)
                 if stop.is_set():
                     return stop.status
             print(_line(_row(results, setting.name)), flush=True)
@@ -87,14 +99,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _kept_part(
-    work: Path, scenario: Scenario, folder: Path, motion: DressingMotion, at: float
+    work: Path,
+    fine: tuple[GarmentMesh, Integrator],
+    coarse: GarmentMesh,
+    motion: DressingMotion,
+    at: float,
 ) -> Part:
     path = work / f"reference_{at:.3f}.npz"
     if path.exists():
         with np.load(path) as kept:
             return Part(at, *(kept[k] for k in ("x", "v", "end", "grippers", "person")))
     with RunLog.open(work / "run" / "run.h5") as log:
-        part = reference_part(scenario, folder, log, motion, at)
+        part = reference_part(fine, coarse, log, motion, at)
     arrays = {k: v for k, v in vars(part).items() if k != "begin"}
     unfinished = path.with_name("unfinished.npz")
     np.savez_compressed(unfinished, **arrays)
@@ -157,12 +173,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", action="append", metavar="NAME", help="a setting; all by default")
     parser.add_argument("--work", type=output_folder, default=Path("out/plant"))
     parser.add_argument("--json", type=output_file, metavar="FILE")
-    parser.add_argument(
-        "--into",
-        type=Path,
-        metavar="FILE.md",
-        help=f"put the table between {begin(_NAME)} and {END}",
-    )
+    add_into_option(parser, _NAME)
     return parser
 
 

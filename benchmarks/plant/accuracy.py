@@ -8,8 +8,8 @@ buckles, where the reference departs from itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,14 +47,10 @@ class Setting:
 
     def of(self, scenario: Scenario, folder: Path) -> tuple[GarmentMesh, Integrator]:
         """Returns the scenario's garment with it, and what steps it."""
-        plant = scenario.plant
-        before = (plant.time_step, plant.self_collision)
-        plant.time_step, plant.self_collision = self.time_step, self.self_collision
-        try:
-            mesh = build_garment(scenario.garment, self.spacing, folder)
-            return mesh, plant_integrator(station_parameters(scenario, mesh))
-        finally:
-            plant.time_step, plant.self_collision = before
+        mesh = build_garment(scenario.garment, self.spacing, folder)
+        p = station_parameters(scenario, mesh)
+        p = replace(p, time_step=self.time_step, self_collision=self.self_collision)
+        return mesh, plant_integrator(p)
 
 
 @dataclass(frozen=True)
@@ -81,11 +77,14 @@ def reference(scenario: Scenario) -> Setting:
 
 
 def reference_part(
-    scenario: Scenario, folder: Path, log: RunLog, motion: DressingMotion, begin: float
+    fine: tuple[GarmentMesh, Integrator],
+    coarse: GarmentMesh,
+    log: RunLog,
+    motion: DressingMotion,
+    begin: float,
 ) -> Part:
-    """Returns the reference through one part."""
-    coarse = build_garment(scenario.garment, scenario.plant.spacing, folder)
-    mesh, cloth = reference(scenario).of(scenario, folder)
+    """Returns the reference `fine` through one part of a log of the garment `coarse`."""
+    mesh, cloth = fine
     finer = barycentric_transfer(coarse, mesh)
     sample = int(np.searchsorted(motion.time, begin - _FORGETTING))
     x = finer @ log.garment_position(sample)
@@ -101,18 +100,16 @@ def compared(
     setting: Setting,
     scenario: Scenario,
     folder: Path,
+    fine: GarmentMesh,
     motion: DressingMotion,
     parts: Sequence[Part],
-) -> list[dict[str, Any]]:
-    """Returns for each part how far a garment is off, mm and N, and what its steps took, ms."""
-    fine, _ = reference(scenario).of(scenario, folder)
+) -> Iterator[dict[str, Any]]:
+    """Yields for each part how far a garment is off, mm and N, and what its steps took, ms."""
     mesh, cloth = setting.of(scenario, folder)
     coarser = barycentric_transfer(fine, mesh)
-    found = []
     for part in parts:
         done = replay(cloth, mesh, motion, coarser @ part.x, coarser @ part.v, part.begin, _PART)
-        found.append(_off(done, part, coarser @ part.end) | {"case": asdict(setting)})
-    return found
+        yield _off(done, part, coarser @ part.end) | {"case": asdict(setting)}
 
 
 def _off(done: Replayed, part: Part, end: FloatArray) -> dict[str, Any]:

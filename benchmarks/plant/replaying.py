@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -60,8 +60,7 @@ def replay(
     h = cloth.time_step
     side = np.repeat([0, 1], [len(mesh.grasp[s]) for s in SIDES])
     offset = x[cloth.held] - motion.grippers_at(begin)[side]
-    state = ClothState.at_rest(x)
-    state = ClothState(state.x, v.copy(), state.mode, state.reaction, state.owner, state.solver)
+    state = replace(ClothState.at_rest(x), v=v.copy())
     count = round(duration / h)
     pulled, pressed = np.zeros((2, 3)), np.zeros(3)
     took, iterations = np.empty(count), []

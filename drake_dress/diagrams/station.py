@@ -203,9 +203,8 @@ def make_simulated_station(
         arms = add_arms(plant, {side: p.placement.base(side) for side in SIDES})
     plant.Finalize()
 
-    held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
     hung, grippers = hung_garment(p), start_grippers(p)
-    start = settled(p, hung, held)
+    start = settled(p, hung)
 
     cloth = builder.AddNamedSystem(
         "cloth",
@@ -412,9 +411,8 @@ def robots_at_start(
 
 def plant_integrator(p: StationParameters) -> Integrator:
     """Returns what steps the plant's garment, held by both grippers."""
-    held = np.concatenate([p.mesh.grasp[side] for side in SIDES]).astype(np.int32)
     scheme = Scheme(
-        held,
+        p.mesh.held,
         p.time_step,
         p.integrator == "projective_dynamics",
         p.tolerance,
@@ -430,11 +428,11 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
     )
 
 
-def settled(p: StationParameters, hung: FloatArray, held: np.ndarray) -> FloatArray:
+def settled(p: StationParameters, hung: FloatArray) -> FloatArray:
     """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
-    cloth = _with_effects(p, Scheme(held, p.time_step, damping=_SETTLING_DAMPING))
+    cloth = _with_effects(p, Scheme(p.mesh.held, p.time_step, damping=_SETTLING_DAMPING))
     state = ClothState.at_rest(hung)
-    still = np.zeros((len(held), 3))
+    still = np.zeros((len(p.mesh.held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):
         state, _ = cloth.step(state, Obstacles.none(), still)
     return state.x

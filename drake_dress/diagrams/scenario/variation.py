@@ -62,5 +62,5 @@ def _vary_person(measures: Measures, v: Variation, draw: Draw) -> None:
 
 
 def _uniform(*seed: int) -> Draw:
-    rng = np.random.default_rng(seed[0] if len(seed) == 1 else seed)
+    rng = np.random.default_rng(seed)
     return lambda width: float(width * rng.uniform(-1.0, 1.0))

@@ -88,12 +88,11 @@ class DressingPolicy:
         self.parameters = parameters
         self.person = person
         elements = make_elements(mesh.rest_position, mesh.faces)
-        held = np.concatenate([mesh.grasp[side] for side in SIDES])
         cloth = ExplicitBiasCloth(
             elements,
             material,
             parameters.time_step,
-            held,
+            mesh.held,
             tolerance=1e-2,
             iterations=parameters.inner_iterations,
         )

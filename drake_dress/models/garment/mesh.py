@@ -40,6 +40,11 @@ class GarmentMesh:
     grasp: dict[str, IntArray]
     region: npt.NDArray[np.int8]
 
+    @property
+    def held(self) -> IntArray:
+        """(k,) int32 nodes held by the left, then by the right gripper."""
+        return np.concatenate([self.grasp[side] for side in SIDES]).astype(np.int32)
+
     def scaled(self, factor: float) -> GarmentMesh:
         """Returns the same mesh with every length multiplied by `factor` about the origin.
 
