@@ -90,7 +90,7 @@ def plant_station(
 def described_person(p: StationParameters) -> Person:
     """Returns the person as it is described, in a plant of its own that nobody simulates."""
     return add_person(
-        MultibodyPlant(p.time_step), p.measures, p.posture, p.arms, p.joints, turns=False
+        MultibodyPlant(p.body_time_step), p.measures, p.posture, p.arms, p.joints, turns=False
     )
 
 
@@ -191,7 +191,10 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         mesh=mesh,
         material=material(scenario.plant.material),
         time_step=scenario.plant.time_step,
+        body_time_step=scenario.plant.body_time_step,
         integrator=scenario.plant.integrator,
+        implicitness=scenario.plant.implicitness,
+        buckling_wavelength=scenario.plant.buckling_wavelength,
         iterations=scenario.plant.iterations,
         tolerance=scenario.plant.tolerance,
         self_collision=scenario.plant.self_collision,
@@ -365,7 +368,7 @@ def rates(scenario: schema.Scenario) -> Rates:
         command_period=1.0 / c.command_rate,
         log_period=1.0 / scenario.log.rate,
         arm_period=1.0 / scenario.station.arms.rate,
-        plant_period=scenario.plant.time_step,
+        plant_period=scenario.plant.body_time_step,
     )
 
 

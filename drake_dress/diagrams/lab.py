@@ -317,7 +317,7 @@ def _record(
             [(int(person.body_indices[c.body]), c) for c in person.capsules],
             1.0 / scenario.log.rate,
             1.0 / scenario.controller.command_rate,
-            arm_period=scenario.plant.time_step,
+            arm_period=scenario.plant.body_time_step,
             has_control=False,
         ),
     )

@@ -114,12 +114,14 @@ _SETTLING_DAMPING = 0.03
 class StationParameters:
     """What the simulated station is made of; SI units.
 
+    `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
     `beside`: the garment is stepped in a process of its own.
     """
 
     mesh: GarmentMesh
     material: Material
     time_step: float
+    body_time_step: float
     measures: BodyMeasures
     posture: Posture
     arms: dict[Side, ArmPose]
@@ -133,6 +135,8 @@ class StationParameters:
     integrator: str = "implicit"
     iterations: int = 40
     tolerance: float = 5e-3
+    implicitness: float = 1.0
+    buckling_wavelength: float = 0.0
     self_collision: bool = False
     effects: tuple[Effect, ...] = ()
     placement: ArmPlacement | None = None
@@ -194,7 +198,7 @@ def make_simulated_station(
         ArmReachError: the arms do not reach where the grippers are at first, or will have to be.
     """
     builder = DiagramBuilder()
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.time_step)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.body_time_step)
     body = body_with_effects(p.measures, p.effects)
     person = add_person(plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
     robots = None
@@ -234,7 +238,10 @@ def make_simulated_station(
             gripper = builder.AddNamedSystem(
                 f"{side}_gripper",
                 FloatingGripper(
-                    grippers[i], p.time_step, p.gripper_max_speed, p.gripper_max_acceleration
+                    grippers[i],
+                    p.body_time_step,
+                    p.gripper_max_speed,
+                    p.gripper_max_acceleration,
                 ),
             )
             builder.ExportInput(
@@ -265,7 +272,7 @@ def make_simulated_station(
     for i, side in enumerate(SIDES):
         for quantity in _MOTION:
             first = grippers[i] if quantity == "position" else np.zeros(3)
-            port = delayed(builder, motion[side, quantity], first, p.time_step, late)
+            port = delayed(builder, motion[side, quantity], first, p.body_time_step, late)
             builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
         for quantity in (*_MOTION, "force"):
             builder.ExportOutput(measured[side, quantity], f"{side}_gripper.{quantity}_measured")
@@ -306,7 +313,7 @@ def _wire_drivers(
         model = arms[side].model
         plant.SetDefaultPositions(model, robots.start[i])
         driver = builder.AddNamedSystem(
-            f"{side}_arm_driver", SimPandaDriver(robots.start[i], LIMITS, p.time_step, p.mode)
+            f"{side}_arm_driver", SimPandaDriver(robots.start[i], LIMITS, p.body_time_step, p.mode)
         )
         builder.Connect(plant.get_state_output_port(model), driver.GetInputPort("state"))
         builder.Connect(
@@ -417,6 +424,8 @@ def plant_integrator(p: StationParameters) -> Integrator:
         p.integrator == "projective_dynamics",
         p.tolerance,
         p.iterations,
+        implicitness=p.implicitness,
+        buckling_wavelength=p.buckling_wavelength,
     )
     integrator = _with_effects(p, scheme)
     return LayeredCloth(integrator) if p.self_collision else integrator
@@ -430,7 +439,13 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
 
 def settled(p: StationParameters, hung: FloatArray) -> FloatArray:
     """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
-    cloth = _with_effects(p, Scheme(p.mesh.held, p.time_step, damping=_SETTLING_DAMPING))
+    scheme = Scheme(
+        p.mesh.held,
+        p.time_step,
+        damping=_SETTLING_DAMPING,
+        buckling_wavelength=p.buckling_wavelength,
+    )
+    cloth = _with_effects(p, scheme)
     state = ClothState.at_rest(hung)
     still = np.zeros((len(p.mesh.held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):

@@ -72,7 +72,7 @@ class Studio:
     def _made(self) -> tuple[Any, ...]:
         p = self._parameters
         inner = DiagramBuilder()
-        plant, scene_graph = AddMultibodyPlantSceneGraph(inner, p.time_step)
+        plant, scene_graph = AddMultibodyPlantSceneGraph(inner, p.body_time_step)
         add_person(plant, self._body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
         if p.placement is not None:
             add_arms(plant, {side: p.placement.base(side) for side in SIDES})

@@ -57,7 +57,7 @@ def summarize(
     `armhole_to_shoulder_left_m`, `…_right_m` are what is left of the way at the end, along the arm.
     Beyond the fixed keys: `linking_number_left`, `…_right` (final), `simulated_time_s`,
     `max_edge_strain_all`, `max_total_contact_force_N`. `max_edge_strain` is the 99th percentile
-    over the edges of |length / rest length - 1|, at its worst sample; `max_edge_strain_all` the
+    over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` the
     worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
     time from which both sleeves stay on (s and linking number). `late_plans` is the share of the

@@ -18,6 +18,7 @@ from drake_dress.diagrams.scenario.checks import (
     check_hardware,
     check_safety,
 )
+from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
 from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
@@ -46,6 +47,7 @@ def load_scenario(
     if seed is not None:
         content["seed"] = seed
     _resolve_delay(source, content)
+    fill_in_fidelity(content)
     content = typed(source, "", content, Scenario)
     try:
         scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))

@@ -3,6 +3,7 @@
 import re
 from dataclasses import fields
 
+from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
@@ -26,6 +27,7 @@ CHOICES = {
         for motion in ("reach", "withdraw", "wave")
     },
     "controller.predictor": ("still", "constant_velocity"),
+    "plant.fidelity": tuple(FIDELITIES),
     "plant.integrator": ("implicit", "projective_dynamics"),
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
@@ -103,6 +105,9 @@ _RANGES: dict[str, tuple[float, float]] = {
     "plant.spacing": (0.01, 0.06),
     "controller.spacing": (0.01, 0.06),
     "plant.time_step": (1e-4, 0.05),
+    "plant.body_time_step": (1e-4, 0.02),
+    "plant.implicitness": (0.5, 1.0),
+    "plant.buckling_wavelength": (0.0, 100.0),
     "plant.iterations": (1, 1000),
     "plant.tolerance": (1e-10, 0.5),
     "shoulder_stiffness": (0.0, 1000.0),

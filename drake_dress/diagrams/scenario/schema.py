@@ -207,9 +207,19 @@ class Person:
 class Plant:
     """The simulated truth."""
 
-    spacing: float = 0.02  # of the garment's mesh, m
-    time_step: float = 0.004  # s
+    # fine, standard or quick: gives what is not given of spacing, time_step, implicitness and
+    # buckling_wavelength; see fidelity.py
+    fidelity: str = "standard"
+    spacing: float = 0.025  # of the garment's mesh, m
+    time_step: float = 0.008  # of the garment, s
+    body_time_step: float = 0.004  # of arms, grippers and the person's joints, s
     integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
+    # of the implicit integrator: 1 is implicit Euler, which damps more the longer the step; near
+    # 0.5 it is of second order and may begin to jitter
+    implicitness: float = 0.7
+    # of it: shortest wrinkle that the mesh can take, in spacings; what cloth would evade by shorter
+    # ones gives way. 0: never
+    buckling_wavelength: float = 3.0
     iterations: int = 40  # of the implicit integrator's linear solver, at most
     tolerance: float = 5e-3  # relative residual at which it stops
     self_collision: bool = False  # layers of the garment do not pass through each other

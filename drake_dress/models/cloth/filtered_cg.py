@@ -13,6 +13,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from drake_dress.models.cloth.buckling import BUCKLED_ROWS, buckled_product
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.kernels import row_product
 from drake_dress.models.cloth.factor.masked import Factor, solve_pair_into, solve_rows
@@ -57,10 +58,17 @@ class SystemMatrix:
         f = fibres or no_fibres()
         self._fibres = f
         self._fibre_block = np.zeros((0, 4))
-        self._linear = (linear.indptr, linear.indices, linear.data)
+        # its own: the diagonal may be changed
+        self._linear = (linear.indptr, linear.indices, linear.data.copy())
+        row = np.repeat(np.arange(len(linear.indptr) - 1), np.diff(linear.indptr))
+        self._diagonal = np.flatnonzero(row == linear.indices)
         self._elements = (triangle, gradient, f.triangle, f.coefficient, f.weight)
         self._scale = scale
         self._inverse_diagonal = inverse_diagonal
+
+    def set_diagonal(self, diagonal: FloatArray) -> None:
+        """Makes `diagonal` (n,) that of the scalar part from now on."""
+        self._linear[2][self._diagonal] = diagonal
 
     def prepare_fibres(self, x: FloatArray) -> None:
         """Takes the fibres' directions from positions `x` (n,3), m."""
@@ -201,7 +209,10 @@ def _apply(operator, z, out):  # type: ignore[no-untyped-def]
     )
     row_product(indptr, indices, data, z, out)
     if scale != 0.0:
-        filtered_product(z, triangle, gradient, block, scale, out)
+        if block.shape[1] == BUCKLED_ROWS:
+            buckled_product(z, triangle, gradient, block, scale, out)
+        else:
+            filtered_product(z, triangle, gradient, block, scale, out)
         fibre_product(z, corners, share, weight, fibres, scale, out)
 
 

@@ -13,14 +13,15 @@ import numpy as np
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
 from drake_dress.models.cloth.forces import gather, polar, scatter
 
-_ROWS = 14
+# Rows that a triangle has in a block.
+PLAIN_ROWS = 14
 # Step of the differences in F, dimensionless.
 _DIFFERENCE = 1e-7
 
 
 def no_stretch() -> FloatArray:
     """Returns the data of no triangle at all."""
-    return np.zeros((0, _ROWS, LANES))
+    return np.zeros((0, PLAIN_ROWS, LANES))
 
 
 def prepare_filtered(elements: Elements, stretch: float, x: FloatArray) -> FloatArray:
@@ -34,7 +35,7 @@ def prepare_filtered(elements: Elements, stretch: float, x: FloatArray) -> Float
         stretch: k, N/m.
         x: (n,3) positions, m.
     """
-    block = np.empty((len(elements.triangle_lanes), _ROWS, LANES))
+    block = np.empty((len(elements.triangle_lanes), PLAIN_ROWS, LANES))
     _prepare(x, elements.triangle_lanes, elements.gradient_lanes, stretch, block)
     return block
 
@@ -43,7 +44,7 @@ def prepare_filtered(elements: Elements, stretch: float, x: FloatArray) -> Float
 def _prepare(x, nodes, gradient, stretch, block):  # type: ignore[no-untyped-def]
     tile = np.empty(6 * LANES)
     # An array of known layout lets the compiler see that its rows do not overlap.
-    rows = np.empty(_ROWS * LANES)
+    rows = np.empty(PLAIN_ROWS * LANES)
     for b in range(nodes.shape[0]):
         gather(x, nodes, b, tile)
         for l in range(LANES):
@@ -90,7 +91,7 @@ def _prepare(x, nodes, gradient, stretch, block):  # type: ignore[no-untyped-def
             rows[11 * LANES + l] = w * (mean - shrink * half)
             rows[12 * LANES + l] = w / max(trace, 2.0)
             rows[13 * LANES + l] = w
-        for c in range(_ROWS):
+        for c in range(PLAIN_ROWS):
             for l in range(LANES):
                 block[b, c, l] = rows[c * LANES + l]
 

@@ -1,11 +1,16 @@
-"""The plant's garment: linearly implicit Euler with contact and dry friction by nodes.
+"""The plant's garment: a linearly implicit scheme with contact and dry friction by nodes.
 
-(M + (h² + hβ) K₊) v' = M v + h f(x), x' = x + h v', with K₊ the positive semi-definite part of
-the exact stiffness (Baraff and Witkin 1998). It is not the controller's scheme: position and
-velocity are consistent, stretched cloth stiffens against sideways motion, and rotation is not
-resisted. Contact sets velocities, so a landing does not bounce: sticking nodes move with the
-surface, slipping nodes keep their normal velocity and feel μ times their normal force; see
-`implicit_contact.py`.
+With w the mean velocity over a step and θ the place in it at which forces count,
+
+    (M / θ + (θ h² + hβ) K₊) w = M v / θ + h f(x),  x' = x + h w,  v' = v + (w − v) / θ,
+
+K₊ the positive semi-definite part of the exact stiffness. θ = 1 is the step of Baraff and Witkin
+(1998), whose damping grows with h; near 1/2 it is of second order and damps little, so that steps
+may be longer. It is not the controller's scheme: position and velocity are consistent, stretched
+cloth stiffens against sideways motion, and rotation is not resisted. Contact sets velocities, so a
+landing does not bounce: for nodes that are bound v' = w, with M in place of M / θ. Sticking nodes
+move with the surface, slipping nodes keep their normal velocity and feel μ times their normal
+force; see `implicit_contact.py`.
 """
 
 from __future__ import annotations
@@ -15,19 +20,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.cloth.buckling import Buckling
 from drake_dress.models.cloth.contact.corners import held_off_corners
 from drake_dress.models.cloth.contact.detection import cannot_land, find_proximity, nothing_near
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK, SystemMatrix
+from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK, SystemMatrix
 from drake_dress.models.cloth.filtered_stiffness import (
     normal_response,
     prepare_filtered,
 )
 from drake_dress.models.cloth.finite import explain_not_finite
-from drake_dress.models.cloth.forces import internal_force
+from drake_dress.models.cloth.forces import bending_force, internal_force
 from drake_dress.models.cloth.implicit_contact import ImplicitContact
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
@@ -116,6 +122,9 @@ class ImplicitCloth:
         most_cone_passes: solves added, at most, while nodes stick beyond what friction can hold.
         fibres: further stiffness of the triangles along a direction of theirs.
         added_mass: (n,) further mass of the nodes, kg.
+        implicitness: θ, above 0.5 to 1.
+        buckling_wavelength: shortest wrinkle that the mesh can take, in its spacings; compression
+            that cloth would evade by shorter ones gives way (`Buckling`). 0: it never does.
     """
 
     def __init__(
@@ -132,6 +141,8 @@ class ImplicitCloth:
         most_cone_passes: int = 3,
         fibres: Fibres | None = None,
         added_mass: FloatArray | None = None,
+        implicitness: float = 1.0,
+        buckling_wavelength: float = 0.0,
     ) -> None:
         self.elements = elements
         self.material = material
@@ -149,9 +160,15 @@ class ImplicitCloth:
         self._edge = elements.edge if sample_elements else None
         self._triangle = elements.triangle if sample_elements else None
 
-        scale = time_step * (time_step + material.damping)
+        self._buckling = None
+        if buckling_wavelength > 0.0:
+            self._buckling = Buckling(elements, material, buckling_wavelength)
+
+        self._implicitness = implicitness
+        self._inertia = self.mass / implicitness
+        scale = time_step * (implicitness * time_step + material.damping)
         bending = bending_matrix(elements, material)
-        mass = sp.diags(self.mass)
+        mass = sp.diags(self._inertia)
         stiffness_bound = stretch_matrix(elements, material) + bending_bound(elements, material)
         if fibres is not None:
             stiffness_bound = stiffness_bound + fibres.matrix(elements.node_count)
@@ -161,7 +178,7 @@ class ImplicitCloth:
         self._system = SystemMatrix(
             Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale, fibres
         )
-        self._scale, self._diagonal = scale, (mass + scale * bending).diagonal()
+        self._scale, self._bending = scale, scale * bending.diagonal()
         # the factor made last: another state may go on with the same one
         self._factor: Factor | None = None
 
@@ -180,7 +197,7 @@ class ImplicitCloth:
             obstacles: the person now, with velocities.
             held_velocity: (k,3) of the held nodes over this step, m/s.
             influences: what else acts on the garment.
-            guess: (n,3) what the velocity after the step may be, m/s; free fall by default.
+            guess: (n,3) what the mean velocity over the step may be, m/s; free fall by default.
 
         Raises:
             ValueError: something is not finite; the message names it.
@@ -189,16 +206,14 @@ class ImplicitCloth:
         e = influences.stiffened(self.elements)
         x, v = state.x, state.v
         mu, adhesion = influences.contact_law(m.friction, len(x))
-        force = internal_force(e, m.stretch_stiffness, m.bending_stiffness, x)
-        block = prepare_filtered(e, m.stretch_stiffness, x)
+        force, block = self._elastic(e, x)
         force += self.mass[:, None] * self.gravity
         if self._fibres is not None:
             self._fibres.add_force(x, force)
             self._system.prepare_fibres(x)
         if influences.force is not None:
             force += influences.force
-        rhs = self.mass[:, None] * v + h * force
-        across = normal_response(e, block, self._scale, self._diagonal)
+        across = normal_response(e, block, self._scale, self._inertia + self._bending)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
@@ -217,6 +232,8 @@ class ImplicitCloth:
             adhesion,
         )
         mode = contact.mode
+        inertia = self._bound_inertia(mode)
+        rhs = inertia[:, None] * v + h * force
 
         velocity = self._start(v, held_velocity, mode, near.normal, rhs, block, guess)
         total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
@@ -256,21 +273,45 @@ class ImplicitCloth:
                 and residual <= self._tolerance
             ):
                 break
+            if changed > 0:
+                inertia = self._bound_inertia(mode)
+                rhs = inertia[:, None] * v + h * force
         end = x + h * velocity
         if not np.isfinite(end).all():
             explain_not_finite(x, v, held_velocity, self.held)
         if residual > 0.1:
             memory[0] = -1
+        # θ where the step was solved as free, 1 where it was bound
+        share = (self.mass / inertia)[:, None]
         touching = (mode == STICK) | (mode == SLIP)
         after = ClothState(
             end,
-            velocity,
+            velocity if self._implicitness == 1.0 else v + (velocity - v) / share,
             mode,
             contact.impulse(velocity, impulse) / h,
             np.where(touching, near.owner, -1).astype(np.int32),
             np.stack([memory, state.solver[1]]),
         )
         return after, StepInfo(passes, total, residual, refactored)
+
+    def _elastic(self, elements: Elements, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns the internal force (n,3), N, and what products with K₊ need."""
+        m = self.material
+        if self._buckling is None:
+            force = internal_force(elements, m.stretch_stiffness, m.bending_stiffness, x)
+            return force, prepare_filtered(elements, m.stretch_stiffness, x)
+        force, e = self._buckling.force(elements, x), elements
+        if m.bending_stiffness > 0.0:
+            bending_force(x, e.hinge_lanes, e.bend_lanes, m.bending_stiffness, force)
+        return force, self._buckling.prepare(e, x)
+
+    def _bound_inertia(self, mode: IntArray) -> FloatArray:
+        """Returns (n,), kg, M / θ of the nodes, M of bound ones, and makes it the system's."""
+        if self._implicitness == 1.0:
+            return self.mass
+        inertia = np.where(mode == FREE, self._inertia, self.mass)
+        self._system.set_diagonal(inertia + self._bending)
+        return inertia
 
     def _start(
         self,
@@ -284,10 +325,11 @@ class ImplicitCloth:
     ) -> FloatArray:
         """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
 
-        A hanging garment keeps its velocity, a falling one gains h g; whichever leaves the smaller
+        A hanging garment keeps its velocity, a falling one gains θ h g; whichever leaves the smaller
         residual. Starting a hanging coat from free fall doubled the iterations.
         """
-        other = v + self.time_step * self.gravity if guess is None else guess.copy()
+        fall = self._implicitness * self.time_step * self.gravity
+        other = v + fall if guess is None else guess.copy()
         best, least = v, np.inf
         for start in (v.copy(), other):
             start[self.held] = held_velocity

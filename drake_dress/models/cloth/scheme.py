@@ -31,6 +31,8 @@ class Scheme:
         accuracy: distance to the fixed point at which Projective Dynamics stops, m.
         predicted: whether it starts from the linearly implicit step.
         damping: in place of the fabric's, s.
+        implicitness: θ of the implicit scheme.
+        buckling_wavelength: of it, in spacings of the mesh; 0: compression never gives way.
         sampled: whether Projective Dynamics has contact between nodes too.
     """
 
@@ -43,6 +45,8 @@ class Scheme:
     predicted: bool = False
     damping: float | None = None
     sampled: bool = False
+    implicitness: float = 1.0
+    buckling_wavelength: float = 0.0
 
     def __call__(
         self,
@@ -79,4 +83,6 @@ class Scheme:
             max_iterations=self.iterations,
             fibres=fibres,
             added_mass=added_mass,
+            implicitness=self.implicitness,
+            buckling_wavelength=self.buckling_wavelength,
         )
