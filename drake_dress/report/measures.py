@@ -28,8 +28,8 @@ class Measures:
         finite: (T,) every node and force is a finite number. The others are NaN or 0 where not.
         linking: (T,2) linking number of the armhole loop and the arm's line.
         cuff_linking: (T,2) that of the cuff loop.
-        edge_strain: (T,) 99th percentile over the edges of length / rest length - 1: what pulls. An edge
-            that is shorter than at rest stands for wrinkles that the mesh does not have.
+        edge_strain: (T,) 99th percentile over the edges of length / rest length - 1. An edge that
+            is shorter than at rest stands for wrinkles that the mesh does not have.
         edge_strain_max: (T,) largest over the edges.
         penetration: (T,) greatest depth of nodes, edge midpoints and face centroids in the
             person's capsules, m; 0 where nothing penetrates.

@@ -15,18 +15,21 @@ FIDELITIES: dict[str, dict[str, float]] = {
         "time_step": 0.004,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
+        "tolerance": 5e-3,
     },
     "standard": {
         "spacing": 0.025,
         "time_step": 0.008,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
+        "tolerance": 2e-2,
     },
     "quick": {
         "spacing": 0.03,
         "time_step": 0.010,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
+        "tolerance": 2e-2,
     },
 }
 

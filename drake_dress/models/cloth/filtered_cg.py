@@ -20,6 +20,7 @@ from drake_dress.models.cloth.factor.masked import Factor, solve_pair_into, solv
 from drake_dress.models.cloth.fibres import Fibres, no_fibres
 from drake_dress.models.cloth.fibres import filtered_product as fibre_product
 from drake_dress.models.cloth.filtered_stiffness import filtered_product
+from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
@@ -58,6 +59,7 @@ class SystemMatrix:
         f = fibres or no_fibres()
         self._fibres = f
         self._fibre_block = np.zeros((0, 4))
+        self._bonds = NO_BONDS
         # its own: the diagonal may be changed
         self._linear = (linear.indptr, linear.indices, linear.data.copy())
         row = np.repeat(np.arange(len(linear.indptr) - 1), np.diff(linear.indptr))
@@ -70,12 +72,18 @@ class SystemMatrix:
         """Makes `diagonal` (n,) that of the scalar part from now on."""
         self._linear[2][self._diagonal] = diagonal
 
+    def set_bonds(self, bonds: Bonds) -> None:
+        """Adds what pairs of layers resist with, in place of those of before."""
+        self._bonds = bonds
+
     def prepare_fibres(self, x: FloatArray) -> None:
         """Takes the fibres' directions from positions `x` (n,3), m."""
         self._fibre_block = self._fibres.prepare(x)
 
     def _operator(self, block: FloatArray) -> tuple[object, ...]:
-        return (*self._linear, *self._elements, self._fibre_block, block, self._scale)
+        b = self._bonds
+        bonds = (b.node, b.row, b.resistance)
+        return (*self._linear, *self._elements, self._fibre_block, block, self._scale, bonds)
 
     def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
         """Returns A z (n,3); `block` is what `prepare_filtered` wrote for this state."""
@@ -204,7 +212,7 @@ def _rows(z):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, nogil=True)
 def _apply(operator, z, out):  # type: ignore[no-untyped-def]
     """Writes A z into `out`, both in rows of four (n,4)."""
-    indptr, indices, data, triangle, gradient, corners, share, weight, fibres, block, scale = (
+    indptr, indices, data, triangle, gradient, corners, share, weight, fibres, block, scale, of = (
         operator
     )
     row_product(indptr, indices, data, z, out)
@@ -214,6 +222,8 @@ def _apply(operator, z, out):  # type: ignore[no-untyped-def]
         else:
             filtered_product(z, triangle, gradient, block, scale, out)
         fibre_product(z, corners, share, weight, fibres, scale, out)
+    node, row, resistance = of
+    bond_product(z, node, row, resistance, out)
 
 
 @nb.njit(cache=True, nogil=True)

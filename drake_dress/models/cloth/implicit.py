@@ -36,6 +36,7 @@ from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import bending_force, internal_force
 from drake_dress.models.cloth.implicit_contact import ImplicitContact
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
+from drake_dress.models.cloth.layers.bonds import NO_BONDS
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -53,6 +54,8 @@ _REFACTOR_AFTER = 40
 _FIRM = 0.03
 # The passes before the last only find the modes: their tolerance is this much coarser.
 _COARSER = 6.0
+# Solves added, at most, for nodes that would end inside a body.
+_LANDING_PASSES = 3
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
 
@@ -213,7 +216,13 @@ class ImplicitCloth:
             self._system.prepare_fibres(x)
         if influences.force is not None:
             force += influences.force
+        driven = h * force
+        bonds = influences.bonds or NO_BONDS
+        self._system.set_bonds(bonds)
+        if len(bonds.node):
+            driven += bonds.drive(len(x))
         across = normal_response(e, block, self._scale, self._inertia + self._bending)
+        bonds.stiffen(*across)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
@@ -233,10 +242,11 @@ class ImplicitCloth:
         )
         mode = contact.mode
         inertia = self._bound_inertia(mode)
-        rhs = inertia[:, None] * v + h * force
+        rhs = inertia[:, None] * v + driven
 
         velocity = self._start(v, held_velocity, mode, near.normal, rhs, block, guess)
-        total, residual, passes, changed, left = 0, 0.0, 0, 1, self._most_cone_passes
+        total, residual, passes, changed = 0, 0.0, 0, 1
+        left, landing = self._most_cone_passes, _LANDING_PASSES
         factor, refactored, memory = self._renewed_factor(state.solver[0], mode, contact.resistance)
         impulse = np.empty_like(velocity)
         max_passes = self._max_passes if contact.is_near else 1
@@ -266,6 +276,16 @@ class ImplicitCloth:
                 if left > 0 and contact.slip_out_of_cone(velocity, impulse):
                     left -= 1
                     continue
+                # Nothing may end up inside the person because it was not seen to land.
+                if (
+                    landing > 0
+                    and contact.is_near
+                    and contact.stop_entering(x, velocity, obstacles, m.margin)
+                ):
+                    landing -= 1
+                    inertia = self._bound_inertia(mode)
+                    rhs = inertia[:, None] * v + driven
+                    continue
                 break
             changed = contact.update(velocity, impulse)
             if (
@@ -275,7 +295,7 @@ class ImplicitCloth:
                 break
             if changed > 0:
                 inertia = self._bound_inertia(mode)
-                rhs = inertia[:, None] * v + h * force
+                rhs = inertia[:, None] * v + driven
         end = x + h * velocity
         if not np.isfinite(end).all():
             explain_not_finite(x, v, held_velocity, self.held)
@@ -325,8 +345,8 @@ class ImplicitCloth:
     ) -> FloatArray:
         """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
 
-        A hanging garment keeps its velocity, a falling one gains θ h g; whichever leaves the smaller
-        residual. Starting a hanging coat from free fall doubled the iterations.
+        A hanging garment keeps its velocity, a falling one gains θ h g; whichever leaves the
+        smaller residual. Starting a hanging coat from free fall doubled the iterations.
         """
         fall = self._implicitness * self.time_step * self.gravity
         other = v + fall if guess is None else guess.copy()

@@ -18,7 +18,9 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.contact.detection import Proximity
+from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
+from drake_dress.models.cloth.contact.distance import distance_to, nearest_obstacle
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK
 
@@ -33,6 +35,10 @@ _SLOWEST, _STOPPING = 2e-4, 0.7
 _KEPT_GAP = 1e-3
 # Gap within which a node may land during a step, m.
 _NEAR = 0.05
+# Depth within its margin, m, at which a node that comes from outside has to be stopped.
+_ENTERED = 1.5e-3
+# Between surfaces that face each other, or look the same way, more than this there is no corner.
+_FACING = 0.97
 # Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
 _TOLERATED_EXCESS = 0.02
 
@@ -68,6 +74,7 @@ class ImplicitContact:
         adhesion: FloatArray,
     ) -> None:
         n, h = len(v), time_step
+        self._h = h
         self._near, self._mu, self._adhesion = near, friction, h * adhesion
         self.mode = np.empty(n, dtype=np.int32)
         _initial_modes(
@@ -83,9 +90,7 @@ class ImplicitContact:
         )
         self.mode[held] = HELD
         # normal velocity, relative to the surface, that brings a node onto its margin
-        self._push = np.where(
-            near.gap > 0.0, -near.gap / h, np.minimum(-0.5 * near.gap / h, _LARGEST_PUSH)
-        )
+        self._push = _push_out(near.gap, h)
         # impulse on nodes that are about to slip; tangential speeds of the last pass
         self._friction, self._speed = np.zeros((n, 3)), np.zeros(n)
         self.resistance = np.zeros(n)
@@ -161,6 +166,65 @@ class ImplicitContact:
             )
         )
 
+    def stop_entering(
+        self, x: FloatArray, velocity: FloatArray, obstacles: Obstacles, margin: float
+    ) -> bool:
+        """Binds nodes that would end inside a body to which they are not bound; returns if any are.
+
+        A node that is free lands on that body; one that is bound to another goes where the surfaces
+        of both meet, and stays there for this step.
+
+        Args:
+            x: (n,3) at the start of the step, m.
+            velocity: (n,3) mean over the step, m/s.
+            obstacles: bodies.
+            margin: distance to keep, m.
+        """
+        near, h, shapes = self._near, self._h, obstacles.packed
+        distance, owner = np.empty(len(x)), np.empty(len(x), dtype=np.int32)
+        nearest_obstacle(x + h * (velocity - near.surface_velocity), shapes, distance, owner)
+        bound = (self.mode == STICK) | (self.mode == SLIP)
+        entered = (distance < margin - _ENTERED) & (self.mode != HELD)
+        known = (near.owner == owner) & (bound | (near.gap < -_ENTERED))
+        rows = np.flatnonzero(entered & ~known)
+        if not len(rows):
+            return False
+        normal, _, moving = surfaces_of(x[rows], obstacles, owner[rows])
+        gap = np.empty(len(rows))
+        distance_to(x[rows], shapes, owner[rows], gap)
+        gap -= margin
+        for k, i in enumerate(rows):
+            if bound[i]:
+                self._hold_in_corner(int(i), normal[k], moving[k], float(gap[k]))
+                continue
+            near.gap[i], near.owner[i] = gap[k], owner[i]
+            near.normal[i], near.surface_velocity[i] = normal[k], moving[k]
+            self._push[i] = _push_out(near.gap[i : i + 1], h)[0]
+            self.mode[i] = _landing_mode(velocity, near.surface_velocity, near.normal, i)
+        return True
+
+    def _hold_in_corner(self, i: int, normal: FloatArray, moving: FloatArray, gap: float) -> None:
+        """Prescribes to node `i`, bound already, the way to where a second surface meets its own.
+
+        Args:
+            i: the node.
+            normal: (3,) of the second surface.
+            moving: (3,) its velocity, m/s.
+            gap: of it, less the margin, m.
+        """
+        near = self._near
+        own, c = near.normal[i].copy(), float(near.normal[i] @ normal)
+        way = np.zeros(3)
+        if abs(c) < _FACING:
+            first, second = float(near.gap[i]), gap
+            way = ((c * second - first) * own + (c * first - second) * normal) / (1.0 - c * c)
+        between = own + normal
+        size = float(np.linalg.norm(between))
+        near.normal[i] = between / size if size > 1e-6 else own
+        near.surface_velocity[i] = 0.5 * (near.surface_velocity[i] + moving) + way / self._h
+        self._push[i], self.mode[i] = 0.0, STICK
+        self._friction[i], self.resistance[i] = 0.0, 0.0
+
     def impulse(self, velocity: FloatArray, residual: FloatArray) -> FloatArray:
         """Returns (n,3) the impulse of person and grippers at a solution, N s.
 
@@ -178,6 +242,12 @@ class ImplicitContact:
             out,
         )
         return out
+
+
+def _push_out(gap: FloatArray, h: float) -> FloatArray:
+    """Returns the normal velocity (k,), m/s, that brings nodes with gaps (k,), m, to the margin."""
+    push: FloatArray = np.where(gap > 0.0, -gap / h, np.minimum(-0.5 * gap / h, _LARGEST_PUSH))
+    return push
 
 
 @nb.njit(cache=True, nogil=True)

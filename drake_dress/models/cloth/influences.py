@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drake_dress.models.cloth.elements import Elements, FloatArray, in_lanes
+from drake_dress.models.cloth.layers.bonds import Bonds
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,14 @@ class Influences:
         friction: (n,) Coulomb coefficient in place of the material's.
         adhesion: (n,) pull that a contact bears before it lets go, N; presses as well.
         stretch_factor: (F,) on the stretch stiffness of each triangle.
+        bonds: pairs of layers that resist approach; only the linearly implicit scheme heeds them.
     """
 
     force: FloatArray | None = None
     friction: FloatArray | None = None
     adhesion: FloatArray | None = None
     stretch_factor: FloatArray | None = None
+    bonds: Bonds | None = None
 
     def contact_law(self, friction: float, count: int) -> tuple[FloatArray, FloatArray]:
         """Returns Coulomb coefficient and adhesion, N, of `count` nodes, (n,) each."""

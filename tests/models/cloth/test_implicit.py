@@ -192,3 +192,53 @@ def test_motion_of_held_nodes_that_is_not_finite_is_told() -> None:
     motion[1, 0] = np.nan
     with pytest.raises(ValueError, match="held"):
         cloth.step(ClothState.at_rest(x), Obstacles.none(), motion)
+
+
+def _vibrated(implicitness: float, time_step: float, duration: float = 0.24) -> FloatArray:
+    """Returns a strip (n,3) that was pulled by 0.3 %, held at one end and let go."""
+    x, e = sheet_elements(3, 9, 0.03)
+    held = np.flatnonzero(x[:, 1] == 0.0).astype(np.int32)
+    cloth = ImplicitCloth(
+        e,
+        Material(stretch_stiffness=5.0, bending_stiffness=0.0),
+        time_step,
+        held,
+        np.zeros(3),
+        tolerance=1e-10,
+        max_iterations=500,
+        implicitness=implicitness,
+    )
+    shape = x[:, 1] / x[:, 1].max()
+    state = ClothState.at_rest(x + np.outer(0.003 * 0.24 * np.sin(0.5 * np.pi * shape), [0, 1, 0]))
+    for _ in range(round(duration / time_step)):
+        state, _ = cloth.step(state, Obstacles.none(), np.zeros((len(held), 3)))
+    return state.x
+
+
+def test_error_of_implicit_euler_is_of_first_order_and_falls_with_its_share() -> None:
+    """The error's leading term is (θ − 1/2) h."""
+    exact = _vibrated(0.6, 0.00025)
+    off = [np.abs(_vibrated(1.0, h) - exact).max() for h in (0.004, 0.002)]
+    assert off[0] / off[1] == pytest.approx(2.0, rel=0.35)
+    less = np.abs(_vibrated(0.7, 0.004) - exact).max()
+    assert less / off[0] == pytest.approx(0.4, rel=0.35)
+
+
+def test_steps_twice_as_long_are_nearer_the_truth_at_0_7_than_implicit_euler_s() -> None:
+    exact = _vibrated(0.6, 0.00025)
+    off = {w: np.abs(_vibrated(*w) - exact).max() for w in ((0.7, 0.008), (1.0, 0.004))}
+    assert off[0.7, 0.008] < off[1.0, 0.004]
+
+
+@pytest.mark.parametrize("implicitness", [1.0, 0.7])
+def test_what_lands_is_at_rest_on_the_floor_and_carries_its_weight(implicitness: float) -> None:
+    x, e = sheet_elements(8, 8, 0.02)
+    start = x - x.mean(axis=0)
+    start[:, 2] = 0.01
+    cloth = ImplicitCloth(e, Material(), 0.008, NO_NODES, implicitness=implicitness)
+    state = replace(ClothState.at_rest(start), v=np.tile([0.0, 0.0, -1.0], (64, 1)))
+    for _ in range(60):
+        state, _ = cloth.step(state, incline(0.0), NOTHING)
+    assert np.abs(state.v).max() < 0.02
+    assert state.x[:, 2].min() > 0.0
+    assert state.reaction[:, 2].sum() == pytest.approx(cloth.mass.sum() * 9.81, rel=0.02)

@@ -16,7 +16,7 @@ from tests.models.cloth.sheets import NO_NODES, sheet, sheet_elements
 
 NOTHING = np.zeros((0, 3))
 WEIGHTLESS = np.zeros(3)
-SCHEMES = ("one_step", "conjugate_gradients", "implicit")
+SCHEMES = ("one_step", "conjugate_gradients", "implicit", "second_order")
 
 
 class Run:
@@ -37,7 +37,7 @@ class Run:
         self.v = np.zeros_like(x) if v is None else v.copy()
         self.reaction = np.zeros_like(x)
         self._explicit: ExplicitBiasCloth | None = None
-        if scheme == "implicit":
+        if scheme in ("implicit", "second_order"):
             self.cloth = ImplicitCloth(
                 elements,
                 material,
@@ -47,6 +47,7 @@ class Run:
                 tolerance=1e-6,
                 max_iterations=300,
                 max_passes=6,
+                implicitness=1.0 if scheme == "implicit" else 0.7,
             )
             self._state = replace(ClothState.at_rest(x), v=self.v)
         else:
@@ -167,14 +168,14 @@ def _capstan(scheme: str, mu: float, h: float, speed: float) -> float:
     return float(np.mean(tight[late]) / np.mean(slack[late]))
 
 
-@pytest.mark.parametrize("scheme", ["one_step", "implicit"])
+@pytest.mark.parametrize("scheme", ["one_step", "implicit", "second_order"])
 @pytest.mark.parametrize("mu", [0.2, 0.5])
 def test_tension_around_a_drum_grows_as_the_capstan_says(scheme: str, mu: float) -> None:
     """T₂ / T₁ = exp(μ φ), φ = π."""
     assert _capstan(scheme, mu, 0.004, 0.002) == pytest.approx(np.exp(mu * np.pi), rel=0.05)
 
 
-@pytest.mark.parametrize("scheme", ["one_step", "implicit"])
+@pytest.mark.parametrize("scheme", ["one_step", "implicit", "second_order"])
 def test_tight_tube_is_pulled_over_a_limb_at_its_belt_friction(scheme: str) -> None:
     """A tube stretched by ε around a limb presses with k ε / r: F = 2π μ k ε L."""
     around, rows, length, limb, mu = 24, 16, 0.15, 0.05, 0.3
