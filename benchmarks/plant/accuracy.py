@@ -1,9 +1,9 @@
 """How far a garment is from a finer one after parts of a dressing's motion.
 
-The reference has half the spacing and a quarter of the step. It begins where the logged garment
-was, and is left alone for a while, in which it forgets the coarser mesh; then each garment that is
-compared begins from its state. Parts last a second: longer ones are decided by which way cloth
-buckles, where the reference departs from itself.
+The reference has half the spacing of `fine` and a quarter of its step. It begins where the logged
+garment was, and is left alone for a while, in which it forgets the coarser mesh; then each garment
+that is compared begins from its state. Parts last a second: longer ones are decided by which way
+cloth buckles, where the reference departs from itself.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from benchmarks.plant.replaying import Replayed, replay
 from drake_dress.diagrams.build import station_parameters
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.station import plant_integrator
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -33,24 +34,38 @@ FloatArray = npt.NDArray[np.float64]
 _FORGETTING, _PART = 0.3, 1.0
 # Of the first part, s: before, the coat hangs still.
 _FIRST = 3.0
-_FINER, _SHORTER = 2.0, 4.0
+_LAST = 0.04  # left over at the end of the motion, s
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A garment that is compared; m and s."""
+    """A garment that is compared; m and s. By default, with the plain law and implicit Euler."""
 
     name: str
     spacing: float
     time_step: float
+    implicitness: float = 1.0
+    buckling_wavelength: float = 0.0
+    tolerance: float = 5e-3
     self_collision: bool = False
+
+    @staticmethod
+    def of_fidelity(name: str, self_collision: bool = False) -> Setting:
+        """Returns the setting of a word of `plant.fidelity`."""
+        shown = f"{name}, layers collide" if self_collision else name
+        return Setting(shown, **FIDELITIES[name], self_collision=self_collision)
 
     def of(self, scenario: Scenario, folder: Path) -> tuple[GarmentMesh, Integrator]:
         """Returns the scenario's garment with it, and what steps it."""
         mesh = build_garment(scenario.garment, self.spacing, folder)
-        p = station_parameters(scenario, mesh)
-        p = replace(p, time_step=self.time_step, self_collision=self.self_collision)
+        numerics = {k: v for k, v in vars(self).items() if k not in ("name", "spacing")}
+        p = replace(station_parameters(scenario, mesh), integrator="implicit", **numerics)
         return mesh, plant_integrator(p)
+
+
+# What all are held against: half the spacing of `fine` and a quarter of its step, with the plain
+# law. Coats are not made finer than this.
+REFERENCE = Setting("reference", 0.01, 0.001)
 
 
 @dataclass(frozen=True)
@@ -67,13 +82,7 @@ class Part:
 
 def part_begins(motion: DressingMotion, count: int) -> FloatArray:
     """Returns when parts begin, s."""
-    return np.linspace(_FIRST, motion.time[-1] - _PART - _SHORTER * 0.01, count)
-
-
-def reference(scenario: Scenario) -> Setting:
-    """Returns what a scenario's plant is held against."""
-    p = scenario.plant
-    return Setting("reference", p.spacing / _FINER, p.time_step / _SHORTER, p.self_collision)
+    return np.linspace(_FIRST, motion.time[-1] - _PART - _LAST, count)
 
 
 def reference_part(

@@ -169,10 +169,10 @@ class ImplicitContact:
     def stop_entering(
         self, x: FloatArray, velocity: FloatArray, obstacles: Obstacles, margin: float
     ) -> bool:
-        """Binds nodes that would end inside a body to which they are not bound; returns if any are.
+        """Binds nodes that would end farther inside a body; returns if there are any.
 
-        A node that is free lands on that body; one that is bound to another goes where the surfaces
-        of both meet, and stays there for this step.
+        A node that is free lands on that body; one that is bound goes where the surfaces of what it
+        touches and of that body meet, and stays there for this step.
 
         Args:
             x: (n,3) at the start of the step, m.
@@ -184,9 +184,11 @@ class ImplicitContact:
         distance, owner = np.empty(len(x)), np.empty(len(x), dtype=np.int32)
         nearest_obstacle(x + h * (velocity - near.surface_velocity), shapes, distance, owner)
         bound = (self.mode == STICK) | (self.mode == SLIP)
-        entered = (distance < margin - _ENTERED) & (self.mode != HELD)
-        known = (near.owner == owner) & (bound | (near.gap < -_ENTERED))
-        rows = np.flatnonzero(entered & ~known)
+        end = distance - margin
+        entered = (end < -_ENTERED) & (self.mode != HELD)
+        # what was as deep in that body before is on its way out
+        leaving = (near.owner == owner) & (end > near.gap - _ENTERED)
+        rows = np.flatnonzero(entered & ~leaving)
         if not len(rows):
             return False
         normal, _, moving = surfaces_of(x[rows], obstacles, owner[rows])
