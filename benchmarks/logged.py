@@ -7,11 +7,42 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import h5py
+import numpy as np
+
 from drake_dress.diagrams.assemble import garments
 from drake_dress.diagrams.build import controller_policy, described_person, station_parameters
 from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.report.log import RunLog
+
+# What is measured by a clock, and so differs from run to run.
+_MEASURED = ("solve_time",)
+
+
+def numbers_that_differ(one: h5py.File, other: h5py.File) -> tuple[int, list[str]]:
+    """Returns how many datasets a log has, and which of them another log has not, bit for bit.
+
+    What is measured by a clock is left out.
+    """
+    names = _datasets(one)
+    different = [name for name in names if not _same(one, other, name)]
+    return len(names), different + [n for n in _datasets(other) if n not in names]
+
+
+def _datasets(file: h5py.File) -> list[str]:
+    names: list[str] = []
+    file.visititems(
+        lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None
+    )
+    return sorted(name for name in names if name.rsplit("/", 1)[-1] not in _MEASURED)
+
+
+def _same(one: h5py.File, other: h5py.File, name: str) -> bool:
+    if name not in other or one[name].shape != other[name].shape:
+        return False
+    first, second = one[name][()], other[name][()]
+    return bool(np.array_equal(first, second, equal_nan=first.dtype.kind == "f"))
 
 
 def opened(paths: Sequence[Path]) -> Iterator[tuple[Path, RunLog]]:

@@ -48,6 +48,7 @@ BENCHMARKS = {
     "local": "constrained DDP beside the exact optimum",
     "delay": "how long plans take on this machine",
     "plant": "how far the plant's garment is from a finer one, and what its steps take",
+    "repeat": "whether the same seed gives the same numbers, under any load",
     "mutation": "faults put into central modules, and whether tests notice them",
 }
 

@@ -92,7 +92,7 @@ class ConjugateGradientSystem(FilteredSystem):
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-    ) -> None:
+    ) -> FloatArray:
         """Starts from the unknown's last solution."""
         nodes = self._nodes
         z = unknown.z.copy()
@@ -106,14 +106,18 @@ class ConjugateGradientSystem(FilteredSystem):
         modes[self._scheme.held] = HELD
         normals = np.zeros_like(z)
         normals[nodes] = normal
-        self._solve(self._factor, modes, normals, rhs, z)
-        unknown.z = z
-
-    def _solve(
-        self, factor: Factor, modes: IntArray, normals: FloatArray, rhs: FloatArray, z: FloatArray
-    ) -> None:
-        s = self._scheme
+        s, product = self._scheme, np.empty_like(z)
         iterations, _ = s.system.solve(
-            factor, self._block, modes, normals, rhs, z, s.tolerance, s.max_iterations
+            self._factor,
+            self._block,
+            modes,
+            normals,
+            rhs,
+            z,
+            s.tolerance,
+            s.max_iterations,
+            applied=product,
         )
         self.iterations += iterations
+        unknown.z = z
+        return product

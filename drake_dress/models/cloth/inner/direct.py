@@ -64,10 +64,11 @@ class DirectSystem(FilteredSystem):
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-    ) -> None:
+    ) -> FloatArray:
         stick, slip = mode == STICK, mode == SLIP
         fixed = self._prescribed(unknown.held, mode, normal, target)
         unknown.z = self._solve(rhs, fixed, self._nodes[stick], self._nodes[slip], normal[slip])
+        return self.product(unknown.z)
 
     def _solve(
         self,

@@ -98,8 +98,8 @@ class FilteredSystem(ABC):
         def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
             rhs = unknown.rhs.copy()
             rhs[self._nodes] += force
-            self._bind(unknown, rhs, mode, normal, target)
-            return self._binding(unknown.z, rhs, mode, normal), unknown.z[self._nodes]
+            product = self._bind(unknown, rhs, mode, normal, target)
+            return self._binding(product, rhs, mode, normal), unknown.z[self._nodes]
 
         force, z, unknown.multiplier = hold_obliquely(
             plain, mode, normal, target, push, backward, self._base.tolerance
@@ -152,10 +152,10 @@ class FilteredSystem(ABC):
         return rows
 
     def _binding(
-        self, z: FloatArray, rhs: FloatArray, mode: IntArray, normal: FloatArray
+        self, product: FloatArray, rhs: FloatArray, mode: IntArray, normal: FloatArray
     ) -> FloatArray:
         """Returns (c,3) what binds the touched nodes: A z − rhs, of slipping ones along n."""
-        binding: FloatArray = (self.product(z) - rhs)[self._nodes]
+        binding: FloatArray = product[self._nodes] - rhs[self._nodes]
         slip = mode == SLIP
         n = normal[slip]
         binding[slip] = np.einsum("ij,ij->i", binding[slip], n)[:, None] * n
@@ -185,5 +185,5 @@ class FilteredSystem(ABC):
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-    ) -> None:
-        """Solves for `unknown.z` with nodes bound, without friction."""
+    ) -> FloatArray:
+        """Solves for `unknown.z` with nodes bound, without friction; returns A z (n,3)."""

@@ -130,9 +130,10 @@ class StationarySystem(FilteredSystem):
         mode: IntArray,
         normal: FloatArray,
         target: FloatArray,
-    ) -> None:
+    ) -> FloatArray:
         start = self._prescribed(unknown.held, mode, normal, target)
         self._iterate(unknown, rhs, start, (mode, normal))
+        return self.product(unknown.z)
 
     def _iterate(
         self,

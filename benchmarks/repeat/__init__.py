@@ -1,0 +1,1 @@
+"""The same seed gives the same numbers, under any load, in one process or in several."""

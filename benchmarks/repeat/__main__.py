@@ -1,0 +1,122 @@
+"""Runs one scenario again and again and tells whether all logs hold the same numbers.
+
+    drake-dress bench repeat --set duration=12
+
+Alone and beside processes that keep every core busy, in one process and in several. Every dataset
+is compared with the first run's bit for bit, but for measured solve times. The exit status is 0 if
+all are the same, 1 if some differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+
+from benchmarks.cloth.table import Table
+from benchmarks.logged import numbers_that_differ
+from benchmarks.parser import OneLineParser, exit_with, output_folder, seed_number
+from benchmarks.scenario_run import run_scenario
+from benchmarks.section import add_into_option, around, write_between
+from drake_dress.errors import UserError
+from drake_dress.interrupt import caught_interrupt
+
+_NAME = "repeat"
+_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+# Busy processes for each core: a run then gets a third of one.
+_LOAD = 2
+
+
+@dataclass(frozen=True)
+class Case:
+    """How a run is made: in one process or several, beside a full load or not."""
+
+    name: str
+    one_process: bool
+    loaded: bool
+
+
+CASES = (
+    Case("one process, alone", True, False),
+    Case("several, alone", False, False),
+    Case("one process, full load", True, True),
+    Case("several, full load", False, True),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs, compares and prints; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    if options.into is not None:
+        around(options.into, _NAME)
+    scenario = Path(options.scenario)
+    logs: list[Path] = []
+    rows: list[list[str | int]] = []
+    with caught_interrupt() as stop:
+        for number, case in enumerate(CASES):
+            out = options.out / str(number)
+            with _busy_cores() if case.loaded else contextlib.nullcontext():
+                _, problem = run_scenario(
+                    scenario, out, options.set, options.seed, False, case.one_process
+                )
+            if stop.is_set():
+                return stop.status
+            if problem:
+                raise UserError("bench", _NAME, f"{case.name}: {problem}")
+            logs.append(out / "run.h5")
+            with h5py.File(logs[0]) as first, h5py.File(logs[-1]) as this:
+                count, different = numbers_that_differ(first, this)
+                samples = len(this["time"])
+            rows.append([case.name, samples, count, len(different), ", ".join(different) or "–"])
+            print(f"{case.name}: {count} datasets, {len(different)} differ", flush=True)
+    header = ["run", "samples", "datasets", "differ from the first run's", "which"]
+    shown = Table(f"{scenario.stem}, again", header, rows).text()
+    print(f"\n{shown}")
+    if options.into is not None:
+        write_between(options.into, _NAME, shown)
+    return int(any(row[3] for row in rows))
+
+
+@contextlib.contextmanager
+def _busy_cores() -> Iterator[None]:
+    """Keeps every core busy meanwhile."""
+    context = multiprocessing.get_context("spawn")
+    count = _LOAD * (os.cpu_count() or 1)
+    busy = [context.Process(target=_turn, daemon=True) for _ in range(count)]
+    for process in busy:
+        process.start()
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.join()
+
+
+def _turn() -> None:
+    while True:
+        pass
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="drake-dress bench repeat",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
+    parser.add_argument("--seed", type=seed_number, help="the scenario's own by default")
+    parser.add_argument("--out", type=output_folder, default=Path("out/repeat"))
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    add_into_option(parser, _NAME)
+    return parser
+
+
+if __name__ == "__main__":
+    exit_with(main)
