@@ -139,6 +139,7 @@ def test_station_of_a_dummy_has_no_system_of_a_behaviour() -> None:
             mesh=MESH,
             material=Material(),
             time_step=0.01,
+            body_time_step=0.01,
             measures=M,
             posture="standing",
             arms=ARMS,

@@ -30,7 +30,7 @@ def test_a_word_gives_every_value_that_is_not_given(tmp_path: Path, name: str) -
     assert load_scenario(again).plant == plant
 
 
-@pytest.mark.parametrize("text", ["seed: 0", "plant:", "plant: {}"])
+@pytest.mark.parametrize("text", ["seed: 0", "plant: {}", "plant: {fidelity: standard}"])
 def test_standard_is_what_nothing_is_said_of(tmp_path: Path, text: str) -> None:
     plant = load_scenario(scenario_file(tmp_path, text)).plant
     assert plant == Plant()

@@ -56,7 +56,7 @@ def test_a_run_without_report_writes_log_and_summary_alone(
     timed = {key for key in first if first[key] != second[key]}
     assert timed <= {
         "wall_time_s", "realtime_factor", "global_rate_hz", "local_rate_hz",
-        "global_solve_ms", "local_solve_ms",
+        "global_solve_ms", "local_solve_ms", "late_plans",
     }  # fmt: skip
 
 

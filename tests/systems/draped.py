@@ -25,6 +25,7 @@ def draped_station(**changes: Any) -> SimulatedStation:
             mesh=make_coat(CoatParameters(), 0.05),
             material=Material(stretch_stiffness=300.0),
             time_step=H,
+            body_time_step=H,
             measures=BodyMeasures(),
             posture="standing",
             arms={"left": pose, "right": pose},

@@ -37,11 +37,9 @@ FIDELITIES: dict[str, dict[str, float]] = {
 def fill_in_fidelity(content: dict[str, Any]) -> None:
     """Writes into a scenario's content what its fidelity says and the content does not.
 
-    What is no fidelity is left alone: it is told when words are looked at.
+    What is no group, or no fidelity, is left alone: it is told when types and words are looked at.
     """
     plant = content.setdefault("plant", {})
-    if plant is None:
-        plant = content["plant"] = {}
     if not isinstance(plant, dict):
         return
     fidelity = plant.get("fidelity", "standard")
