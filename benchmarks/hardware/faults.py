@@ -21,6 +21,7 @@ from drake_dress.report.summary import read_summary
 COARSE = [
     "plant.spacing=0.05",
     "plant.time_step=0.005",
+    "plant.body_time_step=0.005",
     "controller.spacing=0.06",
     "log.rate=100",
     "lab.rest=1.0",

@@ -17,7 +17,12 @@ from drake_dress.report.summary import read_summary
 # Beliefs are faults, too: of what messages say.
 PARTS = ("commands", "dressing", "soak", "faults", "beliefs")
 # On two cores a lab keeps up with time if its garment is coarse.
-_COARSE = ["plant.spacing=0.035", "plant.time_step=0.005", "controller.command_rate=200"]
+_COARSE = [
+    "plant.spacing=0.035",
+    "plant.time_step=0.005",
+    "plant.body_time_step=0.005",
+    "controller.command_rate=200",
+]
 _COARSER = ["plant.spacing=0.05", "controller.spacing=0.06"]
 # What is loaded and compiled comes before memory is settled: a share of the samples. At the end
 # processes close down.

@@ -42,6 +42,7 @@ _SETTINGS = [
     "duration=8",
     "plant.spacing=0.05",
     "plant.time_step=0.01",
+    "plant.body_time_step=0.01",
     "controller.spacing=0.06",
 ]
 HOW = ("kill", "terminate", "disk_full", "group")

@@ -11,7 +11,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.effects.registry import EFFECTS
 from tests.discrepancy.data import SCENARIO
 
-QUICK = ["plant.spacing=0.06", "plant.time_step=0.01"]
+QUICK = ["plant.spacing=0.06", "plant.time_step=0.01", "plant.body_time_step=0.01"]
 
 
 def test_every_effect_can_be_switched_on_and_loads_again(tmp_path):

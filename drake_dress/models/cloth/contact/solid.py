@@ -7,14 +7,13 @@ contact step needs, exists everywhere. A look-up costs the same for any mesh.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import trimesh
 from scipy import ndimage
 
 from drake_dress.errors import UserError
+from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
 from drake_dress.models.cloth.elements import FloatArray
 
 # Beyond the mesh the grid reaches this far, m, at least: garments are looked at before they touch.
@@ -22,21 +21,6 @@ _PADDING = 0.10
 _MOST_CELLS = 20_000_000
 # Points whose distance is asked for at once; the search takes some hundred bytes a point.
 _BATCH = 50_000
-
-
-@dataclass(frozen=True)
-class SignedDistanceField:
-    """Signed distance to a closed surface in its body's frame, positive outside, m.
-
-    Attributes:
-        origin: (3,) position of the grid's first node, m.
-        spacing: of the grid, m.
-        coefficients: (i,j,k) of the cubic B-spline.
-    """
-
-    origin: FloatArray
-    spacing: float
-    coefficients: FloatArray
 
 
 def make_signed_distance_field(

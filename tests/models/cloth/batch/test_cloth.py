@@ -10,7 +10,7 @@ from drake_dress.models.cloth.batch.cloth import BatchCloth
 from drake_dress.models.cloth.batch.tape import ContactTypes
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles, Solid
-from drake_dress.models.cloth.contact.solid import SignedDistanceField
+from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.batch.scenes import (
