@@ -20,7 +20,7 @@ import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, in_lanes
 from drake_dress.models.cloth.filtered_stiffness import PLAIN_ROWS
-from drake_dress.models.cloth.forces import SMALLEST_STRETCH, gather, scatter
+from drake_dress.models.cloth.forces import gather, polar_and_stretch, scatter
 from drake_dress.models.cloth.material import Material
 
 # Stiffness beyond e_c, as a share of k. A strip that has buckled bears hardly more than at first
@@ -78,30 +78,6 @@ def buckling_strain(elements: Elements, material: Material, wavelength: float) -
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
-def _polar(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
-    """Returns the polar factor R of F (six numbers) and S (three)."""
-    c00 = f00 * f00 + f10 * f10 + f20 * f20
-    c01 = f00 * f01 + f10 * f11 + f20 * f21
-    c11 = f01 * f01 + f11 * f11 + f21 * f21
-    s = np.sqrt(max(c00 * c11 - c01 * c01, SMALLEST_STRETCH * SMALLEST_STRETCH))
-    t = 1.0 / np.sqrt(c00 + c11 + 2.0 * s)
-    s00 = (c00 + s) * t
-    s01 = c01 * t
-    s11 = (c11 + s) * t
-    d = 1.0 / (s00 * s11 - s01 * s01)
-    i00 = s11 * d
-    i01 = -s01 * d
-    i11 = s00 * d
-    r00 = f00 * i00 + f01 * i01
-    r01 = f00 * i01 + f01 * i11
-    r10 = f10 * i00 + f11 * i01
-    r11 = f10 * i01 + f11 * i11
-    r20 = f20 * i00 + f21 * i01
-    r21 = f20 * i01 + f21 * i11
-    return r00, r01, r10, r11, r20, r21, s00, s01, s11
-
-
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
 def _tension(s00, s01, s11, limit):  # type: ignore[no-untyped-def]
     """Returns both principal strains, both tensions over k, and the mean of the stretches."""
     mean = 0.5 * (s00 + s11)
@@ -124,7 +100,7 @@ def _force(x, nodes, gradient, limit, stretch, force):  # type: ignore[no-untype
             b0, b1 = gradient[b, 2, l], gradient[b, 3, l]
             u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-            r00, r01, r10, r11, r20, r21, s00, s01, s11 = _polar(
+            r00, r01, r10, r11, r20, r21, _, _, _, s00, s01, s11 = polar_and_stretch(
                 u0 * a0 + v0 * b0,
                 u0 * a1 + v0 * b1,
                 u1 * a0 + v1 * b0,
@@ -165,7 +141,7 @@ def _prepare(x, nodes, gradient, limit, stretch, block):  # type: ignore[no-unty
             w = stretch * gradient[b, 4, l]
             u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
             v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-            r00, r01, r10, r11, r20, r21, s00, s01, s11 = _polar(
+            r00, r01, r10, r11, r20, r21, _, _, _, s00, s01, s11 = polar_and_stretch(
                 u0 * a0 + v0 * b0,
                 u0 * a1 + v0 * b1,
                 u1 * a0 + v1 * b0,

@@ -80,6 +80,15 @@ def stiffness_products(
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
 def polar(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
     """Returns the polar factor R of F (six numbers), S⁻¹ (three) and tr S."""
+    r00, r01, r10, r11, r20, r21, i00, i01, i11, s00, _, s11 = polar_and_stretch(
+        f00, f01, f10, f11, f20, f21
+    )
+    return r00, r01, r10, r11, r20, r21, i00, i01, i11, s00 + s11
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
+def polar_and_stretch(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
+    """Returns the polar factor R of F (six numbers), S⁻¹ and S (three each)."""
     c00 = f00 * f00 + f10 * f10 + f20 * f20
     c01 = f00 * f01 + f10 * f11 + f20 * f21
     c11 = f01 * f01 + f11 * f11 + f21 * f21
@@ -99,7 +108,7 @@ def polar(f00, f01, f10, f11, f20, f21):  # type: ignore[no-untyped-def]
     r11 = f10 * i01 + f11 * i11
     r20 = f20 * i00 + f21 * i01
     r21 = f20 * i01 + f21 * i11
-    return r00, r01, r10, r11, r20, r21, i00, i01, i11, s00 + s11
+    return r00, r01, r10, r11, r20, r21, i00, i01, i11, s00, s01, s11
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
