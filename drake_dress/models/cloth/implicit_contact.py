@@ -91,6 +91,8 @@ class ImplicitContact:
         self.mode[held] = HELD
         # normal velocity, relative to the surface, that brings a node onto its margin
         self._push = _push_out(near.gap, h)
+        # nodes that two bodies hold, where none of the two normals tells what friction bears
+        self._cornered = np.zeros(n, dtype=np.bool_)
         # impulse on nodes that are about to slip; tangential speeds of the last pass
         self._friction, self._speed = np.zeros((n, 3)), np.zeros(n)
         self.resistance = np.zeros(n)
@@ -160,6 +162,7 @@ class ImplicitContact:
                 residual,
                 self._mu,
                 self._adhesion,
+                self._cornered,
                 self.mode,
                 self._friction,
                 self.resistance,
@@ -224,7 +227,7 @@ class ImplicitContact:
         size = float(np.linalg.norm(between))
         near.normal[i] = between / size if size > 1e-6 else own
         near.surface_velocity[i] = 0.5 * (near.surface_velocity[i] + moving) + way / self._h
-        self._push[i], self.mode[i] = 0.0, STICK
+        self._push[i], self.mode[i], self._cornered[i] = 0.0, STICK, True
         self._friction[i], self.resistance[i] = 0.0, 0.0
 
     def impulse(self, velocity: FloatArray, residual: FloatArray) -> FloatArray:
@@ -366,13 +369,13 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
 
 @nb.njit(cache=True, nogil=True)
 def _slip_out_of_cone(  # type: ignore[no-untyped-def]
-    normal, surface_velocity, velocity, impulse, mu, adhesion, mode, friction, resistance
+    normal, surface_velocity, velocity, impulse, mu, adhesion, cornered, mode, friction, resistance
 ):
     """Lets sticking nodes slip whose friction exceeds the cone; returns if it matters in sum."""
     excess = 0.0
     bound = 0.0
     for i in range(mode.shape[0]):
-        if mode[i] != STICK and mode[i] != SLIP:
+        if (mode[i] != STICK and mode[i] != SLIP) or cornered[i]:
             continue
         pressure = 0.0
         for c in range(3):
@@ -391,7 +394,7 @@ def _slip_out_of_cone(  # type: ignore[no-untyped-def]
     if excess <= _TOLERATED_EXCESS * bound:
         return False
     for i in range(mode.shape[0]):
-        if mode[i] != STICK and mode[i] != SLIP:
+        if (mode[i] != STICK and mode[i] != SLIP) or cornered[i]:
             continue
         pressure = 0.0
         for c in range(3):
