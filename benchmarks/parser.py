@@ -22,6 +22,15 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(UNUSABLE, f"{self.prog.replace(' ', ': ', 1)}: {message}\n")
 
 
+def bench_parser(name: str, text: str | None) -> OneLineParser:
+    """Returns the parser of `drake-dress bench NAME`, whose help is `text` as it stands."""
+    return OneLineParser(
+        prog=f"drake-dress bench {name}",
+        description=text,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
 def exit_with(main: Callable[[], int]) -> NoReturn:
     """Ends with the status of a benchmark's `main`, and with one line where input is unusable."""
     try:

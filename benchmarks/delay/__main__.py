@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.parser import OneLineParser, exit_with
+from benchmarks.parser import bench_parser, exit_with
 from benchmarks.scenario_run import run_scenario
 from drake_dress.errors import UserError
 from drake_dress.plan_delay import SHARE, keep_plan_delay
@@ -50,11 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="drake-dress bench delay",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("delay", __doc__)
     parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     return parser

@@ -22,7 +22,7 @@ from benchmarks.hardware.parts import PARTS, Case, Conditions, run
 from benchmarks.hardware.tables import tables, tell
 from benchmarks.hardware.two_processes import available
 from benchmarks.kept import seed_range
-from benchmarks.parser import OneLineParser, at_least_one, exit_with, number_between, some_of
+from benchmarks.parser import at_least_one, bench_parser, exit_with, number_between, some_of
 from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
 from drake_dress.shipped import shipped_scenario
@@ -83,11 +83,7 @@ def _cases(
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="drake-dress bench hardware",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument(
         "--only",
         type=some_of(PARTS),

@@ -26,8 +26,8 @@ from benchmarks.inputs.measurements import prepare
 from benchmarks.inputs.trials import Outcome, Result
 from benchmarks.inputs.worker import KINDS, Worker
 from benchmarks.parser import (
-    OneLineParser,
     at_least_one,
+    bench_parser,
     exit_with,
     output_file,
     seed_number,
@@ -150,11 +150,7 @@ def _as_json(results: Sequence[Result], seed: int) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog=f"drake-dress bench {_NAME}",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument("--cases", type=at_least_one, default=300, metavar="N", help="default 300")
     parser.add_argument(
         "--seed",

@@ -28,7 +28,7 @@ from benchmarks.cloth.table import Table
 from benchmarks.kept import read_results
 from benchmarks.killed.ended_run import Ended, Plan
 from benchmarks.killed.verdict import fingerprints, problems
-from benchmarks.parser import OneLineParser, at_least_one, exit_with, seed_number
+from benchmarks.parser import at_least_one, bench_parser, exit_with, seed_number
 from benchmarks.scenario_run import run_scenario
 from benchmarks.study import add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
@@ -197,11 +197,7 @@ def _tables(results: Sequence[dict[str, Any]]) -> list[Table]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog=f"drake-dress bench {_NAME}",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument(
         "--moments", type=at_least_one, default=100, metavar="N", help="default 100"
     )

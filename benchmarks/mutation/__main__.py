@@ -24,8 +24,8 @@ from benchmarks.mutation.modules import MODULES
 from benchmarks.mutation.mutants import Mutant, all_mutants, change, draw, mutated
 from benchmarks.mutation.trial import CAUGHT, SURVIVED, TIMED_OUT, copied, tried
 from benchmarks.parser import (
-    OneLineParser,
     at_least_one,
+    bench_parser,
     exit_with,
     output_file,
     seed_number,
@@ -116,11 +116,7 @@ def _print_results(results: Mapping[str, dict[str, Any]]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="drake-dress bench mutation",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument("--mutants", type=at_least_one, default=200, help="of all modules together")
     parser.add_argument("--seed", type=seed_number, help="of the draw; a new one by default")
     parser.add_argument(

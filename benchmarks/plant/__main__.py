@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.parser import OneLineParser, at_least_one, exit_with, output_file, output_folder
+from benchmarks.parser import at_least_one, bench_parser, exit_with, output_file, output_folder
 from benchmarks.plant.accuracy import (
     REFERENCE,
     Part,
@@ -171,11 +171,7 @@ def _table(results: Sequence[dict[str, Any]]) -> Table:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="drake-dress bench plant",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
     parser.add_argument("--parts", type=at_least_one, default=10, help="of the motion")
     parser.add_argument("--only", action="append", metavar="NAME", help="a setting; all by default")

@@ -21,7 +21,7 @@ import h5py
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import numbers_that_differ
-from benchmarks.parser import OneLineParser, exit_with, output_folder, seed_number
+from benchmarks.parser import bench_parser, exit_with, output_folder, seed_number
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
@@ -105,11 +105,7 @@ def _turn() -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="drake-dress bench repeat",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser(_NAME, __doc__)
     parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
     parser.add_argument("--seed", type=seed_number, help="the scenario's own by default")
     parser.add_argument("--out", type=output_folder, default=Path("out/repeat"))

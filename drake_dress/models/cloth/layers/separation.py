@@ -245,7 +245,8 @@ class LayerSeparation:
         motion = relative_motion(self._topology, x, dx)
         furthest = 2.0 * float(motion.reach.max())
         # The twist of a rotation by half a turn has no angle, but leaves much.
-        if motion.turn > _TURN or furthest > _FAR * self._edge:
+        turned = motion.turn > _TURN or furthest > _FAR * self._edge
+        if turned:
             # Straight paths of a turning garment close in on each other, those seen by an observer
             # who turns along do not; what crosses nothing for one crosses nothing for the other.
             frame, dx = _seen_by_a_turning_observer(x, dx)
@@ -257,7 +258,7 @@ class LayerSeparation:
         parts = []
         rate, lag = dx.copy(), np.zeros((1, 3))
         known = None
-        if expected is not None and count == 1 and frame[0, 0] == 1.0:
+        if expected is not None and count == 1 and not turned:
             known = expected.of(dx)
         for k in range(count):
             counts.stages = []
