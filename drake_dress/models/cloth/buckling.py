@@ -201,7 +201,7 @@ def _prepare(x, nodes, gradient, limit, stretch, block):  # type: ignore[no-unty
                 block[b, c, l] = rows[c * LANES + l]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[no-untyped-def]
     """Adds scale · K₊ z to `product`, as `filtered_product` does; `block` of `Buckling.prepare`."""
     tile = np.empty(6 * LANES)

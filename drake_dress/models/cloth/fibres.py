@@ -123,7 +123,7 @@ def _prepare(x, triangle, coefficient, block):  # type: ignore[no-untyped-def]
         block[e, 3] = max(0.0, 1.0 - 1.0 / length)
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def filtered_product(z, triangle, coefficient, weight, block, scale, product):  # type: ignore[no-untyped-def]
     """Adds scale · K₊ z to `product` (n,3), K₊ the fibres' stiffness without that of pressure."""
     for e in range(block.shape[0]):

@@ -209,7 +209,7 @@ def _rows(z):  # type: ignore[no-untyped-def]
     return rows
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def _apply(operator, z, out):  # type: ignore[no-untyped-def]
     """Writes A z into `out`, both in rows of four (n,4)."""
     indptr, indices, data, triangle, gradient, corners, share, weight, fibres, block, scale, of = (
@@ -447,7 +447,7 @@ def _go_across(facing, give, mode, normal, residual, out):  # type: ignore[no-un
     return total
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def _precondition(preconditioner, residual, out):  # type: ignore[no-untyped-def]
     factor, masked, masked_scale, mode, normal, work, damped, scaled = preconditioner
     blocks, permutation = factor

@@ -96,7 +96,7 @@ def _prepare(x, nodes, gradient, stretch, block):  # type: ignore[no-untyped-def
                 block[b, c, l] = rows[c * LANES + l]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore[no-untyped-def]
     """Adds scale · K₊ z to `product` (n,3).
 
@@ -266,7 +266,7 @@ def _derivative(x, w, z, nodes, gradient, stretch, out):  # type: ignore[no-unty
         scatter(tile, nodes, b, out)
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def _to_gradient(tile, gradient, b, f):  # type: ignore[no-untyped-def]
     """Writes the gradients F (rows of x, y, z) of the edges in `tile` to `f` (6·LANES,)."""
     for l in range(LANES):
@@ -277,7 +277,7 @@ def _to_gradient(tile, gradient, b, f):  # type: ignore[no-untyped-def]
             f[(2 * c + 1) * LANES + l] = u * a1 + v * b1
 
 
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def _quadratic(f, dw, dz, gradient, b, stretch, value):  # type: ignore[no-untyped-def]
     """Writes dwᵀ k₊(F) dz of the triangles of tile b to `value` (LANES,)."""
     for l in range(LANES):

@@ -46,9 +46,9 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import Csr, bending_matrix, lumped_mass, stretch_matrix
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
 from drake_dress.models.cloth.projective.projected_system import ProjectedSystem
-from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory, dot
+from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory
 from drake_dress.models.cloth.projective.stopping_rule import StoppingRule
-from drake_dress.models.cloth.vectors import largest_length
+from drake_dress.models.cloth.vectors import dot, largest_length
 
 _WINDOW = 5
 # Decrease that a line search asks for, as a share of what the slope promises.

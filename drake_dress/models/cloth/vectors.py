@@ -13,7 +13,7 @@ from drake_dress.models.cloth.elements import FloatArray
 _SUMS = {"reassoc", "contract"}
 
 
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS, forceinline=True)
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Returns Σ a b of two C-contiguous arrays of one shape."""
     p, q = a.reshape(-1), b.reshape(-1)
@@ -23,7 +23,7 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     return total
 
 
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS, forceinline=True)
 def add(a: FloatArray, scale: float, b: FloatArray) -> None:
     """Adds `scale` times `b` to `a`, in place."""
     p, q = a.reshape(-1), b.reshape(-1)
@@ -31,7 +31,7 @@ def add(a: FloatArray, scale: float, b: FloatArray) -> None:
         p[i] += scale * q[i]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=_SUMS)
+@nb.njit(cache=True, nogil=True, fastmath=_SUMS, forceinline=True)
 def turn(direction: FloatArray, beta: float, ahead: FloatArray) -> None:
     """Writes `ahead` + β `direction` to `direction`: the next one of conjugate gradients."""
     p, q = direction.reshape(-1), ahead.reshape(-1)

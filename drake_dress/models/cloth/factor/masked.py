@@ -111,7 +111,7 @@ class SymbolicFactor:
         return Factor(p, blocks, masked.copy())
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-def]
     """Writes P_ff⁻¹ rhs_f (n,3) into `out`, zeros in masked rows; `work` (n,4) is scratch."""
     n = rhs.shape[0]
@@ -130,7 +130,7 @@ def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-
         out[p, 2] = work[i, 2]
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def solve_rows(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-def]
     """Does as `solve_into` with rows of four, (n,4)."""
     take_rows(permutation, rhs, work)
@@ -139,7 +139,7 @@ def solve_rows(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-
     put_rows(permutation, work, out)
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def solve_pair_into(blocks, permutation, first, second, x, y):  # type: ignore[no-untyped-def]
     """Writes P_ff⁻¹ of two right-hand sides (n,3) into `x` and `y`."""
     n = first.shape[0]
@@ -158,7 +158,7 @@ def solve_pair_into(blocks, permutation, first, second, x, y):  # type: ignore[n
             y[p, c] = work[i, c + 4]
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def restricted_solve(part, force, motion):  # type: ignore[no-untyped-def]
     """Writes to `motion` (k,3) the rows of P_ff⁻¹ E `force` at the nodes where `force` (k,3) acts.
 

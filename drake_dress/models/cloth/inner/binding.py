@@ -116,7 +116,7 @@ def bind(  # type: ignore[no-untyped-def]
     return force, moved, multiplier, iterations
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def _conjugate_gradients(  # type: ignore[no-untyped-def]
     system, lack, unknown, moved, started, tolerance, most
 ):
@@ -158,7 +158,7 @@ def _conjugate_gradients(  # type: ignore[no-untyped-def]
     return iterations
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def _generalised_residuals(  # type: ignore[no-untyped-def]
     system, lack, unknown, moved, started, tolerance, most
 ):
@@ -245,7 +245,7 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
     return iterations
 
 
-@nb.njit(cache=True, nogil=True)
+@nb.njit(cache=True, nogil=True, forceinline=True)
 def _condition(conditioner, mode, normal, residual, out, z, force):  # type: ignore[no-untyped-def]
     """Writes the forces that nearly take the motions `residual`; `z`, `force` (c,3) are scratch."""
     around, (indptr, indices, data), nodes, blocks, permutation, moved, others, work = conditioner

@@ -20,7 +20,7 @@ from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
-from drake_dress.models.cloth.projective.quasi_newton import dot
+from drake_dress.models.cloth.vectors import dot
 
 # Relative residual at which conjugate gradients stop, and their most iterations.
 _TOLERANCE = 0.3

@@ -15,6 +15,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.cloth.vectors import dot
 
 # A pair is kept if s·y is at least this share of ‖s‖ ‖y‖: without curvature it has no inverse.
 _LEAST_CURVATURE = 1e-8
@@ -59,15 +60,6 @@ class CurvatureHistory:
         z = first_guess(q)
         _second_loop(order, self._s, self._y, self._inverse, z, alpha)
         return z
-
-
-@nb.njit(cache=True, nogil=True, fastmath=True)
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """Returns Σ a·b of two (n,3)."""
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
-    return total
 
 
 @nb.njit(cache=True, nogil=True)
