@@ -17,7 +17,7 @@ from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.sleeve import find_entry
 from drake_dress.models.dressing.stages import StageState
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.heading import heading
+from drake_dress.models.human.heading import headings
 from drake_dress.models.immutable import Immutable
 from drake_dress.models.sides import SIDES
 
@@ -147,7 +147,7 @@ class DressingPolicy:
         guess = np.concatenate(
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
-        leftward = np.stack([heading(q).leftward for q in joints[1:]])
+        leftward = headings(joints[1:]).leftward
         plan = self.controller.solve(
             x, v, targets, obstacles, guess, p.committed_steps, leftward, p.budget
         )

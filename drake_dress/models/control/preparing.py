@@ -8,16 +8,15 @@ import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.task_parameters import Approach, TaskParameters
-from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts
 from drake_dress.models.human.heading import Heading
 
 
 def choose_approach(
-    p: TaskParameters, axis: ArmAxis, to: Heading, side: int, attempts: int, tethered: bool
+    p: TaskParameters, forearm: FloatArray, to: Heading, side: int, attempts: int, tethered: bool
 ) -> Approach:
-    """Returns how to go about a hand that was missed so often.
+    """Returns how to go about a hand that was missed so often, with `forearm` (3,) as it is now.
 
     What misses a hand once mostly misses it again: an arm that another approach suits gets it. A
     flat forearm goes into an armhole that is turned toward it about the vertical, a steep one into
@@ -27,24 +26,26 @@ def choose_approach(
     """
     if tethered:
         return p.tethered_approaches[attempts % len(p.tethered_approaches)]
-    led = opening(axis, to, side) < p.led_inward
+    led = opening(forearm, to, side) < p.led_inward
     if led and attempts >= p.led_after and (attempts - p.led_after) % 2 == 0:
         return p.led_approach
-    level = float(np.linalg.norm(axis.D(0.0)[:2]))
+    level = float(np.hypot(forearm[0], forearm[1]))
     best = 1 if level >= p.flat else 2 if level <= p.steep else 0
     turn = attempts % len(p.approaches)
     # the best goes first, the others keep their order
     return p.approaches[best if turn == 0 else turn - 1 if turn <= best else turn]
 
 
-def opening(axis: ArmAxis, to: Heading, side: int) -> float:
-    """Returns the inward part of a forearm's direction from hand to elbow."""
-    return float(axis.D(0.0) @ to.inward(side))
+def opening(forearm: FloatArray, to: Heading, side: int) -> float:
+    """Returns the inward part of a forearm's direction (3,) from hand to elbow."""
+    return float(forearm @ to.inward(side))
 
 
-def distance_aside(offset: FloatArray, direction: FloatArray) -> float:
-    """Returns the length of `offset` across the unit vector `direction`."""
-    return float(np.linalg.norm(offset - direction * (direction @ offset)))
+def distance_aside(offset: FloatArray, direction: FloatArray) -> FloatArray:
+    """Returns the lengths (…) of `offset` (…,3) across unit vectors `direction` (…,3)."""
+    along = np.einsum("...i,...i->...", offset, direction)
+    across = offset - direction * along[..., None]
+    return np.sqrt(np.einsum("...i,...i->...", across, across))
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,7 @@ class Preparation:
         parameters: settings.
         side: of the sleeve.
         fact: of the sleeve.
+        way: how it goes about the hand.
         tethered: the other sleeve is on its arm.
         attempts: how often it has missed the hand.
         outlook: place from the hand at which the hand sees the armhole, (3,) m.
@@ -72,80 +74,87 @@ class Preparation:
     parameters: TaskParameters
     side: int
     fact: SleeveFacts
+    way: Approach
     tethered: bool
     attempts: int
     outlook: FloatArray | None
     retreat: bool = False
 
-    def place(self, axis: ArmAxis, to: Heading, sleeve: SleeveState) -> FloatArray:
-        """Returns where the armhole's centre is asked to be, (3,) m.
+    def places(
+        self, hand: FloatArray, forearm: FloatArray, to: Heading, sleeve: SleeveState
+    ) -> FloatArray:
+        """Returns where the armhole's centre is asked to be at N times, (N,3) m.
 
         Args:
-            axis: of the arm.
-            to: heading of the person.
-            sleeve: where it is.
+            hand: (N,3) m.
+            forearm: (N,3) unit, from hand to elbow.
+            to: heading of the person at these times.
+            sleeve: where it is now.
         """
-        p, hand = self.parameters, axis.G(0.0)
-        way = choose_approach(p, axis, to, self.side, self.attempts, self.tethered)
-        direction = way.direction(axis, to, self.side)
+        p = self.parameters
+        direction = self.way.direction(forearm, to, self.side)
         cap = p.tethered_approach_distance if self.tethered else p.approach_distance
         cap *= 1.0 + p.widening * min(self.attempts, 3)
+        outside = hand - cap * direction
         if self.retreat:
-            return hand - cap * direction - p.retreat_distance * to.front
+            return outside - p.retreat_distance * to.front
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
-        depth = float(offset @ -sleeve.v_c)
-        beside = distance_aside(offset, sleeve.v_c)
+        depth = (offset @ -sleeve.v_c)[:, None]
+        beside = distance_aside(offset, sleeve.v_c)[:, None]
         facing = self._facing(beside)
         inside = facing * _ramp(depth, -0.02, 0.02)
         # not over the hand before it is in line: what is beside goes first
-        ahead = _ramp(beside, p.funnel_wide, p.funnel_narrow) if depth < 0.0 else 1.0
+        ahead = np.where(depth < 0.0, _ramp(beside, p.funnel_wide, p.funnel_narrow), 1.0)
         if self.outlook is not None:
-            onward = (1.0 - inside) * sleeve.v_c + inside * axis.D(0.0)
+            onward = (1.0 - inside) * sleeve.v_c + inside * forearm
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
             there: FloatArray = hand + (1.0 - facing) * self.outlook + facing * onward
             return there
         barred = self._barred
-        aside = (1.0 - facing) * distance_aside(offset, direction)
-        distance = min(p.approach_slope * max(0.0, aside - p.aside_free), cap)
-        distance = max(distance, barred * cap)
-        if distance == cap:
-            return self._behind(sleeve, hand - cap * direction, to)
-        onward = (facing - inside) * sleeve.v_c + inside * axis.D(0.0)
+        aside = (1.0 - facing) * distance_aside(offset, direction)[:, None]
+        distance = np.minimum(p.approach_slope * np.maximum(0.0, aside - p.aside_free), cap)
+        distance = np.maximum(distance, barred * cap)
+        waits = distance == cap
+        if waits.all():
+            return self._behind(sleeve, outside, to)
+        onward = (facing - inside) * sleeve.v_c + inside * forearm
         onward = p.overshoot * ((1.0 - facing) * direction + ahead * onward)
         onward = onward - (1.0 - ahead) * facing * p.funnel_distance * sleeve.v_c
         goal: FloatArray = hand - distance * direction + (1.0 - barred) * onward
-        return goal
+        if not waits.any():
+            return goal
+        return np.where(waits, self._behind(sleeve, outside, to), goal)
 
     @property
     def _barred(self) -> float:
         """How far the garment bars the hand's sight of the opening, 0 to 1."""
         stages = self.parameters.stages
-        return _ramp(self.fact.sight, stages.least_sight, stages.lost_sight)
+        return float(_ramp(self.fact.sight, stages.least_sight, stages.lost_sight))
 
-    def _facing(self, beside: float) -> float:
-        """Returns how far, 0 to 1, the opening is one to be drawn straight at the hand.
+    def _facing(self, beside: FloatArray) -> FloatArray:
+        """Returns how far, 0 to 1, the opening is one to be drawn straight at the hand, (N,1).
 
         Args:
-            beside: of the hand, from the opening's normal, m.
+            beside: (N,1) of the hand, from the opening's normal, m.
         """
         p = self.parameters
         facing = (1.0 - self._barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
-        if self.outlook is not None:
-            facing = max(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
-        return facing
+        if self.outlook is None:
+            return facing
+        return np.maximum(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
 
     def _behind(self, sleeve: SleeveState, outside: FloatArray, to: Heading) -> FloatArray:
-        """Returns a place behind `outside`, the further behind the less it is in line with it."""
+        """Returns places behind `outside` (N,3), the further behind the less it is in line."""
         p = self.parameters
         behind = p.tethered_behind_distance if self.tethered else p.behind_distance
-        error = sleeve.p_c - outside
-        error = error - to.front * (to.front @ error)
-        wait = p.approach_slope * max(0.0, float(np.linalg.norm(error)) - 2.0 * p.aside_free)
-        place: FloatArray = outside - min(wait, behind) * to.front
+        error = distance_aside(sleeve.p_c - outside, to.front)[:, None]
+        wait = p.approach_slope * np.maximum(0.0, error - 2.0 * p.aside_free)
+        place: FloatArray = outside - np.minimum(wait, behind) * to.front
         return place
 
 
-def _ramp(value: float, zero: float, one: float) -> float:
-    """Returns 0 beyond `zero`, 1 beyond `one`, linear between."""
-    return min(1.0, max(0.0, (value - zero) / (one - zero)))
+def _ramp(value: float | FloatArray, zero: float, one: float) -> FloatArray:
+    """Returns 0 beyond `zero`, 1 beyond `one`, linear between, for any number of values."""
+    ramp: FloatArray = np.minimum(1.0, np.maximum(0.0, (value - zero) / (one - zero)))
+    return ramp

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_dress.models.cloth.elements import FloatArray
-from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.human.heading import Heading
 
@@ -29,15 +28,26 @@ class Approach:
     emphasis: float = 1.0
     tilt: float = 1.0
 
-    def direction(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
-        """Returns the unit vector along which an armhole is drawn over the hand."""
-        return _between(to.inward(side), axis.D(0.0), self.share)
+    def direction(self, forearm: FloatArray, to: Heading, side: int) -> FloatArray:
+        """Returns the unit vector (…,3) along which an armhole is drawn over the hand.
 
-    def entry(self, axis: ArmAxis, to: Heading, side: int) -> FloatArray:
-        """Returns the unit vector from an armhole to the garment's entry, as it is asked for."""
-        forearm = axis.D(0.0) * np.array([1.0, 1.0, self.tilt])
-        forearm /= np.linalg.norm(forearm)
-        return _between(to.inward(side), forearm, self.orientation)
+        Args:
+            forearm: (…,3) unit, from hand to elbow.
+            to: heading, or one for each forearm.
+            side: of the arm.
+        """
+        return _between(to.inward(side), forearm, self.share)
+
+    def entry(self, forearm: FloatArray, to: Heading, side: int) -> FloatArray:
+        """Returns the unit vector (…,3) from an armhole to the garment's entry, as it is asked for.
+
+        Args:
+            forearm: (…,3) unit, from hand to elbow.
+            to: heading, or one for each forearm.
+            side: of the arm.
+        """
+        tilted = unit(forearm * np.array([1.0, 1.0, self.tilt]))
+        return _between(to.inward(side), tilted, self.orientation)
 
 
 @dataclass(frozen=True)
@@ -143,8 +153,12 @@ class TaskParameters:
     stages: StageParameters = field(default_factory=StageParameters)
 
 
+def unit(v: FloatArray) -> FloatArray:
+    """Returns vectors (…,3) with length one."""
+    shortened: FloatArray = v / np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
+    return shortened
+
+
 def _between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
-    """Returns the unit vector between unit vectors `a` (share 0) and `b` (share 1)."""
-    mixed = (1.0 - share) * a + share * b
-    unit: FloatArray = mixed / np.linalg.norm(mixed)
-    return unit
+    """Returns the unit vectors between unit vectors `a` (share 0) and `b` (share 1), (…,3)."""
+    return unit((1.0 - share) * a + share * b)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from drake_dress.models.control.preparing import (
     distance_aside,
     opening,
 )
-from drake_dress.models.control.task_parameters import Approach, TaskParameters
+from drake_dress.models.control.task_parameters import Approach, TaskParameters, unit
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sight import (
@@ -37,7 +38,7 @@ from drake_dress.models.dressing.stages import (
     withdraws,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.heading import Heading, heading
+from drake_dress.models.human.heading import Heading, heading, headings
 
 # How much further up its arm the next place of a sleeve that is on it is, as s.
 _NEXT = 0.04
@@ -71,6 +72,28 @@ def arm_axes(joints: FloatArray) -> tuple[ArmAxis, ArmAxis]:
         ArmAxis(hand=q[2], elbow=q[1], shoulder=q[0]),
         ArmAxis(hand=q[5], elbow=q[4], shoulder=q[3]),
     )
+
+
+class _Arm:
+    """An arm at N + 1 times.
+
+    Args:
+        joints: (N+1,6,3) predicted, m; row 0 is now.
+        side: of the arm.
+
+    Attributes:
+        shoulder, hand: (N+1,3) m. forearm: (N+1,3) unit, from hand to elbow.
+    """
+
+    def __init__(self, joints: FloatArray, side: int) -> None:
+        self.shoulder, self._elbow, self.hand = (joints[:, 3 * side + i] for i in range(3))
+        self.forearm = unit(self._elbow - self.hand)
+
+    @cached_property
+    def axes(self) -> list[ArmAxis]:
+        """The arm's axis at each time."""
+        rows = zip(self.hand, self._elbow, self.shoulder, strict=True)
+        return [ArmAxis(hand, elbow, shoulder) for hand, elbow, shoulder in rows]
 
 
 class TaskPlanner:
@@ -114,7 +137,7 @@ class TaskPlanner:
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
         missed = stages.attempts
         linked = [self._linked(x, joints, side) for side in (0, 1)]
-        ways = [choose_approach(p, axes[i], to, i, missed[i], linked[1 - i]) for i in (0, 1)]
+        ways = [choose_approach(p, axes[i].D(0.0), to, i, missed[i], linked[1 - i]) for i in (0, 1)]
         facts = (
             self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
             self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
@@ -168,11 +191,11 @@ class TaskPlanner:
             joints: (N+1,6,3) predicted, m; row 0 is now.
             time_step: between rows, s.
         """
-        axes = [arm_axes(q) for q in joints]
-        headings = [heading(q) for q in joints]
+        arms = (_Arm(joints, 0), _Arm(joints, 1))
+        to = headings(joints)
         return (
-            self._target(assignment, 0, axes, headings, sleeves, time_step),
-            self._target(assignment, 1, axes, headings, sleeves, time_step),
+            self._target(assignment, 0, arms, to, sleeves, time_step),
+            self._target(assignment, 1, arms, to, sleeves, time_step),
         )
 
     def _linked(self, x: FloatArray, joints: FloatArray, side: int) -> bool:
@@ -216,7 +239,7 @@ class TaskPlanner:
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + _NEXT))
-        return axis.G(0.0) - p.approach_distance * way.direction(axis, to, side)
+        return axis.G(0.0) - p.approach_distance * way.direction(axis.D(0.0), to, side)
 
     def _facts(
         self,
@@ -232,7 +255,7 @@ class TaskPlanner:
         _, elbow, hand = joints[3 * side : 3 * side + 3]
         s, _, _ = axis.coordinates(sleeve.p_c)
         offset = hand - sleeve.p_c
-        aside = distance_aside(offset, way.direction(axis, to, side))
+        aside = distance_aside(offset, way.direction(axis.D(0.0), to, side))
         loop = self.armholes[side]
         sight = free_sight(x, self.mesh.faces, loop, hand)
         touches = not linked and distance_to_opening(x[loop], hand) < self.parameters.touch_distance
@@ -241,9 +264,9 @@ class TaskPlanner:
             sight=1.0 if touches else sight,
             s=float(s) if linked else 0.0,
             hand_distance=float(np.linalg.norm(offset)),
-            prepared_error=max(aside, 0.5 * float(np.linalg.norm(offset))),
+            prepared_error=max(float(aside), 0.5 * float(np.linalg.norm(offset))),
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
-            opening=opening(axis, to, side),
+            opening=opening(axis.D(0.0), to, side),
             touches=touches,
             hand=_place(hand),
             away=_place(offset / max(float(np.linalg.norm(offset)), 1e-12)),
@@ -253,55 +276,53 @@ class TaskPlanner:
         self,
         given: Assignment,
         side: int,
-        axes: Sequence[tuple[ArmAxis, ArmAxis]],
-        headings: Sequence[Heading],
+        arms: tuple[_Arm, _Arm],
+        to: Heading,
         sleeves: Sequence[SleeveState],
         time_step: float,
     ) -> SleeveTarget:
         task = given.tasks[side]
         if task in (Task.PREPARE, Task.REST) or not given.facts[side].linked:
-            mine = [pair[side] for pair in axes]
-            target = self._target_off_arm(given, side, mine, headings, sleeves, time_step)
+            target = self._target_off_arm(given, side, arms[side], to, sleeves, time_step)
             if task == Task.REST:
                 return SleeveTarget(target.position, target.direction, 0.0, 0.0)
             return target
-        return self._target_on_arm(given, side, axes, headings, sleeves, time_step)
+        return self._target_on_arm(given, side, arms, to, sleeves, time_step)
 
     def _target_off_arm(
         self,
         given: Assignment,
         side: int,
-        axes: Sequence[ArmAxis],
-        headings: Sequence[Heading],
+        arm: _Arm,
+        to: Heading,
         sleeves: Sequence[SleeveState],
         time_step: float,
     ) -> SleeveTarget:
         """Returns the target of a sleeve that is to go over its hand, or is taken back from it."""
-        p, fact, tethered = self.parameters, given.facts[side], given.facts[1 - side].linked
-        missed = given.attempts[side]
-        way = choose_approach(p, axes[0], headings[0], side, missed, tethered)
-        preparation = self._preparation(given, side, given.retreat[side])
+        p, fact = self.parameters, given.facts[side]
+        preparation = self._preparation(given, side, arm, to, given.retreat[side])
         away = given.retreat[side] or given.swing[side] or given.withdraw
-
-        def place(j: int, axis: ArmAxis, to: Heading) -> FloatArray:
-            if given.withdraw:
-                return axis.G(2.0) - p.withdrawal_distance * to.front
-            if given.swing[side]:
-                return self._swung(to, side, sleeves[1 - side])
-            if fact.touches and not away:
-                return axis.G(j * time_step * p.progress_rate)
-            return preparation.place(axis, to, sleeves[side])
-
-        ahead = list(zip(axes[1:], headings[1:], strict=True))
+        hand, forearm, soon = arm.hand[1:], arm.forearm[1:], Heading(to.rotation[1:])
+        if given.withdraw:
+            position = arm.shoulder[1:] - p.withdrawal_distance * soon.front
+        elif given.swing[side]:
+            position = self._swung(soon, side, sleeves[1 - side])
+        elif fact.touches and not away:
+            times = time_step * np.arange(1, len(hand) + 1)
+            drawn = zip(arm.axes[1:], p.progress_rate * times, strict=True)
+            position = np.stack([axis.G(s) for axis, s in drawn])
+        else:
+            position = preparation.places(hand, forearm, soon, sleeves[side])
+        way = preparation.way
         target = SleeveTarget(
-            np.stack([place(j, axis, to) for j, (axis, to) in enumerate(ahead, start=1)]),
-            np.stack([way.entry(axis, to, side) for axis, to in ahead]),
+            position,
+            way.entry(forearm, soon, side),
             direction_weight=way.emphasis,
             entering=True,
         )
         if away:
             return target
-        corridor = _ahead(axes[1:])
+        corridor = Corridor(hand, -forearm)
         target = replace(target, passage=corridor.into)
         if fact.hand_distance > p.near_distance:
             return target
@@ -316,25 +337,22 @@ class TaskPlanner:
         self,
         given: Assignment,
         side: int,
-        axes: Sequence[tuple[ArmAxis, ArmAxis]],
-        headings: Sequence[Heading],
+        arms: tuple[_Arm, _Arm],
+        to: Heading,
         sleeves: Sequence[SleeveState],
         time_step: float,
     ) -> SleeveTarget:
         """Returns the target of a sleeve that is drawn up its arm, waits on it, or is held."""
-        p, fact, task, n = self.parameters, given.facts[side], given.tasks[side], len(axes) - 1
-        mine = [pair[side] for pair in axes]
+        p, fact, task, mine = self.parameters, given.facts[side], given.tasks[side], arms[side].axes
+        n = len(mine) - 1
         if task == Task.HOLD:
             progress = [max(fact.s, p.stages.done_progress)] * n
         elif task == Task.DRESS:
             progress = self._drawn_progress(given, side, [j * time_step for j in range(1, n + 1)])
         else:
             k = 1 - side
-            other = self._preparation(given, k)
-            places = [
-                other.place(pair[k], to, sleeves[k])
-                for pair, to in zip(axes[1:], headings[1:], strict=True)
-            ]
+            other, soon = self._preparation(given, k, arms[k], to), Heading(to.rotation[1:])
+            places = other.places(arms[k].hand[1:], arms[k].forearm[1:], soon, sleeves[k])
             progress = [
                 self._waiting_progress(axis, place)
                 for axis, place in zip(mine[1:], places, strict=True)
@@ -362,25 +380,30 @@ class TaskPlanner:
                 largest = min(largest, p.stages.done_progress)
         return [min(fact.s + t * rate, largest) for t in times]
 
-    def _preparation(self, given: Assignment, side: int, retreat: bool = False) -> Preparation:
+    def _preparation(
+        self, given: Assignment, side: int, arm: _Arm, to: Heading, retreat: bool = False
+    ) -> Preparation:
+        p, now = self.parameters, Heading(to.rotation[0])
+        missed, tethered = given.attempts[side], given.facts[1 - side].linked
         return Preparation(
-            self.parameters,
+            p,
             side,
             given.facts[side],
-            given.facts[1 - side].linked,
-            given.attempts[side],
+            choose_approach(p, arm.forearm[0], now, side, missed, tethered),
+            tethered,
+            missed,
             given.outlook[side],
             retreat,
         )
 
     def _swung(self, to: Heading, side: int, other: SleeveState) -> FloatArray:
-        """Returns where a sleeve is swung back to, (3,) m, with the other one on its arm.
+        """Returns where a sleeve is swung back to, (N,3) m, with the other one on its arm.
 
         Behind the first one, where the coat hangs free of the hand that was missed.
         """
         p = self.parameters
         way = -to.front - p.swing_outward * to.inward(side)
-        place: FloatArray = other.p_c + p.swing_reach * self._reach * way / np.linalg.norm(way)
+        place: FloatArray = other.p_c + p.swing_reach * self._reach * unit(way)
         return place
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
@@ -395,11 +418,6 @@ class TaskPlanner:
         offset = axis.points(steps) - other
         reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
         return float(steps[np.argmax(reached)]) if reached.any() else least
-
-
-def _ahead(axes: Sequence[ArmAxis]) -> Corridor:
-    """Returns the way ahead of a hand whose arm is predicted."""
-    return Corridor(np.stack([a.G(0.0) for a in axes]), -np.stack([a.D(0.0) for a in axes]))
 
 
 def _place(point: FloatArray) -> Place:

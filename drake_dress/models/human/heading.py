@@ -18,7 +18,8 @@ class Heading:
     """Directions of a person who may have turned about the vertical.
 
     Attributes:
-        rotation: R (3,3) about z from a person who faces +x.
+        rotation: R (3,3) about z from a person who faces +x; (N,3,3) of N times, and then there are
+            as many of each direction.
     """
 
     rotation: FloatArray
@@ -26,12 +27,12 @@ class Heading:
     @property
     def front(self) -> FloatArray:
         """Returns the unit vector (3,) the person faces along (v_f)."""
-        return self.rotation[:, 0]
+        return self.rotation[..., 0]
 
     @property
     def leftward(self) -> FloatArray:
         """Returns the unit vector (3,) from right to left."""
-        return self.rotation[:, 1]
+        return self.rotation[..., 1]
 
     def inward(self, side: int) -> FloatArray:
         """Returns the unit vector (3,) from a side, 0 the left, to the other."""
@@ -49,3 +50,8 @@ def heading(joints: FloatArray) -> Heading:
         return Heading(np.eye(3))
     c, s = line[1] / length, -line[0] / length
     return Heading(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def headings(joints: FloatArray) -> Heading:
+    """Returns the headings at N times of joints (N,6,3), m, as one with N rows."""
+    return Heading(np.stack([heading(q).rotation for q in joints]))

@@ -151,7 +151,7 @@ def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
         given = Assignment((Task.PREPARE, Task.REST), (off, off), attempts=(k, 0))
         asked.append(planner.targets(given, [away, away], rows, STEP)[0].direction[0])
     order = [first, *(i for i in range(len(ways)) if i != first)]
-    np.testing.assert_allclose(asked, [ways[i].entry(axis, to, 0) for i in order])
+    np.testing.assert_allclose(asked, [ways[i].entry(axis.D(0.0), to, 0) for i in order])
 
 
 @pytest.mark.parametrize("tethered", [False, True])
@@ -181,7 +181,7 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
                 attempts=(missed, 0) if side == 0 else (0, missed),
             )
             asked = planner.targets(given, sleeves, rows, STEP)[side].direction[0]
-            along = p.led_approach.entry(axis, to, side)
+            along = p.led_approach.entry(axis.D(0.0), to, side)
             due = not tethered and inward < p.led_inward and missed in (3, 5)
             assert np.allclose(asked, along) == due
 
@@ -228,7 +228,7 @@ def test_the_first_sleeve_comes_in_line_before_it_is_drawn_over_the_hand(
 ) -> None:
     q, to = np.stack([joints()] * (HORIZON + 1)), heading(joints())
     axis, p = arm_axes(joints())[0], planner.parameters
-    normal = p.approaches[0].direction(axis, to, 0)
+    normal = p.approaches[0].direction(axis.D(0.0), to, 0)
     across = np.cross(normal, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     facts = SleeveFacts(False, 0.0, 0.12, 0.06, 0.0)
@@ -252,7 +252,7 @@ def test_a_sleeve_goes_back_as_far_as_its_hand_is_barred_from_it(planner: TaskPl
     """Without a leap: an armhole that turned round with each line of sight would get nowhere."""
     q, to = np.stack([joints()] * (HORIZON + 1)), heading(joints())
     axis, p = arm_axes(joints())[0], planner.parameters
-    way = p.approaches[0].direction(axis, to, 0)
+    way = p.approaches[0].direction(axis.D(0.0), to, 0)
     near = SleeveState(axis.G(0.0) - 0.12 * way, way)
 
     def ahead(sight: float) -> float:
