@@ -24,7 +24,7 @@ from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
-FREE, STICK, SLIP, HELD = 0, 1, 2, 3
+FREE, STICK, SLIP, HELD, RAIL = 0, 1, 2, 3, 4
 # Weight of motion across the cloth beside P⁻¹ in the preconditioner: smooth motion is in both.
 _ACROSS = 0.3
 # Of the residual at the start, what rounding leaves over. Where all but nothing drives the free
@@ -260,6 +260,11 @@ def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
             z[i, 0] -= d * normal[i, 0]
             z[i, 1] -= d * normal[i, 1]
             z[i, 2] -= d * normal[i, 2]
+        elif m == 4:
+            d = z[i, 0] * normal[i, 0] + z[i, 1] * normal[i, 1] + z[i, 2] * normal[i, 2]
+            z[i, 0] = d * normal[i, 0]
+            z[i, 1] = d * normal[i, 1]
+            z[i, 2] = d * normal[i, 2]
 
 
 @nb.njit(cache=True, nogil=True)
@@ -439,6 +444,9 @@ def _go_across(facing, give, mode, normal, residual, out):  # type: ignore[no-un
             f0 -= d * normal[i, 0]
             f1 -= d * normal[i, 1]
             f2 -= d * normal[i, 2]
+        elif m == 4:
+            d = f0 * normal[i, 0] + f1 * normal[i, 1] + f2 * normal[i, 2]
+            f0, f1, f2 = d * normal[i, 0], d * normal[i, 1], d * normal[i, 2]
         step = give[i] * along
         out[i, 0] += step * f0
         out[i, 1] += step * f1

@@ -27,7 +27,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK, SystemMatrix
+from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK, SystemMatrix
 from drake_dress.models.cloth.filtered_stiffness import (
     normal_response,
     prepare_filtered,
@@ -245,7 +245,7 @@ class ImplicitCloth:
         rhs = inertia[:, None] * v + driven
 
         velocity = self._start(v, held_velocity, mode, near.normal, rhs, block, guess)
-        total, residual, passes, changed = 0, 0.0, 0, 1
+        total, residual, passes = 0, 0.0, 0
         left, landing = self._most_cone_passes, _LANDING_PASSES
         factor, refactored, memory = self._renewed_factor(state.solver[0], mode, contact.resistance)
         impulse = np.empty_like(velocity)
@@ -276,26 +276,24 @@ class ImplicitCloth:
                 if left > 0 and contact.slip_out_of_cone(velocity, impulse):
                     left -= 1
                     continue
-                # Nothing may end up inside the person because it was not seen to land.
-                if (
-                    landing > 0
-                    and contact.is_near
-                    and contact.stop_entering(x, velocity, obstacles, m.margin)
-                ):
-                    landing -= 1
-                    inertia = self._bound_inertia(mode)
-                    rhs = inertia[:, None] * v + driven
+            else:
+                changed = contact.update(velocity, impulse)
+                few = changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
+                if not few or residual > self._tolerance:
+                    if changed > 0:
+                        inertia = self._bound_inertia(mode)
+                        rhs = inertia[:, None] * v + driven
                     continue
-                break
-            changed = contact.update(velocity, impulse)
+            # Nothing may end up inside the person because it was not seen to land.
             if (
-                changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
-                and residual <= self._tolerance
+                landing == 0
+                or not contact.is_near
+                or not contact.stop_entering(x, velocity, impulse, obstacles, m.margin)
             ):
                 break
-            if changed > 0:
-                inertia = self._bound_inertia(mode)
-                rhs = inertia[:, None] * v + driven
+            landing -= 1
+            inertia = self._bound_inertia(mode)
+            rhs = inertia[:, None] * v + driven
         end = x + h * velocity
         if not np.isfinite(end).all():
             explain_not_finite(x, v, held_velocity, self.held)
@@ -303,12 +301,15 @@ class ImplicitCloth:
             memory[0] = -1
         # θ where the step was solved as free, 1 where it was bound
         share = (self.mass / inertia)[:, None]
+        reaction = contact.impulse(velocity, impulse) / h
+        # for this step only
+        mode[mode == RAIL] = SLIP
         touching = (mode == STICK) | (mode == SLIP)
         after = ClothState(
             end,
             velocity if self._implicitness == 1.0 else v + (velocity - v) / share,
             mode,
-            contact.impulse(velocity, impulse) / h,
+            reaction,
             np.where(touching, near.owner, -1).astype(np.int32),
             np.stack([memory, state.solver[1]]),
         )

@@ -6,6 +6,7 @@ r_N along the normal n, and u_N* the normal velocity that brings a node onto its
     free     w_N ≥ u_N*,  r = 0
     stick    w_N = u_N*,  w_T = 0,  ‖r_T‖ ≤ μ r_N
     slip     w_N = u_N*,  r_T = −μ r_N w_T / ‖w_T‖
+    rail     held by two bodies: w only along the line where their surfaces meet, and friction on it
 
 Modes start from those of the step before. Friction of slipping nodes enters as a resistance c w_T,
 c = μ r_N / ‖w_T‖ of the last pass or step: it cannot turn a node around. As a fixed impulse, ten
@@ -22,7 +23,7 @@ from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
 from drake_dress.models.cloth.contact.distance import distance_to, nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK
+from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK
 
 # A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.
 _LARGEST_PUSH = 0.2
@@ -57,8 +58,9 @@ class ImplicitContact:
         adhesion: (n,) pull that a contact bears, N.
 
     Attributes:
-        mode: (n,) FREE, STICK, SLIP or HELD, now.
-        resistance: (n,) c of slipping nodes, kg.
+        mode: (n,) FREE, STICK, SLIP, RAIL or HELD, now. Of a node on a rail, `normal` is the rail's
+            direction.
+        resistance: (n,) c of nodes that slip or are on a rail, kg.
     """
 
     def __init__(
@@ -91,8 +93,6 @@ class ImplicitContact:
         self.mode[held] = HELD
         # normal velocity, relative to the surface, that brings a node onto its margin
         self._push = _push_out(near.gap, h)
-        # nodes that two bodies hold, where none of the two normals tells what friction bears
-        self._cornered = np.zeros(n, dtype=np.bool_)
         # impulse on nodes that are about to slip; tangential speeds of the last pass
         self._friction, self._speed = np.zeros((n, 3)), np.zeros(n)
         self.resistance = np.zeros(n)
@@ -162,7 +162,6 @@ class ImplicitContact:
                 residual,
                 self._mu,
                 self._adhesion,
-                self._cornered,
                 self.mode,
                 self._friction,
                 self.resistance,
@@ -170,23 +169,29 @@ class ImplicitContact:
         )
 
     def stop_entering(
-        self, x: FloatArray, velocity: FloatArray, obstacles: Obstacles, margin: float
+        self,
+        x: FloatArray,
+        velocity: FloatArray,
+        residual: FloatArray,
+        obstacles: Obstacles,
+        margin: float,
     ) -> bool:
         """Binds nodes that would end farther inside a body; returns if there are any.
 
         A node that is free lands on that body; one that is bound goes where the surfaces of what it
-        touches and of that body meet, and stays there for this step.
+        touches and of that body meet, and slides along that line with friction.
 
         Args:
             x: (n,3) at the start of the step, m.
             velocity: (n,3) mean over the step, m/s.
+            residual: (n,3) of the equations of motion without contact, N s.
             obstacles: bodies.
             margin: distance to keep, m.
         """
         near, h, shapes = self._near, self._h, obstacles.packed
         distance, owner = np.empty(len(x)), np.empty(len(x), dtype=np.int32)
         nearest_obstacle(x + h * (velocity - near.surface_velocity), shapes, distance, owner)
-        bound = (self.mode == STICK) | (self.mode == SLIP)
+        bound = (self.mode == STICK) | (self.mode == SLIP) | (self.mode == RAIL)
         end = distance - margin
         entered = (end < -_ENTERED) & (self.mode != HELD)
         # what was as deep in that body before is on its way out
@@ -200,7 +205,10 @@ class ImplicitContact:
         gap -= margin
         for k, i in enumerate(rows):
             if bound[i]:
-                self._hold_in_corner(int(i), normal[k], moving[k], float(gap[k]))
+                if self.mode[i] != RAIL:
+                    self._put_on_rail(
+                        int(i), velocity[i], residual[i], normal[k], moving[k], float(gap[k])
+                    )
                 continue
             near.gap[i], near.owner[i] = gap[k], owner[i]
             near.normal[i], near.surface_velocity[i] = normal[k], moving[k]
@@ -208,27 +216,47 @@ class ImplicitContact:
             self.mode[i] = _landing_mode(velocity, near.surface_velocity, near.normal, i)
         return True
 
-    def _hold_in_corner(self, i: int, normal: FloatArray, moving: FloatArray, gap: float) -> None:
-        """Prescribes to node `i`, bound already, the way to where a second surface meets its own.
+    def _put_on_rail(
+        self,
+        i: int,
+        velocity: FloatArray,
+        residual: FloatArray,
+        normal: FloatArray,
+        moving: FloatArray,
+        gap: float,
+    ) -> None:
+        """Leaves to node `i`, bound already, the line where a second surface meets its own.
+
+        Surfaces that face each other, or look the same way, have no such line: between them a node
+        slips.
 
         Args:
             i: the node.
+            velocity: (3,) of it, m/s.
+            residual: (3,) N s.
             normal: (3,) of the second surface.
             moving: (3,) its velocity, m/s.
             gap: of it, less the margin, m.
         """
         near = self._near
         own, c = near.normal[i].copy(), float(near.normal[i] @ normal)
-        way = np.zeros(3)
+        between = 0.5 * (near.surface_velocity[i] + moving)
+        self._push[i], self._friction[i] = 0.0, 0.0
         if abs(c) < _FACING:
             first, second = float(near.gap[i]), gap
             way = ((c * second - first) * own + (c * first - second) * normal) / (1.0 - c * c)
-        between = own + normal
-        size = float(np.linalg.norm(between))
-        near.normal[i] = between / size if size > 1e-6 else own
-        near.surface_velocity[i] = 0.5 * (near.surface_velocity[i] + moving) + way / self._h
-        self._push[i], self.mode[i], self._cornered[i] = 0.0, STICK, True
-        self._friction[i], self.resistance[i] = 0.0, 0.0
+            between += way / self._h
+            line = np.cross(own, normal)
+            near.normal[i], self.mode[i] = line / np.linalg.norm(line), RAIL
+            slid = abs(float(near.normal[i] @ (velocity - between)))
+        else:
+            self.mode[i] = SLIP
+            w = velocity - between
+            slid = float(np.linalg.norm(w - (own @ w) * own))
+        near.surface_velocity[i] = between
+        # what the first surface bore so far tells how large friction is
+        pressure = max(float(own @ residual) + float(self._adhesion[i]), 0.0)
+        self.resistance[i] = self._mu[i] * pressure / max(slid, _SLOWEST)
 
     def impulse(self, velocity: FloatArray, residual: FloatArray) -> FloatArray:
         """Returns (n,3) the impulse of person and grippers at a solution, N s.
@@ -272,6 +300,13 @@ def _impulse(  # type: ignore[no-untyped-def]
             for c in range(3):
                 w = velocity[i, c] - surface_velocity[i, c] - away * normal[i, c]
                 out[i, c] = pressure * normal[i, c] + friction[i, c] - resistance[i] * w
+        elif mode[i] == RAIL:
+            along, slid = 0.0, 0.0
+            for c in range(3):
+                along += residual[i, c] * normal[i, c]
+                slid += (velocity[i, c] - surface_velocity[i, c]) * normal[i, c]
+            for c in range(3):
+                out[i, c] = residual[i, c] - (along + resistance[i] * slid) * normal[i, c]
         else:
             for c in range(3):
                 out[i, c] = residual[i, c]
@@ -365,17 +400,23 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
                 along += normal[i, c] * (surface_velocity[i, c] - velocity[i, c])
             for c in range(3):
                 velocity[i, c] += along * normal[i, c]
+        elif mode[i] == RAIL:
+            along = 0.0
+            for c in range(3):
+                along += normal[i, c] * (velocity[i, c] - surface_velocity[i, c])
+            for c in range(3):
+                velocity[i, c] = surface_velocity[i, c] + along * normal[i, c]
 
 
 @nb.njit(cache=True, nogil=True)
 def _slip_out_of_cone(  # type: ignore[no-untyped-def]
-    normal, surface_velocity, velocity, impulse, mu, adhesion, cornered, mode, friction, resistance
+    normal, surface_velocity, velocity, impulse, mu, adhesion, mode, friction, resistance
 ):
     """Lets sticking nodes slip whose friction exceeds the cone; returns if it matters in sum."""
     excess = 0.0
     bound = 0.0
     for i in range(mode.shape[0]):
-        if (mode[i] != STICK and mode[i] != SLIP) or cornered[i]:
+        if mode[i] != STICK and mode[i] != SLIP:
             continue
         pressure = 0.0
         for c in range(3):
@@ -394,7 +435,7 @@ def _slip_out_of_cone(  # type: ignore[no-untyped-def]
     if excess <= _TOLERATED_EXCESS * bound:
         return False
     for i in range(mode.shape[0]):
-        if (mode[i] != STICK and mode[i] != SLIP) or cornered[i]:
+        if mode[i] != STICK and mode[i] != SLIP:
             continue
         pressure = 0.0
         for c in range(3):

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
-from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
@@ -79,3 +79,36 @@ def test_a_sheet_thrown_at_a_limb_does_not_enter(speed: float) -> None:
         state, _ = cloth.step(state, bodies, np.zeros((0, 3)))
         deepest = max(deepest, depth(state.x, bodies))
     assert deepest < 1e-3
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+@pytest.mark.parametrize("angle", [50.0, 90.0, 130.0])
+def test_what_slides_from_one_surface_to_another_goes_on_along_where_they_meet(
+    angle: float, friction: float
+) -> None:
+    """A floor and a wall on it: a sheet that reaches the wall keeps its way along both."""
+    x, e = sheet_elements(3, 3, 0.025)
+    material = Material(stretch_stiffness=1500.0, friction=friction)
+    start = x - x.max(axis=0)
+    start[:, 2] = material.margin
+    lean = np.deg2rad(angle)
+    normals = np.array([[0.0, 0.0, 1.0], [-np.sin(lean), 0.0, np.cos(lean)]])
+    planes = HalfSpaces.resting(np.array([np.zeros(3), [0.01, 0.0, 0.0]]), normals)
+    bodies = replace(Obstacles.none(), half_spaces=planes)
+    cloth = ImplicitCloth(e, material, H, NO_NODES, tolerance=1e-6, implicitness=0.7)
+    # pressed to the floor by a step, then thrown
+    state, _ = cloth.step(ClothState.at_rest(start), bodies, np.zeros((0, 3)))
+    state = replace(state, v=np.tile([2.0, 1.0, 0.0], (len(x), 1)))
+    before = 1.0
+    for k in range(4):
+        state, _ = cloth.step(state, bodies, np.zeros((0, 3)))
+        assert depth(state.x, bodies) < 1e-3
+        along = state.v[:, 1] @ cloth.mass / cloth.mass.sum()
+        if friction == 0.0:
+            assert along == pytest.approx(1.0, abs=1e-3)
+        else:
+            assert -1e-3 < along < before
+        if k == 0:
+            # reached the wall just now, which nothing holds on to
+            assert along > 0.9
+        before = along
