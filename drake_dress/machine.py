@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import os
-from collections.abc import MutableMapping
+from collections.abc import Iterator, MutableMapping
 from pathlib import Path
 
 _OWN_GROUPS = Path("/proc/self/cgroup")
@@ -41,6 +43,21 @@ def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
     if count < len(os.sched_getaffinity(0)):
         for name in _THREADS:
             environment.setdefault(name, str(count))
+
+
+@contextlib.contextmanager
+def left_out_of_garbage() -> Iterator[None]:
+    """Has Python look for garbage only among what is made meanwhile.
+
+    Compilers, libraries and diagrams are a million objects that stay: to look at them again and
+    again took 3 % of a run.
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _quota(groups: Path, own: Path) -> float | None:

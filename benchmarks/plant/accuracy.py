@@ -53,7 +53,8 @@ class Setting:
     def of_fidelity(name: str, self_collision: bool = False) -> Setting:
         """Returns the setting of a word of `plant.fidelity`."""
         shown = f"{name}, layers collide" if self_collision else name
-        return Setting(shown, **FIDELITIES[name], self_collision=self_collision)
+        given = {k: v for k, v in FIDELITIES[name].items() if k in Setting.__dataclass_fields__}
+        return Setting(shown, **given, self_collision=self_collision)
 
     def of(self, scenario: Scenario, folder: Path) -> tuple[GarmentMesh, Integrator]:
         """Returns the scenario's garment with it, and what steps it."""

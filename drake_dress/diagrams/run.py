@@ -30,6 +30,7 @@ from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_ya
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
+from drake_dress.machine import left_out_of_garbage
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_writer import RunLogWriter
@@ -97,7 +98,8 @@ def run_scenario(
         ) as writer:
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
-            ending = _simulate(dressing, simulator, scenario.duration, realtime_rate)
+            with left_out_of_garbage():
+                ending = _simulate(dressing, simulator, scenario.duration, realtime_rate)
             _note(dressing, simulator, ending, writer)
         wall_time = clock.perf_counter() - begin
         return concluded(out, wall_time, report, ending.interrupt)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -43,6 +44,7 @@ class Apart:
 def _begin(work: Callable[..., Any]) -> None:
     global _worker
     _worker = work
+    gc.freeze()
     # who sends commands goes first where cores are few
     os.nice(_NICENESS)
 

@@ -19,6 +19,7 @@ from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.human.body import Capsule
+from drake_dress.systems.body_frames import frames
 from drake_dress.systems.garment_steps import Steps, StepsBeside, StepsHere, Surroundings
 
 FloatArray = np.ndarray
@@ -150,8 +151,8 @@ class ClothPlant(LeafSystem):
         """Returns the person's capsules in the world, as the body ports say."""
         poses, velocities = self._poses.Eval(context), self._velocities.Eval(context)
         body = self._body_of
-        rotation = np.array([poses[i].rotation().matrix() for i in self._index])[body]
-        origin = np.array([poses[i].translation() for i in self._index])[body]
+        frame = frames(poses, self._index)[body]
+        rotation, origin = frame[:, :, :3], frame[:, :, 3]
         twist = np.array([velocities[i].get_coeffs() for i in self._index])[body]
         omega = np.ascontiguousarray(twist[:, :3])
         to_a = np.einsum("kij,kj->ki", rotation, self._a)
@@ -247,7 +248,7 @@ class ClothPlant(LeafSystem):
     def _wrenches(self, context: Context, after: ClothState) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
         poses = self._poses.Eval(context)
-        origin = np.array([poses[i].translation() for i in self._index])
+        origin = np.ascontiguousarray(frames(poses, self._index)[:, :, 3])
         return body_wrenches(self._body_of, origin, after.x, after.owner, after.reaction)
 
     def _calc(self, index):  # type: ignore[no-untyped-def]

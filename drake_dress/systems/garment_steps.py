@@ -7,6 +7,7 @@ the two it is makes no difference to the numbers.
 from __future__ import annotations
 
 import contextlib
+import gc
 import multiprocessing
 import os
 from dataclasses import dataclass
@@ -225,6 +226,7 @@ def _serve(shared: _Shared, pipe: Connection, parent: int) -> None:
         cloth, surroundings = pipe.recv()
     except (EOFError, OSError):
         return
+    gc.freeze()
     places, around = shared.states(), shared.around()
     place, state = 0, places[0]
     while True:

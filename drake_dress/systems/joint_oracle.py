@@ -11,6 +11,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from drake_dress.models.effects.composition import seen_points
 from drake_dress.models.effects.effect import Effect
+from drake_dress.systems.body_frames import world_points
 
 
 class JointOracle(LeafSystem):
@@ -36,11 +37,12 @@ class JointOracle(LeafSystem):
     ) -> None:
         super().__init__()
         self._effects = tuple(effects)
-        self._points = points
+        self._bodies = [body for body, _ in points]
+        self._points = np.array([p for _, p in points])
         self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self.DeclareVectorOutputPort("joint_position", 18, self._calc)
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         poses = self.get_input_port(0).Eval(context)
-        joints = np.stack([poses[body] @ p for body, p in self._points])
+        joints = world_points(poses, self._bodies, self._points)
         output.SetFromVector(seen_points(joints, self._effects).ravel())

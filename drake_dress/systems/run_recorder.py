@@ -18,6 +18,7 @@ from drake_dress.models.human.body import Capsule
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
+from drake_dress.systems.body_frames import world_points
 
 # In the order of `ArmSample`.
 _OF_ARM = ("position", "velocity", "command", "torque")
@@ -233,10 +234,9 @@ class RunRecorder(LeafSystem):
             a, b, _ = person_capsules(self._model, joints)
             return a, b
         poses = self.GetInputPort("body_poses").Eval(context)
-        return (
-            np.stack([poses[body] @ c.a_B for body, c in self._capsules]),
-            np.stack([poses[body] @ c.b_B for body, c in self._capsules]),
-        )
+        bodies = [body for body, _ in self._capsules]
+        a, b = (np.array([getattr(c, end) for _, c in self._capsules]) for end in ("a_B", "b_B"))
+        return world_points(poses, bodies, a), world_points(poses, bodies, b)
 
     def _ended(self, context: Context, name: str) -> tuple[float, int]:
         """Returns the last solve's time, s, and how many ended since the sample before.

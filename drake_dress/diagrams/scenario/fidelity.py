@@ -13,6 +13,7 @@ FIDELITIES: dict[str, dict[str, float]] = {
     "fine": {
         "spacing": 0.02,
         "time_step": 0.004,
+        "body_time_step": 0.004,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
         "tolerance": 5e-3,
@@ -20,16 +21,18 @@ FIDELITIES: dict[str, dict[str, float]] = {
     "standard": {
         "spacing": 0.025,
         "time_step": 0.008,
+        "body_time_step": 0.008,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
-        "tolerance": 2e-2,
+        "tolerance": 5e-2,
     },
     "quick": {
         "spacing": 0.03,
         "time_step": 0.010,
+        "body_time_step": 0.010,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
-        "tolerance": 2e-2,
+        "tolerance": 5e-2,
     },
 }
 

@@ -207,12 +207,12 @@ class Person:
 class Plant:
     """The simulated truth."""
 
-    # fine, standard or quick: gives what is not given of spacing, time_step, implicitness,
-    # buckling_wavelength and tolerance; see fidelity.py
+    # fine, standard or quick: gives what is not given of spacing, time_step, body_time_step,
+    # implicitness, buckling_wavelength and tolerance; see fidelity.py
     fidelity: str = "standard"
     spacing: float = 0.025  # of the garment's mesh, m
     time_step: float = 0.008  # of the garment, s
-    body_time_step: float = 0.004  # of arms, grippers and the person's joints, s
+    body_time_step: float = 0.008  # of arms, grippers and the person's joints, s
     integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
     # of the implicit integrator: 1 is implicit Euler, which damps more the longer the step; near
     # 0.5 it is of second order and may begin to jitter
@@ -221,8 +221,8 @@ class Plant:
     # ones gives way. 0: never
     buckling_wavelength: float = 3.0
     iterations: int = 40  # of the implicit integrator's linear solver, at most
-    tolerance: float = 2e-2  # relative residual at which it stops
-    self_collision: bool = False  # layers of the garment do not pass through each other
+    tolerance: float = 5e-2  # relative residual at which it stops
+    self_collision: bool = True  # layers of the garment do not pass through each other
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
