@@ -390,6 +390,7 @@ def safety_limits(scenario: schema.Scenario) -> SafetyLimits:
         max_lead=s.max_lead,
         stale_time=s.stale_time,
         person_distance=s.person_distance,
+        held_distance=s.held_distance,
         least_distance=s.least_distance,
         largest_distance=np.inf if largest is None else largest,
         workspace=None if box is None else np.array([box.low, box.high]),

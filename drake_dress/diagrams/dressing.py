@@ -167,7 +167,9 @@ def make_dressing(
         asking = builder.AddNamedSystem("local_controller", local.system(beside))
     governor = builder.AddNamedSystem(
         "safety_governor",
-        SafetyGovernor(station.start_grippers, rates.command_period, limits, policy.person),
+        SafetyGovernor(
+            station.start_grippers, rates.command_period, limits, policy.person, policy.held_offsets
+        ),
     )
 
     def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]

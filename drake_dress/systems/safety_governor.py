@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
@@ -56,6 +58,7 @@ class SafetyGovernor(LeafSystem):
         period: of the commands, s.
         limits: which are kept.
         person: their shape; None: grippers may touch them.
+        held: of left and right, (k,3) where the cloth that it holds is from the gripper, m.
 
     Raises:
         ValueError: the start is outside the limits of place.
@@ -67,6 +70,7 @@ class SafetyGovernor(LeafSystem):
         period: float,
         limits: SafetyLimits,
         person: PersonModel | None = None,
+        held: Sequence[np.ndarray] = (),
     ) -> None:
         super().__init__()
         start = np.asarray(start, dtype=float).reshape(2, 3)
@@ -76,6 +80,12 @@ class SafetyGovernor(LeafSystem):
         self._period = period
         self._limits = limits
         self._person = person
+        # of each gripper itself, then of what it holds, and by how much nearer that may be
+        offsets = [np.vstack([np.zeros((1, 3)), *held[i : i + 1]]) for i in range(len(SIDES))]
+        self._offset = np.vstack(offsets)
+        self._side = np.repeat([0, 1], [len(k) for k in offsets])
+        nearer = limits.person_distance - limits.held_distance
+        self._nearer = np.concatenate([np.where(np.arange(len(k)), nearer, 0.0) for k in offsets])
         self._memory = self.DeclareDiscreteState(GovernorState(start).packed())
         self._verdict = self.DeclareDiscreteState(np.zeros(2))
         for side in SIDES:
@@ -99,7 +109,7 @@ class SafetyGovernor(LeafSystem):
         too_fast = Request(np.full((2, 3), limits.max_speed), 0.0)
         step(GovernorState(start), too_fast, Measurement(start, 0.0 * start), limits, 0.0, period)
         if person is not None:
-            _beside(person, np.zeros((6, 3)), start)
+            self._beside(person, np.zeros((6, 3)), start)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         def of_both(name: str) -> np.ndarray:
@@ -130,7 +140,21 @@ class SafetyGovernor(LeafSystem):
         seen = joints.Eval(context).reshape(6, 3)
         if not np.isfinite(seen).all():
             return None
-        return _beside(self._person, seen, position)
+        return self._beside(self._person, seen, position)
+
+    def _beside(self, person: PersonModel, joints: np.ndarray, position: np.ndarray) -> Skin:
+        """Returns the person whose joints (6,3) are seen next to `position` (2,3), m.
+
+        The gripper or the cloth in it, whichever has less room.
+        """
+        bodies = Obstacles.resting(*person_capsules(person, joints))
+        near = find_proximity(position[self._side] + self._offset, bodies, 0.0)
+        room = near.gap + self._nearer
+        tightest = [
+            rows[np.argmin(room[rows])]
+            for rows in (np.flatnonzero(self._side == i) for i in (0, 1))
+        ]
+        return Skin(room[tightest], near.normal[tightest])
 
     def _show(self, rows: slice):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
@@ -140,9 +164,3 @@ class SafetyGovernor(LeafSystem):
 
     def _calc_verdict(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state(self._verdict).value())
-
-
-def _beside(person: PersonModel, joints: np.ndarray, position: np.ndarray) -> Skin:
-    """Returns the person whose joints (6,3) are seen next to `position` (2,3), m."""
-    near = find_proximity(position, Obstacles.resting(*person_capsules(person, joints)), 0.0)
-    return Skin(near.gap, near.normal)

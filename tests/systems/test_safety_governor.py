@@ -1,5 +1,6 @@
 """The governor in a diagram, with grippers, and a spring for a garment."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -55,10 +56,11 @@ def simulate(
     alive: float = np.inf,
     permission: float = 1.0,
     joints: np.ndarray | None = None,
+    held: Sequence[np.ndarray] = (),
 ) -> dict[str, np.ndarray]:
     """Returns logs of the left gripper, (T,k), at every 2 ms, and of the verdicts."""
     builder = DiagramBuilder()
-    governor = builder.AddSystem(SafetyGovernor(START, PERIOD, limits, PERSON))
+    governor = builder.AddSystem(SafetyGovernor(START, PERIOD, limits, PERSON, held))
     if joints is not None:
         seen = builder.AddSystem(ConstantVectorSource(joints))
         builder.Connect(seen.get_output_port(), governor.GetInputPort("joint_position"))
@@ -152,6 +154,15 @@ def test_a_gripper_keeps_its_distance_to_the_skin() -> None:
     log = simulate([0.2, 0.0, 0.0], 0.0, 2.0, limits, joints=JOINTS)
     ahead = log["command"][:, 0] - START[0, 0]
     assert 0.125 < ahead.max() <= 0.2 - 0.04 - 0.03 + 1e-9
+    assert int(log["verdict"][-1][0]) & Verdict.PERSON
+
+
+def test_what_a_gripper_holds_keeps_its_own_distance() -> None:
+    limits = replace(LIMITS, person_distance=0.03, held_distance=0.005)
+    held = [np.array([[0.06, 0.0, 0.0], [-0.06, 0.0, 0.0]])] * 2
+    log = simulate([0.2, 0.0, 0.0], 0.0, 2.0, limits, joints=JOINTS, held=held)
+    ahead = log["command"][:, 0] - START[0, 0]
+    assert 0.09 < ahead.max() <= 0.2 - 0.04 - 0.06 - 0.005 + 1e-9
     assert int(log["verdict"][-1][0]) & Verdict.PERSON
 
 

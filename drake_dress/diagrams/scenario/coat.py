@@ -17,5 +17,5 @@ def coat_parameters(coat: Coat) -> CoatParameters:
         given = getattr(coat, name)
         measures[name] = coat.scale * (getattr(parameters, name) if given is None else given)
     if coat.grasp == "seam":
-        parameters = replace(parameters, grasp_count=0)
+        parameters = replace(parameters, grasp_radius=0.0)
     return replace(parameters, **measures)

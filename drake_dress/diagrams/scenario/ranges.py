@@ -197,6 +197,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "safety.max_lead": (0.001, 0.2),
     "safety.stale_time": (0.005, 5.0),
     "safety.person_distance": (0.0, 0.3),
+    "safety.held_distance": (0.0, 0.3),
     "safety.least_distance": (0.0, 1.0),
     "safety.largest_distance": (0.05, 3.0),
     "gripper.max_speed": (0.001, 2.0),

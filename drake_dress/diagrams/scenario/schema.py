@@ -24,8 +24,8 @@ class Coat:
     neck_width: float | None = None  # between the inner ends of the shoulder seams
     shoulder_slope: float | None = None  # height of the seam's inner end above its outer end
     front_opening: float | None = None  # between the front edges, part of the chest girth
-    # What each gripper holds: a patch of ten nodes, or the whole shoulder seam, as a hanger does;
-    # the seam is the same at every spacing, a patch of nodes is not.
+    # What each gripper holds: a patch of 7 cm across, of four nodes at least, or the whole shoulder
+    # seam, as a hanger does.
     grasp: str = "patch"
 
 
@@ -335,6 +335,7 @@ class Safety:
     max_lead: float = 0.02  # of a command before its gripper, m
     stale_time: float = 0.1  # age at which a request is not obeyed any more, s
     person_distance: float = 0.03  # of a gripper to the person's skin, m
+    held_distance: float = 0.005  # likewise of the cloth that it holds, m
     least_distance: float = 0.08  # between the grippers, m
     largest_distance: float | None = None  # between the grippers, m; any if empty
     workspace: Workspace | None = None  # everywhere if empty

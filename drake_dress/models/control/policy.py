@@ -97,7 +97,10 @@ class DressingPolicy:
             iterations=parameters.inner_iterations,
         )
         self.planner = TaskPlanner(mesh, parameters.tasks)
-        left, right = (mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES)
+        held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
+        left, right = (x.mean(axis=0) for x in held)
+        # of left and right, (k,3) where what is held is from its gripper, m
+        self.held_offsets = (held[0] - left, held[1] - right)
         span = float(np.linalg.norm(left - right))
         self.controller = GlobalController(
             cloth,

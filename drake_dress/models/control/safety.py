@@ -120,6 +120,7 @@ class SafetyLimits:
         max_lead: of the command before the measured position, m, braking included.
         stale_time: age at which a request is not obeyed any more, s.
         person_distance: of a gripper's command to the person's skin, m. 0: any.
+        held_distance: of the cloth that it holds to the person's skin, m.
         least_distance: of the grippers' commands, m: hands must not hit each other. 0: any.
         largest_distance: of the same, m, for a garment that may not be drawn wider even if the
             force is measured wrong; inf: any.
@@ -142,6 +143,7 @@ class SafetyLimits:
     max_lead: float = 0.02
     stale_time: float = 0.1
     person_distance: float = 0.0
+    held_distance: float = 0.0
     least_distance: float = 0.0
     largest_distance: float = np.inf
     workspace: FloatArray | None = None
@@ -207,6 +209,7 @@ class Limits(NamedTuple):
     max_lead: float
     stale_time: float
     person_distance: float
+    held_distance: float
     least_distance: float
     largest_distance: float
     workspace: FloatArray

@@ -50,7 +50,8 @@ class CoatParameters:
     front_opening: float = 0.22  # between the front edges at the underarm, part of the chest girth
     shoulder_slope: float = 0.04  # height of the seam's inner end above its outer end
     grasp_fraction: float = 0.75  # where a gripper holds, from neck (0) to shoulder tip (1)
-    grasp_count: int = 10  # nodes that one gripper holds; 0: its whole shoulder seam
+    # within which a gripper holds the cloth; 0: its whole shoulder seam
+    grasp_radius: float = 0.035
 
 
 COATS = {
@@ -113,12 +114,13 @@ _RANGES = {
     "front_opening": (0.01, 0.4),
     "shoulder_slope": (0.0, 0.08),
     "grasp_fraction": (0.0, 1.0),
-    "grasp_count": (0, 60),
+    "grasp_radius": (0.0, 0.12),
 }
 _DEPTH_RATIO = 0.55  # depth of the chest ellipse by its width, from body measures
 _GAP_RATIO = 0.24  # part of the armhole that runs below the arm, across the side of the body
 _DIP_RATIO = 0.04  # by how much the middle of that part lies lower than its ends
 _SLEEVE_SLOPE = np.deg2rad(58.0)  # of the sleeves below the horizontal
+_FEWEST_HELD = 4  # nodes that a gripper holds: three may lie on a line, about which cloth turns
 _COLLAR_LEAN = np.deg2rad(8.0)  # of the collar outward from the vertical
 _FILLS = (1.0, 0.95, 0.9, 0.85, 0.8)  # grid step by spacing, tried in order
 _LONGEST = 1.6  # longest edge by spacing
@@ -159,10 +161,8 @@ def _check(p: CoatParameters, spacing: float, source: str) -> None:
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
             raise UserError(source, entry.name, f"is {value!r}, expected a number")
         if not low <= value <= high:
-            unit = "" if entry.name.startswith("grasp") else " m"
+            unit = "" if entry.name == "grasp_fraction" else " m"
             raise UserError(source, entry.name, f"is {value}{unit}, expected {low} to {high}{unit}")
-    if p.grasp_count != int(p.grasp_count):
-        raise UserError(source, "grasp_count", f"is {p.grasp_count}, expected a whole number")
     low, high = SPACING_RANGE
     if not low <= spacing <= high:
         raise UserError(source, "spacing", f"is {spacing} m, expected {low} to {high} m")
@@ -427,8 +427,9 @@ def _build(p: CoatParameters, shape: _Shape, c: _Counts, source: str) -> Garment
     region[sleeve_end:] = 3
     hold = shape.seam[0] + p.grasp_fraction * (shape.seam[-1] - shape.seam[0])
     far = np.linalg.norm(half.position - hold, axis=1)
-    grasp = np.argsort(far, kind="stable")[: int(p.grasp_count)].astype(np.int32)
-    if p.grasp_count == 0:
+    count = max(_FEWEST_HELD, int(np.count_nonzero(far <= p.grasp_radius)))
+    grasp = np.argsort(far, kind="stable")[:count].astype(np.int32)
+    if p.grasp_radius == 0.0:
         grasp = front[-1]
     return _mirrored(half, armhole, cuff, grasp, region, source)
 
@@ -486,7 +487,9 @@ def _mirrored(
     faces = np.concatenate(half.faces)
     if np.isin(image[grasp], grasp).any():
         raise UserError(
-            source, "grasp_count", f"is {len(grasp)}: both grippers would hold the same nodes"
+            source,
+            "grasp_radius",
+            f"holds {len(grasp)} nodes: both grippers would hold the same",
         )
     right_region = region[aside]
     right_region[right_region == 1] = 2
