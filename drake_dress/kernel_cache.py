@@ -8,9 +8,12 @@ replaced; kernels of other packages in the process are kept as before.
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import sys
+import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TextIO
 
 from numba.core import caching, dispatcher
 
@@ -20,17 +23,60 @@ from drake_dress.caches import user_cache
 _DISPATCHER: Any = dispatcher
 
 
+# Time after the first kernel that is not there, s, from which it is told, and between lines.
+_PATIENCE, _AGAIN = 2.0, 15.0
+
+
+class Telling:
+    """Tells that kernels are compiled, where that takes long: once on a machine, mostly.
+
+    Args:
+        out: where lines are written; stderr if None.
+        clock: s that go on.
+    """
+
+    def __init__(
+        self, out: TextIO | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._out, self._clock = out, clock
+        self._count = 0
+        self._due: float | None = None
+
+    def begin(self) -> None:
+        """Notes that a kernel is to be compiled."""
+        if self._due is None:
+            self._due = self._clock() + _PATIENCE
+
+    def end(self) -> None:
+        """Notes that one was, and tells so where it is time."""
+        self._count += 1
+        now = self._clock()
+        # processes beside this one compile at the same time, and are silent
+        if self._due is None or now < self._due or multiprocessing.parent_process() is not None:
+            return
+        self._due = now + _AGAIN
+        line = f"compiling kernels, once on this machine: {self._count} so far"
+        print(line, file=self._out or sys.stderr, flush=True)
+
+
+_TELLING = Telling()
+
+
 class _Forgiving(caching.FunctionCache):
     """Passes over what cannot be loaded or saved."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         # A damaged file raises whatever its bytes happen to mean.
         except Exception:
-            return None
+            found = None
+        if found is None:
+            _TELLING.begin()
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
+        _TELLING.end()
         try:
             super().save_overload(sig, data)
         except Exception:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -155,3 +156,17 @@ def test_a_disk_that_fills_up_only_costs_the_cache() -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(caching.IndexDataCacheFile, "_save_index", full)
         assert thrice(3) == 9
+
+
+def test_compiling_is_told_once_it_takes_long() -> None:
+    from drake_dress.kernel_cache import Telling
+
+    out, now = io.StringIO(), [0.0]
+    telling = Telling(out, lambda: now[0])
+    for at in (0.0, 1.0, 2.5, 3.0, 17.4, 17.6):
+        telling.begin()
+        now[0] = at
+        telling.end()
+    lines = out.getvalue().splitlines()
+    assert [line.split(": ")[1] for line in lines] == ["3 so far", "6 so far"]
+    assert all("once on this machine" in line for line in lines)

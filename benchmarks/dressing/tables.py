@@ -26,6 +26,7 @@ _HEADER = [
     "largest force, N",
     "penetration, mm",
     "both arms inside, s < 1.9",
+    "runs with layers crossed at the end",
     "real-time factor",
 ]
 _BESIDE = ["pairs", "both dressed", "full alone", "it alone", "neither", "longer by, s"]
@@ -117,6 +118,8 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         max((s["max_gripper_force_N"] for s in summaries), default=None),
         max(penetration, default=None),
         sum(map(_short_of_the_shoulder, summaries)),
+        # logs of earlier versions do not tell
+        sum((s.get("layers_crossed_at_end") or 0) > 0 for s in summaries),
         median("realtime_factor"),
     ]
 

@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
+from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.sides import SIDES, Side
@@ -61,8 +63,8 @@ def summarize(
     worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
     `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
     time from which both sleeves stay on (s and linking number). `late_plans` is the share of the
-    global controller's solves that took longer than the delay that is modelled. `safety_cut_s` is,
-    for each side
+    global controller's solves that took longer than the delay that is modelled.
+    `layers_crossed_at_end` counts edges that pierce another layer. `safety_cut_s` is, for each side
     and each flag of the safety governor that came up, the time of the samples that have it; None
     where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
     sending of a status to the command that answers it), `start_up_s` (to the first command),
@@ -106,6 +108,7 @@ def summarize(
         "max_edge_strain": _largest(m.edge_strain),
         "max_edge_strain_all": _largest(m.edge_strain_max),
         "max_penetration_m": _largest(m.penetration),
+        "layers_crossed_at_end": _layers_crossed(log),
         "realtime_factor": duration / wall_time if wall_time > 0.0 else None,
         "wall_time_s": float(wall_time),
     }
@@ -117,6 +120,7 @@ def summarize(
         )
         summary[f"{name}_solve_ms"] = {
             "median": 1e3 * float(np.median(solve)) if len(solve) else None,
+            "p95": 1e3 * float(np.quantile(solve, 0.95)) if len(solve) else None,
             "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
         }
     summary["late_plans"] = _late_plans(log)
@@ -196,6 +200,18 @@ def _to_shoulder(log: RunLog, side: Side) -> float | None:
     if not (np.isfinite(s) and np.isfinite([shoulder, elbow, hand]).all()):
         return None
     return ArmAxis(hand, elbow, shoulder).to_shoulder(float(s))
+
+
+def _layers_crossed(log: RunLog) -> int | None:
+    """Returns how many edges pierce another layer of the garment at the end of a run.
+
+    What is joined to a triangle by an edge is the same layer. None where nothing is known.
+    """
+    x = log.garment_position(-1) if len(log) else None
+    if x is None or not np.isfinite(x).all():
+        return None
+    elements = make_elements(log.rest_position, log.faces)
+    return len(piercing_edges(x.astype(np.float64), elements, rings=1))
 
 
 def _late_plans(log: RunLog) -> float | None:

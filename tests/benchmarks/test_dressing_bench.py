@@ -46,6 +46,7 @@ def result(method="full", seed=0, success=True, reason=None, time=20.0):
             "dressing_time_s": time if success else None,
             "max_gripper_force_N": 15.0,
             "max_penetration_m": 0.001,
+            "layers_crossed_at_end": 0,
             "realtime_factor": 0.5,
         },
         "force_p99": 11.0,

@@ -20,8 +20,8 @@ FIDELITIES: dict[str, dict[str, float]] = {
     },
     "standard": {
         "spacing": 0.025,
-        "time_step": 0.008,
-        "body_time_step": 0.008,
+        "time_step": 0.010,
+        "body_time_step": 0.010,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
         "tolerance": 5e-2,

@@ -211,8 +211,8 @@ class Plant:
     # implicitness, buckling_wavelength and tolerance; see fidelity.py
     fidelity: str = "standard"
     spacing: float = 0.025  # of the garment's mesh, m
-    time_step: float = 0.008  # of the garment, s
-    body_time_step: float = 0.008  # of arms, grippers and the person's joints, s
+    time_step: float = 0.010  # of the garment, s
+    body_time_step: float = 0.010  # of arms, grippers and the person's joints, s
     integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
     # of the implicit integrator: 1 is implicit Euler, which damps more the longer the step; near
     # 0.5 it is of second order and may begin to jitter
@@ -257,15 +257,15 @@ class GlobalMpc:
     period: float = 0.5  # between solves, s
     # From what is seen to the use of the plan, s, a multiple of time_step; or "measured": the least
     # such one that 95 % of the solves keep on this machine, of drake-dress bench delay.
-    delay: float = 0.2
+    delay: float = 0.4
     time_step: float = 0.2  # of the prediction, s
     horizon: int = 5  # steps
     max_iterations: int = 3  # gradient steps per solve
-    # Of a solve, in iterations of linear solves; what is best when it is spent is used. Any number
-    # if empty. On hardware a solve has a share of its delay instead.
-    budget: int | None = None
+    # Of a solve, in iterations of linear solves, 0.1 ms each; what is best when it is spent is used.
+    # Any number if empty. On hardware a solve has a share of its delay instead.
+    budget: int | None = 3200
     delay_share: float = 0.9  # of the delay, that a solve may take on hardware
-    inner_iterations: int = 8  # of the garment's linear solve; 1 is the paper's scheme
+    inner_iterations: int = 5  # of the garment's linear solve; 1 is the paper's scheme
     max_speed: float = 0.12  # of a gripper, m/s
     weights: Weights = field(default_factory=Weights)
     progress_step: float = 0.08  # advance of s asked for per step (k)
@@ -300,7 +300,7 @@ class Local:
 class Controller:
     """What the controllers believe and how they act."""
 
-    spacing: float = 0.04  # of the believed garment's mesh, m
+    spacing: float = 0.05  # of the believed garment's mesh, m
     material: Material = field(default_factory=Material)
     method: str = "global"  # global plan alone, local compensation alone, or full: both
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
