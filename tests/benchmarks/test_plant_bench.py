@@ -30,8 +30,9 @@ def test_settings_are_named_once_and_coarser_than_the_reference() -> None:
     for setting in SETTINGS:
         assert setting.spacing >= REFERENCE.spacing
         assert setting.time_step >= REFERENCE.time_step
-    values = {k: getattr(Setting.of_fidelity("quick"), k) for k in FIDELITIES["quick"]}
-    assert values == FIDELITIES["quick"]
+    # bodies are as the log has them, whatever their step
+    expected = {k: v for k, v in FIDELITIES["quick"].items() if k != "body_time_step"}
+    assert {k: getattr(Setting.of_fidelity("quick"), k) for k in expected} == expected
 
 
 @pytest.mark.parametrize("self_collision", [False, True])

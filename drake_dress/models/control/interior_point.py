@@ -18,6 +18,8 @@ _BORDER_SHARE = 0.995
 # Excess at first as a share of the bound.
 _FIRST_EXCESS = 0.3
 # Way from the optimum, m, that a start is taken to have at least.
+# Of products that are small enough, to what they are brought at most.
+_WAITING = 1e-4
 _FLATTEST = 1e-3
 
 
@@ -127,7 +129,11 @@ def interior_point(  # type: ignore[no-untyped-def]
                             ) + (excess[t, k] + primal * d_excess[t, k]) * (spare[t, k] - change)
                             left[t, k] = d_slack[t, k] * d_multiplier[t, k]
                             left_spare[t, k] = -d_excess[t, k] * d_multiplier[t, k]
-                target = mu * min(1.0, (after / (2.0 * count * mu)) ** 3)
+                # without any bound there is nothing to be central to; products that are small
+                # enough wait for bounds that are not kept yet, or slacks vanish before these are
+                if mu > 0.0:
+                    target = mu * min(1.0, (after / (2.0 * count * mu)) ** 3)
+                    target = max(target, _WAITING * enough)
         for t in range(steps):
             for c in range(m):
                 v[t, c] += primal * dv[t, c]

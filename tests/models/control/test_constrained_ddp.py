@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.local.problems import random_problem
@@ -325,6 +325,14 @@ sizes = st.tuples(st.integers(1, 8), st.integers(1, 7), st.integers(1, 5))
 
 
 @given(seed=seeds, size=sizes)
+@settings(max_examples=30, deadline=None)
+def test_a_problem_without_any_bound_has_an_optimum(seed: int, size: tuple[int, int, int]) -> None:
+    p = unbounded(drawn_of_size(seed, *size))
+    assert_optimal(p, solve_constrained_ddp(p))
+
+
+@given(seed=seeds, size=sizes)
+@example(seed=326, size=(7, 1, 5))  # slacks vanished before a far bound was kept
 @settings(max_examples=30, deadline=None)
 def test_they_hold_whatever_the_numbers_of_steps_states_and_inputs(
     seed: int, size: tuple[int, int, int]
