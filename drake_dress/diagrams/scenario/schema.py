@@ -263,7 +263,7 @@ class GlobalMpc:
     max_iterations: int = 3  # gradient steps per solve
     # Of a solve, in iterations of linear solves, of 0.1 to 0.2 ms; what is best when it is spent is
     # used. Any number if empty. On hardware a solve has a share of its delay instead.
-    budget: int | None = 1900
+    budget: int | None = 3200
     delay_share: float = 0.9  # of the delay, that a solve may take on hardware
     inner_iterations: int = 5  # of the garment's linear solve; 1 is the paper's scheme
     max_speed: float = 0.12  # of a gripper, m/s
