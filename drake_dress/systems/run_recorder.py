@@ -95,7 +95,9 @@ class RunRecorder(LeafSystem):
         self._writer = writer
         self._mesh = mesh
         self._model = capsules if isinstance(capsules, PersonModel) else None
-        self._capsules = [] if isinstance(capsules, PersonModel) else list(capsules)
+        shapes = [] if isinstance(capsules, PersonModel) else list(capsules)
+        self._bodies = [body for body, _ in shapes]
+        self._capsule_ends = [np.array([getattr(c, e) for _, c in shapes]) for e in ("a_B", "b_B")]
         self._has_control = has_control
         self._begun: float | None = None
         self._heard = False
@@ -234,9 +236,8 @@ class RunRecorder(LeafSystem):
             a, b, _ = person_capsules(self._model, joints)
             return a, b
         poses = self.GetInputPort("body_poses").Eval(context)
-        bodies = [body for body, _ in self._capsules]
-        a, b = (np.array([getattr(c, end) for _, c in self._capsules]) for end in ("a_B", "b_B"))
-        return world_points(poses, bodies, a), world_points(poses, bodies, b)
+        a, b = (world_points(poses, self._bodies, ends) for ends in self._capsule_ends)
+        return a, b
 
     def _ended(self, context: Context, name: str) -> tuple[float, int]:
         """Returns the last solve's time, s, and how many ended since the sample before.

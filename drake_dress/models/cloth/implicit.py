@@ -271,6 +271,7 @@ class ImplicitCloth:
             total += iterations
             impulse -= rhs
             passes += 1
+            settled = last
             if last:
                 # Sticking may not hold more than friction can: what does slides after all.
                 if left > 0 and contact.slip_out_of_cone(velocity, impulse):
@@ -279,19 +280,16 @@ class ImplicitCloth:
             else:
                 changed = contact.update(velocity, impulse)
                 few = changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
-                if not few or residual > self._tolerance:
-                    if changed > 0:
-                        inertia = self._bound_inertia(mode)
-                        rhs = inertia[:, None] * v + driven
-                    continue
-            # Nothing may end up inside the person because it was not seen to land.
-            if (
-                landing == 0
-                or not contact.is_near
-                or not contact.stop_entering(x, velocity, impulse, obstacles, m.margin)
-            ):
-                break
-            landing -= 1
+                settled = bool(few and residual <= self._tolerance)
+            if settled:
+                # Nothing may end up inside the person because it was not seen to land.
+                if (
+                    landing == 0
+                    or not contact.is_near
+                    or not contact.stop_entering(x, velocity, impulse, obstacles, m.margin)
+                ):
+                    break
+                landing -= 1
             inertia = self._bound_inertia(mode)
             rhs = inertia[:, None] * v + driven
         end = x + h * velocity

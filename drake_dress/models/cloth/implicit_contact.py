@@ -191,9 +191,9 @@ class ImplicitContact:
         near, h, shapes = self._near, self._h, obstacles.packed
         distance, owner = np.empty(len(x)), np.empty(len(x), dtype=np.int32)
         nearest_obstacle(x + h * (velocity - near.surface_velocity), shapes, distance, owner)
-        bound = (self.mode == STICK) | (self.mode == SLIP) | (self.mode == RAIL)
+        bound = (self.mode == STICK) | (self.mode == SLIP)
         end = distance - margin
-        entered = (end < -_ENTERED) & (self.mode != HELD)
+        entered = (end < -_ENTERED) & (self.mode != HELD) & (self.mode != RAIL)
         # what was as deep in that body before is on its way out
         leaving = (near.owner == owner) & (end > near.gap - _ENTERED)
         rows = np.flatnonzero(entered & ~leaving)
@@ -205,10 +205,9 @@ class ImplicitContact:
         gap -= margin
         for k, i in enumerate(rows):
             if bound[i]:
-                if self.mode[i] != RAIL:
-                    self._put_on_rail(
-                        int(i), velocity[i], residual[i], normal[k], moving[k], float(gap[k])
-                    )
+                self._put_on_rail(
+                    int(i), velocity[i], residual[i], normal[k], moving[k], float(gap[k])
+                )
                 continue
             near.gap[i], near.owner[i] = gap[k], owner[i]
             near.normal[i], near.surface_velocity[i] = normal[k], moving[k]
