@@ -20,7 +20,13 @@ import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, in_lanes
 from drake_dress.models.cloth.filtered_stiffness import PLAIN_ROWS
-from drake_dress.models.cloth.forces import gather, polar_and_stretch, scatter
+from drake_dress.models.cloth.forces import (
+    deformation,
+    gather,
+    polar_and_stretch,
+    put_stress,
+    scatter,
+)
 from drake_dress.models.cloth.material import Material
 
 # Stiffness beyond e_c, as a share of k. A strip that has buckled bears hardly more than at first
@@ -78,36 +84,6 @@ def buckling_strain(elements: Elements, material: Material, wavelength: float) -
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
-def _deformation(tile, gradient, b, l):  # type: ignore[no-untyped-def]
-    """Returns the six entries of F, row by row, of triangle l of a gathered tile b."""
-    a0, a1 = gradient[b, 0, l], gradient[b, 1, l]
-    b0, b1 = gradient[b, 2, l], gradient[b, 3, l]
-    u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
-    v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-    return (
-        u0 * a0 + v0 * b0,
-        u0 * a1 + v0 * b1,
-        u1 * a0 + v1 * b0,
-        u1 * a1 + v1 * b1,
-        u2 * a0 + v2 * b0,
-        u2 * a1 + v2 * b1,
-    )
-
-
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
-def _put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21):  # type: ignore[no-untyped-def]
-    """Writes what the derivative by F, six entries, does to both edges, for `scatter`."""
-    a0, a1 = gradient[b, 0, l], gradient[b, 1, l]
-    b0, b1 = gradient[b, 2, l], gradient[b, 3, l]
-    tile[l] = d00 * a0 + d01 * a1
-    tile[LANES + l] = d10 * a0 + d11 * a1
-    tile[2 * LANES + l] = d20 * a0 + d21 * a1
-    tile[3 * LANES + l] = d00 * b0 + d01 * b1
-    tile[4 * LANES + l] = d10 * b0 + d11 * b1
-    tile[5 * LANES + l] = d20 * b0 + d21 * b1
-
-
-@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
 def _tension(s00, s01, s11, limit):  # type: ignore[no-untyped-def]
     """Returns both principal strains, both tensions over k, and the mean of the stretches."""
     mean = 0.5 * (s00 + s11)
@@ -126,7 +102,7 @@ def _force(x, nodes, gradient, limit, stretch, force):  # type: ignore[no-untype
     for b in range(nodes.shape[0]):
         gather(x, nodes, b, tile)
         for l in range(LANES):
-            f00, f01, f10, f11, f20, f21 = _deformation(tile, gradient, b, l)
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
             r00, r01, r10, r11, r20, r21, _, _, _, s00, s01, s11 = polar_and_stretch(
                 f00, f01, f10, f11, f20, f21
             )
@@ -141,7 +117,7 @@ def _force(x, nodes, gradient, limit, stretch, force):  # type: ignore[no-untype
             d00, d01 = r00 * t00 + r01 * t01, r00 * t01 + r01 * t11
             d10, d11 = r10 * t00 + r11 * t01, r10 * t01 + r11 * t11
             d20, d21 = r20 * t00 + r21 * t01, r20 * t01 + r21 * t11
-            _put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
+            put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
         scatter(tile, nodes, b, force)
 
 
@@ -154,7 +130,7 @@ def _prepare(x, nodes, gradient, limit, stretch, block):  # type: ignore[no-unty
         gather(x, nodes, b, tile)
         for l in range(LANES):
             w = stretch * gradient[b, 4, l]
-            f00, f01, f10, f11, f20, f21 = _deformation(tile, gradient, b, l)
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
             r00, r01, r10, r11, r20, r21, _, _, _, s00, s01, s11 = polar_and_stretch(
                 f00, f01, f10, f11, f20, f21
             )
@@ -208,7 +184,7 @@ def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[
     for b in range(block.shape[0]):
         gather(z, nodes, b, tile)
         for l in range(LANES):
-            d00, d01, d10, d11, d20, d21 = _deformation(tile, gradient, b, l)
+            d00, d01, d10, d11, d20, d21 = deformation(tile, gradient, b, l)
             r00, r01, r10 = block[b, 0, l], block[b, 1, l], block[b, 2, l]
             r11, r20, r21 = block[b, 3, l], block[b, 4, l], block[b, 5, l]
             n0, n1, n2 = block[b, 6, l], block[b, 7, l], block[b, 8, l]
@@ -241,5 +217,5 @@ def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[
             d11 = scale * (w * d11 - r10 * h01 - r11 * h11 - n1 * o1)
             d20 = scale * (w * d20 - r20 * h00 - r21 * h10 - n2 * o0)
             d21 = scale * (w * d21 - r20 * h01 - r21 * h11 - n2 * o1)
-            _put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
+            put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
         scatter(tile, nodes, b, product)

@@ -11,7 +11,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
-from drake_dress.models.cloth.forces import gather, polar, scatter
+from drake_dress.models.cloth.forces import deformation, gather, polar, scatter
 
 # Rows that a triangle has in a block.
 PLAIN_ROWS = 14
@@ -48,23 +48,9 @@ def _prepare(x, nodes, gradient, stretch, block):  # type: ignore[no-untyped-def
     for b in range(nodes.shape[0]):
         gather(x, nodes, b, tile)
         for l in range(LANES):
-            a0, a1, b0, b1 = (
-                gradient[b, 0, l],
-                gradient[b, 1, l],
-                gradient[b, 2, l],
-                gradient[b, 3, l],
-            )
             w = stretch * gradient[b, 4, l]
-            u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
-            v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-            r00, r01, r10, r11, r20, r21, i00, i01, i11, trace = polar(
-                u0 * a0 + v0 * b0,
-                u0 * a1 + v0 * b1,
-                u1 * a0 + v1 * b0,
-                u1 * a1 + v1 * b1,
-                u2 * a0 + v2 * b0,
-                u2 * a1 + v2 * b1,
-            )
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
+            r00, r01, r10, r11, r20, r21, i00, i01, i11, trace = polar(f00, f01, f10, f11, f20, f21)
             n0 = r10 * r21 - r20 * r11
             n1 = r20 * r01 - r00 * r21
             n2 = r00 * r11 - r10 * r01

@@ -118,23 +118,13 @@ def stretch_force(x, nodes, gradient, stretch, force):  # type: ignore[no-untype
     for b in range(nodes.shape[0]):
         gather(x, nodes, b, tile)
         for l in range(LANES):
-            a0, a1, b0, b1, area = _row(gradient, b, l)
-            u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
-            v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-            f00, f01 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1
-            f10, f11 = u1 * a0 + v1 * b0, u1 * a1 + v1 * b1
-            f20, f21 = u2 * a0 + v2 * b0, u2 * a1 + v2 * b1
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
             r00, r01, r10, r11, r20, r21, _, _, _, _ = polar(f00, f01, f10, f11, f20, f21)
-            w = -stretch * area
+            w = -stretch * gradient[b, 4, l]
             d00, d01 = w * (f00 - r00), w * (f01 - r01)
             d10, d11 = w * (f10 - r10), w * (f11 - r11)
             d20, d21 = w * (f20 - r20), w * (f21 - r21)
-            tile[l] = d00 * a0 + d01 * a1
-            tile[LANES + l] = d10 * a0 + d11 * a1
-            tile[2 * LANES + l] = d20 * a0 + d21 * a1
-            tile[3 * LANES + l] = d00 * b0 + d01 * b1
-            tile[4 * LANES + l] = d10 * b0 + d11 * b1
-            tile[5 * LANES + l] = d20 * b0 + d21 * b1
+            put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
         scatter(tile, nodes, b, force)
 
 
@@ -419,6 +409,36 @@ def scatter(tile, nodes, b, out):  # type: ignore[no-untyped-def]
             out[j, c] += p
             out[k, c] += q
             out[i, c] -= p + q
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
+def deformation(tile, gradient, b, l):  # type: ignore[no-untyped-def]
+    """Returns the six entries of F, row by row, of triangle l of a gathered tile b."""
+    a0, a1 = gradient[b, 0, l], gradient[b, 1, l]
+    b0, b1 = gradient[b, 2, l], gradient[b, 3, l]
+    u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
+    v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
+    return (
+        u0 * a0 + v0 * b0,
+        u0 * a1 + v0 * b1,
+        u1 * a0 + v1 * b0,
+        u1 * a1 + v1 * b1,
+        u2 * a0 + v2 * b0,
+        u2 * a1 + v2 * b1,
+    )
+
+
+@nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
+def put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21):  # type: ignore[no-untyped-def]
+    """Writes what the derivative by F, six entries, does to both edges, for `scatter`."""
+    a0, a1 = gradient[b, 0, l], gradient[b, 1, l]
+    b0, b1 = gradient[b, 2, l], gradient[b, 3, l]
+    tile[l] = d00 * a0 + d01 * a1
+    tile[LANES + l] = d10 * a0 + d11 * a1
+    tile[2 * LANES + l] = d20 * a0 + d21 * a1
+    tile[3 * LANES + l] = d00 * b0 + d01 * b1
+    tile[4 * LANES + l] = d10 * b0 + d11 * b1
+    tile[5 * LANES + l] = d20 * b0 + d21 * b1
 
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", inline="always")
