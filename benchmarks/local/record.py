@@ -19,7 +19,6 @@ from rich.progress import Progress
 
 from benchmarks.local.recorded import write_problems
 from drake_dress.diagrams.assemble import garments, parts, wired
-from drake_dress.diagrams.dressing import is_finished
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
 from drake_dress.errors import UserError
 from drake_dress.models.control.local_problem import LocalProblem
@@ -51,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for now in np.arange(0.5, options.duration + 0.25, 0.5):
             simulator.AdvanceTo(now)
             progress.update(task, completed=now)
-            if is_finished(dressing.mpc.GetOutputPort("stage").Eval(context)):
+            if dressing.mpc.is_finished(context):
                 break
     chosen = np.unique(np.linspace(0, len(problems) - 1, options.count).astype(int))
     options.out.parent.mkdir(parents=True, exist_ok=True)

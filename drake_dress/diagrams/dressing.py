@@ -286,8 +286,3 @@ def make_dressing(
     diagram = builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, mpc, local)
-
-
-def is_finished(stage: np.ndarray) -> bool:
-    """Returns whether both sleeves are done."""
-    return bool(np.all(stage >= 2))

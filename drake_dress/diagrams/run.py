@@ -18,7 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from drake_dress import __version__
 from drake_dress.diagrams.arms import ArmReachError, arm_bases
 from drake_dress.diagrams.assemble import Garments, Parts, garments, hardware_parts, parts, wired
-from drake_dress.diagrams.dressing import Dressing, is_finished
+from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.hardware_station import (
     HardwareStation,
     NoBusError,
@@ -230,7 +230,8 @@ def _simulate(
             if not terminal and now - told >= 5.0 - 1e-9:
                 told = now
                 print(f"{now:5.1f} s  left {names[0]}, right {names[1]}", file=sys.stderr)
-            done_since = min(done_since, now) if is_finished(stage) else np.inf
+            finished = dressing.mpc.is_finished(context)
+            done_since = min(done_since, now) if finished else np.inf
             if now - done_since >= _STAY:
                 break
         ended = interrupt if interrupt.is_set() else None

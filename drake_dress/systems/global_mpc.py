@@ -227,6 +227,17 @@ class GlobalMpc(LeafSystem):
         """Returns why there are no plans any more, in its own context; None while there are."""
         return self._progress_in(context).failure
 
+    def is_finished(self, context: Context) -> bool:
+        """Returns whether both sleeves are done, and still on as they are seen now, in its context.
+
+        Stages are those of the plan in use, which is of a second ago: a sleeve may have slipped.
+        """
+        if np.any(context.get_discrete_state(self._shown).value()[:2] < Stage.DONE):
+            return False
+        x = self.get_input_port(0).Eval(context).reshape(-1, 3)
+        joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3)
+        return self._policy.planner.are_on(x, joints[0])
+
     def _progress_in(self, context: Context) -> _Progress:
         progress: _Progress = context.get_abstract_state(self._progress).get_value()
         return progress

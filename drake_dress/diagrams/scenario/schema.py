@@ -335,7 +335,7 @@ class Safety:
     max_lead: float = 0.02  # of a command before its gripper, m
     stale_time: float = 0.1  # age at which a request is not obeyed any more, s
     person_distance: float = 0.03  # of a gripper to the person's skin, m
-    held_distance: float = 0.005  # likewise of the cloth that it holds, m
+    held_distance: float = 0.008  # likewise of the cloth that it holds, m: a fold fits between
     least_distance: float = 0.08  # between the grippers, m
     largest_distance: float | None = None  # between the grippers, m; any if empty
     workspace: Workspace | None = None  # everywhere if empty

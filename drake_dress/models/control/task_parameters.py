@@ -96,6 +96,8 @@ class TaskParameters:
             armhole lies askew on the shoulder.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
+        largest_aside: how far a waiting sleeve is drawn aside at most, m: hands that hang 0.58 m
+            apart come 0.15 m nearer at forces of 12 N.
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
             armpit, and both sleeves would pull against each other. A sleeve whose other one is not
             there yet stays where it just counts as done, and leaves the garment to it.
@@ -148,6 +150,7 @@ class TaskParameters:
     dressing_direction: float = 0.1
     dressing_position: float = 4.0
     waiting_reach: float = 0.9
+    largest_aside: float = 0.15
     final_progress: float = 1.99
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)

@@ -162,6 +162,20 @@ class TaskPlanner:
             ),
         )
 
+    def are_on(self, x: FloatArray, joints: FloatArray) -> bool:
+        """Returns whether both sleeves are on their arms, as far up as one that is done may slip.
+
+        Args:
+            x: (n,3) the garment now, m.
+            joints: (6,3) shoulder, elbow, hand of left, then right arm now, m.
+        """
+        least = self.parameters.stages.kept_progress
+        sides = zip((0, 1), arm_axes(joints), self.sleeves(x), strict=True)
+        return all(
+            float(axis.coordinates(sleeve.p_c).s) >= least and self._linked(x, joints, side)
+            for side, axis, sleeve in sides
+        )
+
     def renewed(
         self, given: Assignment, sleeves: Sequence[SleeveState], joints: FloatArray
     ) -> Assignment:
@@ -360,6 +374,8 @@ class TaskPlanner:
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])
+        if task == Task.WAIT:
+            position = position + self._aside(position, places)
         if task == Task.HOLD:
             # as far beside the arm as it is
             position = position + sleeves[side].p_c - mine[0].G(fact.s)
@@ -405,6 +421,17 @@ class TaskPlanner:
         way = -to.front - p.swing_outward * to.inward(side)
         place: FloatArray = other.p_c + p.swing_reach * self._reach * unit(way)
         return place
+
+    def _aside(self, waiting: FloatArray, other: FloatArray) -> FloatArray:
+        """Returns how far a waiting sleeve is drawn aside, (N,3) m: the arm in it comes along.
+
+        By what the garment lacks from `waiting` (N,3) to where the other sleeve goes (N,3), m.
+        """
+        p, way = self.parameters, other - waiting
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        lacking = np.clip(length - p.waiting_reach * self._reach, 0.0, p.largest_aside)
+        aside: FloatArray = way * (lacking / np.maximum(length, p.largest_aside))
+        return aside
 
     def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
         """Returns the largest s from which the garment reaches `other` (3,), m.

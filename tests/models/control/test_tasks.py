@@ -339,25 +339,56 @@ def test_sleeves_that_are_done_stay_where_they_are_on_their_arms(planner: TaskPl
 
 
 def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: TaskPlanner) -> None:
+    """Where it is too far off even so, it is drawn aside by what is lacking."""
     p, facts = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
     reach = p.waiting_reach * armholes_apart(planner)
-    held = []
+    held, drawn = [], []
     for across in np.linspace(0.0, 0.8, 17):  # the right hand comes over to the left arm
         q = joints()
         q[5] += across * (q[2] - q[5])
         axis, other = arm_axes(q)
         sleeves = [SleeveState(axis.G(1.5), axis.D(1.5)), SleeveState(other.G(0.0), other.D(0.0))]
         waiting, prepared = planner.targets(given, sleeves, np.stack([q] * 2), STEP)
-        s = axis.coordinates(waiting.position[0]).s
-        held.append(s)
-        if s > p.stages.waiting_progress + 1e-6:
-            assert np.linalg.norm(axis.G(s) - prepared.position[0]) < reach
-        if s < p.final_progress - 0.05:
-            further = axis.points(np.linspace(s + 0.05, 2.0, 50))
-            assert np.linalg.norm(further - prepared.position[0], axis=1).min() > reach
-    assert min(held) == pytest.approx(p.stages.waiting_progress)
+        apart = float(np.linalg.norm(waiting.position[0] - prepared.position[0]))
+        along = np.linspace(0.0, 2.0, 2001)
+        aside = np.linalg.norm(axis.points(along) - waiting.position[0], axis=1)
+        if aside.min() < 1e-3:
+            s = along[np.argmin(aside)]
+            assert apart < reach
+            if s < p.final_progress - 0.05:
+                further = axis.points(np.linspace(s + 0.05, 2.0, 50))
+                assert np.linalg.norm(further - prepared.position[0], axis=1).min() > reach
+            held.append(s)
+        else:
+            stood = axis.G(p.stages.waiting_progress)
+            to_other, moved = prepared.position[0] - stood, waiting.position[0] - stood
+            np.testing.assert_allclose(np.cross(to_other, moved), 0.0, atol=1e-12)
+            assert moved @ to_other > 0.0
+            drawn.append(float(np.linalg.norm(moved)))
+            assert drawn[-1] <= p.largest_aside + 1e-12
+            assert apart == pytest.approx(reach) or drawn[-1] == pytest.approx(p.largest_aside)
     assert sum(min(held) + 0.1 < s < p.final_progress - 0.1 for s in held) > 1
+    assert max(drawn) > 0.01
+
+
+def test_sleeves_are_on_while_both_arms_are_far_enough_in_them(planner: TaskPlanner) -> None:
+    q, kept = joints(), planner.parameters.stages.kept_progress
+    axes, angle = arm_axes(q), np.linspace(0.0, 2.0 * np.pi, len(planner.armholes[0]), False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def on(progress: tuple[float, float], beside: tuple[float, float] = (0.0, 0.0)) -> bool:
+        x = planner.mesh.rest_position.copy()
+        for loop, axis, s, off in zip(planner.armholes, axes, progress, beside, strict=True):
+            across = np.linalg.svd(axis.D(s)[None])[2][1:]
+            x[loop] = axis.G(s) + (0.1 * circle + [off, 0.0]) @ across
+        return planner.are_on(x, q)
+
+    up, down = kept + 0.01, kept - 0.01
+    assert on((up, up))
+    assert not on((up, down)) and not on((down, up))
+    # beside its arm a sleeve is not on it, however far up
+    assert not on((up, up), (0.0, 0.2)) and not on((up, up), (0.2, 0.0))
 
 
 def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner) -> None:
