@@ -113,6 +113,7 @@ class ClothPlant(LeafSystem):
         self._owner = self.DeclareDiscreteState(np.full(n, -1.0))
         self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
         self._solver = self.DeclareDiscreteState(np.full(2 * (n + 1), -1.0))
+        self._tangled = self.DeclareDiscreteState(np.zeros(n))
         # Force and moment about the body's origin, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
         self._mount = self.DeclareDiscreteState(MountState.at_rest(len(limbs)).flat())
@@ -198,6 +199,7 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._owner, after.owner.astype(np.float64))
         discrete.set_value(self._reaction, after.reaction.ravel())
         discrete.set_value(self._solver, after.solver.ravel().astype(np.float64))
+        discrete.set_value(self._tangled, after.tangled.astype(np.float64))
         discrete.set_value(self._wrench, self._wrenches(context, after).ravel())
 
     def _stepped(self, context: Context) -> ClothState:
@@ -211,6 +213,7 @@ class ClothPlant(LeafSystem):
             context.get_discrete_state(self._reaction).value().reshape(n, 3).copy(),
             context.get_discrete_state(self._owner).value().astype(np.int32),
             context.get_discrete_state(self._solver).value().reshape(2, n + 1).astype(np.int32),
+            context.get_discrete_state(self._tangled).value().astype(np.int32),
         )
         around = context.get_discrete_state(self._around).value()
         if not np.isfinite(around).all():

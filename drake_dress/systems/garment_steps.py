@@ -26,7 +26,7 @@ from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 FloatArray = npt.NDArray[np.float64]
 # The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
 # solvers go on with.
-_VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner"), "solver"
+_VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner", "tangled"), "solver"
 # What is said of a step that begins: it goes on from the last one, or from a state that is given.
 _GO_ON, _FROM_GIVEN = b"\0", b"\1"
 

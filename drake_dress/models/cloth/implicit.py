@@ -72,6 +72,8 @@ class ClothState:
         solver: (2,n+1) what the linear solvers of the next step start from, so that a step depends
             on its arguments alone. Row 0 is of the linearly implicit scheme, row 1 of Projective
             Dynamics: how worn the factor is, -1 without one, then 1 for each node it leaves out.
+        tangled: (n,) 1 for nodes of edges and triangles that pierce each other, where layers that
+            are kept apart have crossed even so; 0 for the others.
     """
 
     x: FloatArray
@@ -80,8 +82,11 @@ class ClothState:
     reaction: FloatArray
     owner: IntArray
     solver: IntArray = field(default_factory=lambda: np.empty((2, 0), dtype=np.int32))
+    tangled: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int32))
 
     def __post_init__(self) -> None:
+        if len(self.tangled) == 0:
+            object.__setattr__(self, "tangled", np.zeros(len(self.x), dtype=np.int32))
         if self.solver.shape[1] == 0:
             no_factor = np.full((2, len(self.x) + 1), -1, dtype=np.int32)
             object.__setattr__(self, "solver", no_factor)

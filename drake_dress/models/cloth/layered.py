@@ -2,7 +2,8 @@
 
 Wraps any integrator with the interface of `ImplicitCloth`. Pairs of layers that would come too
 close resist within the step of the linearly implicit scheme (`layers/bonds.py`); what it, or
-another, then proposes is corrected by `LayerSeparation`, so that nothing crosses.
+another, then proposes is corrected by `LayerSeparation`, so that nothing crosses. Where prescribed
+motions leave no way, layers do cross, and are led back from then on (`layers/tangles.py`).
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from drake_dress.models.cloth.filtered_cg import HELD, STICK
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.layers.bonds import Bonds
-from drake_dress.models.cloth.layers.neighbours import Pairs
+from drake_dress.models.cloth.layers.neighbours import Pairs, Passing
 from drake_dress.models.cloth.layers.separation import Expected, LayerSeparation
+from drake_dress.models.cloth.layers.tangles import Tangle, Tangles
 from drake_dress.models.cloth.material import Material
 
 # Nodes within this gap of the person are not pushed toward it, m.
@@ -30,6 +32,8 @@ _RECOVERY = 0.2
 # Resistance of a pair to approach, by the median mass of a node: with a third of it corrections are
 # five times as large, with three times it the solver takes a third more iterations.
 _RESISTANCE = 1000.0
+# Speed at which layers that have crossed are led back, m/s: a fold of 2 cm is out in 0.2 s.
+_WAY_OUT = 0.1
 
 
 class Integrator(Protocol):
@@ -74,6 +78,7 @@ class LayeredCloth:
         self.gravity = integrator.gravity
         self._integrator = integrator
         self._layers = LayerSeparation(integrator.elements, thickness)
+        self._tangles = Tangles(integrator.elements)
         self._resistance = _RESISTANCE * float(np.median(self.mass))
 
     def step(
@@ -85,24 +90,65 @@ class LayeredCloth:
         guess: FloatArray | None = None,
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
+        tangle = self._tangle(state)
         expected = self._layers.expect(state.x, self.time_step * state.v)
-        bonds = self._bonds(state, expected.pairs)
-        given = replace(influences, bonds=bonds)
+        kept = expected
+        if tangle is not None:
+            kept = replace(expected, pairs=expected.pairs.without(tangle.passing))
+        given = replace(influences, bonds=self._bonds(state, kept.pairs))
         after, info = self._integrator.step(state, obstacles, held_velocity, given, guess)
         near = find_proximity(state.x, obstacles, self.material.margin)
         barred = np.where((near.gap < _ON_THE_PERSON)[:, None], near.normal, 0.0)
-        x, v = separate(
-            self._layers,
-            self.mass,
-            self.time_step,
-            state.x,
-            after.x,
-            after.v,
-            after.mode,
-            barred,
-            expected,
-        )
-        return replace(after, x=x, v=v), info
+        w = inverse_mass(self.mass, after.mode)
+        if tangle is not None:
+            after = self._led_back(state, after, w, barred, tangle, expected.pairs)
+        passing = None if tangle is None else tangle.passing
+        return self._apart(state, after, w, barred, kept, passing), info
+
+    def _tangle(self, state: ClothState) -> Tangle | None:
+        """Returns what pierces, if anything does."""
+        if not state.tangled.any():
+            return None
+        return self._tangles.at(state.x, state.tangled.astype(np.bool_))
+
+    def _led_back(
+        self,
+        before: ClothState,
+        after: ClothState,
+        w: FloatArray,
+        barred: FloatArray,
+        tangle: Tangle,
+        pairs: Pairs,
+    ) -> ClothState:
+        """Returns `after` with layers on their way back that have crossed."""
+        h, dx = self.time_step, after.x - before.x
+        moved = self._tangles.lead_back(tangle, before.x, dx, w, barred, pairs, _WAY_OUT * h)
+        change = moved - dx
+        return replace(after, x=before.x + moved, v=after.v + change / h)
+
+    def _apart(
+        self,
+        before: ClothState,
+        after: ClothState,
+        w: FloatArray,
+        barred: FloatArray,
+        expected: Expected,
+        passing: Passing | None,
+    ) -> ClothState:
+        """Returns `after` with layers kept apart."""
+        dx = after.x - before.x
+        moved, record = self._layers.correct(before.x, dx, w, barred, expected, passing)
+        x, v = after.x, after.v
+        pushed = pushed_nodes(record.rate_change)
+        if pushed.any():
+            x, v = before.x + moved, after.v.copy()
+            v[pushed] = (dx + record.rate_change)[pushed] / self.time_step
+        tangled = before.tangled.astype(np.bool_)
+        if record.crossing:
+            tangled = self._tangles.everywhere(x)
+        elif tangled.any():
+            tangled = self._tangles.near(x, tangled)
+        return replace(after, x=x, v=v, tangled=tangled.astype(np.int32))
 
     def _bonds(self, state: ClothState, pairs: Pairs) -> Bonds:
         """Returns those of `pairs` that would come closer than layers keep by themselves."""
@@ -119,40 +165,6 @@ class LayeredCloth:
             np.full(np.count_nonzero(near), self._resistance),
             share * lacking / h,
         )
-
-
-def separate(
-    layers: LayerSeparation,
-    mass: FloatArray,
-    time_step: float,
-    x: FloatArray,
-    proposed: FloatArray,
-    velocity: FloatArray,
-    mode: IntArray,
-    barred: FloatArray,
-    expected: Expected | None = None,
-) -> tuple[FloatArray, FloatArray]:
-    """Returns positions and velocities (n,3) after layers have been kept apart.
-
-    Args:
-        layers: of the garment.
-        mass: (n,) kg.
-        time_step: s.
-        x: (n,3) positions before the step, m.
-        proposed: (n,3) positions after it, m.
-        velocity: (n,3) after it, m/s.
-        mode: (n,) contact types in it.
-        barred: (n,3) unit directions along which nodes may not be moved, or zero.
-        expected: pairs that were found before the step.
-    """
-    dx = proposed - x
-    moved, record = layers.correct(x, dx, inverse_mass(mass, mode), barred, expected)
-    pushed = pushed_nodes(record.rate_change)
-    if not pushed.any():
-        return proposed, velocity
-    after = velocity.copy()
-    after[pushed] = (dx + record.rate_change)[pushed] / time_step
-    return x + moved, after
 
 
 def inverse_mass(mass: FloatArray, mode: IntArray) -> FloatArray:

@@ -101,6 +101,8 @@ class TaskParameters:
         final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
             armpit, and both sleeves would pull against each other. A sleeve whose other one is not
             there yet stays where it just counts as done, and leaves the garment to it.
+        held_progress: s up to which a sleeve that has slipped is drawn again while both are held:
+            what is asked for is reached but for 0.03, and forces follow where it is.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
     """
@@ -152,6 +154,7 @@ class TaskParameters:
     waiting_reach: float = 0.9
     largest_aside: float = 0.15
     final_progress: float = 1.99
+    held_progress: float = 1.95
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
 

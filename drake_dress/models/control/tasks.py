@@ -360,7 +360,7 @@ class TaskPlanner:
         p, fact, task, mine = self.parameters, given.facts[side], given.tasks[side], arms[side].axes
         n = len(mine) - 1
         if task == Task.HOLD:
-            progress = [max(fact.s, p.stages.done_progress)] * n
+            progress = [max(fact.s, p.held_progress)] * n
         elif task == Task.DRESS:
             progress = self._drawn_progress(given, side, [j * time_step for j in range(1, n + 1)])
         else:
@@ -425,11 +425,11 @@ class TaskPlanner:
     def _aside(self, waiting: FloatArray, other: FloatArray) -> FloatArray:
         """Returns how far a waiting sleeve is drawn aside, (N,3) m: the arm in it comes along.
 
-        By what the garment lacks from `waiting` (N,3) to where the other sleeve goes (N,3), m.
+        By what the garment, drawn out, lacks from `waiting` (N,3) to where the other goes (N,3), m.
         """
         p, way = self.parameters, other - waiting
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        lacking = np.clip(length - p.waiting_reach * self._reach, 0.0, p.largest_aside)
+        lacking = np.clip(length - p.outlook_reach * self._reach, 0.0, p.largest_aside)
         aside: FloatArray = way * (lacking / np.maximum(length, p.largest_aside))
         return aside
 

@@ -13,11 +13,32 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.layers.closest import EDGE_EDGE, NODE_TRIANGLE, closest, offset
 from drake_dress.models.cloth.layers.meetings import Meetings, squared
 from drake_dress.models.cloth.layers.motion import Motion
 from drake_dress.models.cloth.layers.topology import Topology
+
+
+@dataclass(frozen=True)
+class Passing:
+    """Who may pass through whom.
+
+    Attributes:
+        tangled: (n,) nodes among which everyone may.
+        astray: (n,) nodes behind a layer, which may come back through it.
+        around: (n,) nodes among which that layer is.
+    """
+
+    tangled: BoolArray
+    astray: BoolArray
+    around: BoolArray
+
+    def may(self, node: IntArray) -> BoolArray:
+        """Returns (P,) which pairs of nodes (P,4) may pass."""
+        back = self.astray[node].any(axis=1) & self.around[node].all(axis=1)
+        passing: BoolArray = np.logical_or(back, self.tangled[node].all(axis=1))
+        return passing
 
 
 @dataclass(frozen=True)
@@ -37,6 +58,13 @@ class Pairs:
     weights: FloatArray
     direction: FloatArray
     distance: FloatArray
+
+    def without(self, passing: Passing | None) -> Pairs:
+        """Returns these without those that may pass."""
+        if passing is None:
+            return self
+        kept = ~passing.may(self.node)
+        return Pairs(*(values[kept] for values in vars(self).values()))
 
 
 class PairFinder:

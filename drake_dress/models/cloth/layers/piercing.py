@@ -1,4 +1,4 @@
-"""Counts where a garment passes through itself; shares no code with what prevents it."""
+"""Counts where a garment passes through itself; shares no code with what keeps layers apart."""
 
 from __future__ import annotations
 
@@ -18,14 +18,7 @@ def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArra
             many edges or fewer.
     """
     e = elements
-    position = np.ascontiguousarray(x, dtype=np.float64)
-    corner = position[e.triangle]
-    axis = int(np.argmax(position.max(axis=0) - position.min(axis=0)))
-    low = corner.min(axis=1)
-    order = np.argsort(low[:, axis], kind="stable")
-    longest = float((corner.max(axis=1) - low)[:, axis].max()) if len(order) else 0.0
-    found = _pierced(position, e.edge, e.triangle[order], low[order, axis], axis, longest)
-    found[:, 1] = order[found[:, 1]]
+    found = piercings(x, e.edge, e.triangle)
     if rings > 0 and len(found):
         reach = within_rings(elements, rings)
         near = np.array(
@@ -35,6 +28,27 @@ def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArra
             ]
         )
         found = found[~near]
+    return found
+
+
+def piercings(x: FloatArray, edge: IntArray, triangle: IntArray) -> IntArray:
+    """Returns (k,2) which of the edges (E,2) pierce which of the triangles (F,3), as rows of both.
+
+    Args:
+        x: (n,3) positions, m.
+        edge: (E,2) nodes; those that share a node with a triangle do not count.
+        triangle: (F,3) nodes.
+    """
+    position = np.ascontiguousarray(x, dtype=np.float64)
+    if not (len(edge) and len(triangle)):
+        return np.empty((0, 2), dtype=np.int32)
+    corner = position[triangle]
+    axis = int(np.argmax(position.max(axis=0) - position.min(axis=0)))
+    low = corner.min(axis=1)
+    order = np.argsort(low[:, axis], kind="stable")
+    longest = float((corner.max(axis=1) - low)[:, axis].max())
+    found: IntArray = _pierced(position, edge, triangle[order], low[order, axis], axis, longest)
+    found[:, 1] = order[found[:, 1]]
     return found
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.layers.motion import Motion, relative_motion
-from drake_dress.models.cloth.layers.neighbours import PairFinder, Pairs
+from drake_dress.models.cloth.layers.neighbours import PairFinder, Pairs, Passing
 from drake_dress.models.cloth.layers.passes import (
     CROSSING,
     THIN,
@@ -134,6 +134,7 @@ class _Counts:
     zones: int = 0
     pairs: int = 0
     stages: list[Impulses | Zone] = field(default_factory=list)
+    passing: Passing | None = None
 
 
 class _Work:
@@ -194,17 +195,18 @@ class LayerSeparation:
         self._slack = max(self.thickness, _SLACK * self._edge)
         self._nothing_barred = np.zeros((self._n, 3))
 
-    def expect(self, x: FloatArray, dx: FloatArray) -> Expected:
+    def expect(self, x: FloatArray, dx: FloatArray, passing: Passing | None = None) -> Expected:
         """Returns the pairs that may come near each other in a displacement like `dx` (n,3), m.
 
         Args:
             x: (n,3) positions at the start of the step, m.
             dx: (n,3) what it may be, m.
+            passing: as of `correct`.
         """
         motion = relative_motion(self._topology, x, dx)
         room = _EXPECTED * self._edge
         near = self.thickness + self._slack + 2.0 * room
-        return Expected(self._finder.find(x, motion, near), dx, room)
+        return Expected(self._finder.find(x, motion, near).without(passing), dx, room)
 
     def correct(
         self,
@@ -213,6 +215,7 @@ class LayerSeparation:
         inverse_mass: FloatArray,
         barred: FloatArray | None = None,
         expected: Expected | None = None,
+        passing: Passing | None = None,
     ) -> tuple[FloatArray, SeparationRecord]:
         """Returns the corrected displacement (n,3), m, and how it came about.
 
@@ -225,6 +228,7 @@ class LayerSeparation:
             barred: (n,3) unit direction along which a node may not be moved (the normal where it
                 slips on the person), zero for the others; None for no such node.
             expected: of `expect` at `x`; saves a search where `dx` is nearly what was expected.
+            passing: who may pass through whom; None for nobody.
 
         Raises:
             ValueError: an array has another shape.
@@ -254,7 +258,7 @@ class LayerSeparation:
             motion = relative_motion(self._topology, x, dx)
             furthest = 2.0 * float(motion.reach.max())
         count = min(max(1, int(np.ceil(furthest / (_LONGEST_PART * self._edge)))), _MOST_PARTS)
-        counts = _Counts()
+        counts = _Counts(passing=passing)
         parts = []
         rate, lag = dx.copy(), np.zeros((1, 3))
         known = None
@@ -326,7 +330,7 @@ class LayerSeparation:
         """Corrects `dx` in place and notes what was done."""
         counts.thin = 0
         for _ in range(_ROUNDS):
-            pairs = known if known is not None else self._find(x, dx, motion)
+            pairs = known if known is not None else self._find(x, dx, counts.passing, motion)
             motion = known = None
             counts.pairs = len(pairs.kind)
             if counts.pairs == 0:
@@ -342,10 +346,12 @@ class LayerSeparation:
             return
         self._join(x, dx, w, barred, pairs, state, complete, counts)
 
-    def _find(self, x: FloatArray, dx: FloatArray, motion: Motion | None = None) -> Pairs:
+    def _find(
+        self, x: FloatArray, dx: FloatArray, passing: Passing | None, motion: Motion | None = None
+    ) -> Pairs:
         if motion is None:
             motion = relative_motion(self._topology, x, dx)
-        return self._finder.find(x, motion, self.thickness + self._slack)
+        return self._finder.find(x, motion, self.thickness + self._slack).without(passing)
 
     def _impulses(
         self,
@@ -436,7 +442,7 @@ class LayerSeparation:
         union = Union()
         zone = np.full(self._n, -1, dtype=np.int32)
         if not complete:
-            pairs = self._find(x, dx)
+            pairs = self._find(x, dx, counts.passing)
             state = self._judge(x, dx, w, barred, pairs)
         for _ in range(_ZONE_ROUNDS):
             crossing = state == CROSSING
@@ -454,7 +460,7 @@ class LayerSeparation:
                 stage.apply(dx)
                 counts.stages.append(stage)
                 counts.zones += 1
-            pairs = self._find(x, dx)
+            pairs = self._find(x, dx, counts.passing)
             state = self._judge(x, dx, w, barred, pairs)
         else:
             together = np.zeros(len(state), dtype=np.bool_)
