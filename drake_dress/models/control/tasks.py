@@ -86,14 +86,21 @@ class _Arm:
     """
 
     def __init__(self, joints: FloatArray, side: int) -> None:
-        self.shoulder, self._elbow, self.hand = (joints[:, 3 * side + i] for i in range(3))
+        own = joints[:, 3 * side : 3 * side + 3]
+        self.shoulder, self._elbow, self.hand = (own[:, i] for i in range(3))
         self.forearm = unit(self._elbow - self.hand)
+        self._moved = np.any(own[1:] != own[:-1], axis=(1, 2))
 
     @cached_property
     def axes(self) -> list[ArmAxis]:
-        """The arm's axis at each time."""
-        rows = zip(self.hand, self._elbow, self.shoulder, strict=True)
-        return [ArmAxis(hand, elbow, shoulder) for hand, elbow, shoulder in rows]
+        """The arm's axis at each time; the same object while the arm is where it was."""
+        axes: list[ArmAxis] = []
+        for k, (hand, elbow, shoulder) in enumerate(
+            zip(self.hand, self._elbow, self.shoulder, strict=True)
+        ):
+            stays = k > 0 and not self._moved[k - 1]
+            axes.append(axes[-1] if stays else ArmAxis(hand, elbow, shoulder))
+        return axes
 
 
 class TaskPlanner:
@@ -367,10 +374,10 @@ class TaskPlanner:
             k = 1 - side
             other, soon = self._preparation(given, k, arms[k], to), Heading(to.rotation[1:])
             places = other.places(arms[k].hand[1:], arms[k].forearm[1:], soon, sleeves[k])
-            progress = [
-                self._waiting_progress(axis, place)
-                for axis, place in zip(mine[1:], places, strict=True)
-            ]
+            progress = []
+            for j, (axis, place) in enumerate(zip(mine[1:], places, strict=True)):
+                stays = j > 0 and axis is mine[j] and np.array_equal(place, places[j - 1])
+                progress.append(progress[-1] if stays else self._waiting_progress(axis, place))
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])

@@ -41,7 +41,7 @@ _SLACK = 0.15
 # Part of the thickness that pairs may lose unseen by such corrections.
 _UNSEEN = 0.5
 # By which a displacement may differ from what was expected, by the mean edge length.
-_EXPECTED = 0.08
+_EXPECTED = 0.15
 _PASSES = 64
 _PASSES_AT_ONCE = 4
 # Passes that take needless impulses back.
