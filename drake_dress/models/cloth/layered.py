@@ -144,9 +144,8 @@ class LayeredCloth:
             x, v = before.x + moved, after.v.copy()
             v[pushed] = (dx + record.rate_change)[pushed] / self.time_step
         tangled = before.tangled.astype(np.bool_)
-        if record.crossing:
-            tangled = self._tangles.everywhere(x)
-        elif tangled.any():
+        tangled[record.unparted] = True
+        if tangled.any():
             tangled = self._tangles.near(x, tangled)
         return replace(after, x=x, v=v, tangled=tangled.astype(np.int32))
 

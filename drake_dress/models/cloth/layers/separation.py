@@ -85,7 +85,7 @@ class SeparationRecord:
         inverse_mass: (n,) as given; barred: (n,3) as given, in the frame's axes.
         thin: pairs left closer than the thickness asks for, after the last part.
         crossing: pairs that could not be kept apart, over all parts: only where motions that are
-            prescribed leave no way.
+            prescribed leave no way. unparted: (4 crossing,) their nodes.
         zones: rigid zones over all parts.
         pairs: pairs that were looked at in the last part.
     """
@@ -97,6 +97,7 @@ class SeparationRecord:
     barred: FloatArray
     thin: int
     crossing: int
+    unparted: IntArray
     zones: int
     pairs: int
 
@@ -130,7 +131,7 @@ class Expected:
 @dataclass
 class _Counts:
     thin: int = 0
-    crossing: int = 0
+    unparted: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     zones: int = 0
     pairs: int = 0
     stages: list[Impulses | Zone] = field(default_factory=list)
@@ -291,7 +292,8 @@ class LayerSeparation:
             w,
             m,
             counts.thin,
-            counts.crossing,
+            len(counts.unparted) // 4,
+            counts.unparted,
             counts.zones,
             counts.pairs,
         )
@@ -466,7 +468,8 @@ class LayerSeparation:
             together = np.zeros(len(state), dtype=np.bool_)
         stuck = (w == 0.0) | np.any(barred != 0.0, axis=1)
         safe = together & ~np.any(stuck[pairs.node], axis=1)
-        counts.crossing += int(np.count_nonzero((state >= CROSSING) & ~safe))
+        unparted = pairs.node[(state >= CROSSING) & ~safe].ravel()
+        counts.unparted = np.concatenate([counts.unparted, unparted])
 
 
 def _transpose(

@@ -83,7 +83,11 @@ class Tangles:
         return self._nodes_of(piercing_edges(x, self._elements, self._rings))
 
     def near(self, x: FloatArray, tangled: BoolArray) -> BoolArray:
-        """Returns the same, looked for near nodes (n,) that were of such a step before."""
+        """Returns the same, looked for near nodes (n,).
+
+        Near those that were of such a step before, and those that were not kept apart in it
+        (`SeparationRecord.unparted`): elsewhere nothing has begun to pierce.
+        """
         return self._nodes_of(self._piercings(x, self._grown(tangled, _AROUND)))
 
     def at(self, x: FloatArray, tangled: BoolArray) -> Tangle:
