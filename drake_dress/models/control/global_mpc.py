@@ -197,6 +197,7 @@ class GlobalController:
         committed_steps: int = 0,
         leftward: FloatArray | None = None,
         budget: Budget = UNLIMITED,
+        max_speed: float = np.inf,
     ) -> Plan:
         """Returns the plan that gradient descent reaches from `guess` within a budget.
 
@@ -212,10 +213,14 @@ class GlobalController:
             committed_steps: the first steps of `guess` that are on their way already and stay.
             leftward: (N,3) horizontal unit vectors to the person's left; None: nothing is level.
             budget: of the solve.
+            max_speed: of a gripper in the steps that are not on their way, m/s, where that is less
+                than what is allowed ever.
         """
         h, n = self.cloth.time_step, self.horizon
         spending = Spending(budget)
-        velocity = _limited(guess, self.max_speed)
+        fastest = np.full((n, 1, 1), self.max_speed)
+        fastest[committed_steps:] = min(self.max_speed, max_speed)
+        velocity = _limited(guess, fastest)
         now = self._rollout(x, v, velocity, targets, obstacles, leftward)
         rolling = spending.charge(now.iterations())
         descending = rolling
@@ -238,7 +243,7 @@ class GlobalController:
                 afforded = spending.allows(rolling)
                 if not afforded:
                     break
-                trial_velocity = _limited(velocity - length * descent, self.max_speed)
+                trial_velocity = _limited(velocity - length * descent, fastest)
                 moved = trial_velocity - velocity
                 if np.abs(moved).max() < 1e-3 * self.max_speed:
                     break
@@ -425,8 +430,8 @@ class GlobalController:
         return gradient
 
 
-def _limited(velocity: FloatArray, max_speed: float) -> FloatArray:
-    """Returns velocities (N,2,3) with none faster than `max_speed`, directions kept."""
+def _limited(velocity: FloatArray, max_speed: FloatArray) -> FloatArray:
+    """Returns velocities (N,2,3) with none faster than `max_speed` (N,1,1), directions kept."""
     speed = np.linalg.norm(velocity, axis=2, keepdims=True)
     limited: FloatArray = velocity * np.minimum(1.0, max_speed / np.maximum(speed, 1e-12))
     return limited

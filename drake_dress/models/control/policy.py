@@ -151,8 +151,18 @@ class DressingPolicy:
             [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
         )[: p.horizon]
         leftward = headings(joints[1:]).leftward
+        least = p.tasks.stages.creeping_progress
+        settling = all(fact.linked and fact.s >= least for fact in assignment.facts)
         plan = self.controller.solve(
-            x, v, targets, obstacles, guess, p.committed_steps, leftward, p.budget
+            x,
+            v,
+            targets,
+            obstacles,
+            guess,
+            p.committed_steps,
+            leftward,
+            p.budget,
+            p.tasks.settling_speed if settling else p.max_speed,
         )
         return replace(state, stages=stages, velocity=plan.velocity), Decision(
             plan, assignment, target

@@ -103,6 +103,9 @@ class TaskParameters:
             there yet stays where it just counts as done, and leaves the garment to it.
         held_progress: s up to which a sleeve that has slipped is drawn again while both are held:
             what is asked for is reached but for 0.03, and forces follow where it is.
+        settling_speed: of grippers once both sleeves are at the shoulders, m/s. A plan answers what
+            was seen up to 0.9 s before: with all the speed there is, grippers went up and down by
+            4 cm once a second.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
     """
@@ -155,6 +158,7 @@ class TaskParameters:
     largest_aside: float = 0.15
     final_progress: float = 1.99
     held_progress: float = 1.95
+    settling_speed: float = 0.03
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
 

@@ -378,6 +378,10 @@ class TaskPlanner:
             for j, (axis, place) in enumerate(zip(mine[1:], places, strict=True)):
                 stays = j > 0 and axis is mine[j] and np.array_equal(place, places[j - 1])
                 progress.append(progress[-1] if stays else self._waiting_progress(axis, place))
+            if given.facts[k].hand_distance < p.near_distance:
+                # not now: it would draw the other armhole away from the hand that is going in
+                furthest = max(fact.s, p.stages.waiting_progress)
+                progress = [min(s, furthest) for s in progress]
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])
