@@ -29,6 +29,7 @@ class _Policy:
     ends: str
     parameters: PolicyParameters = field(default_factory=PolicyParameters)
     mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
+    planner: Any = None
 
     def initial_state(self) -> Any:
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
@@ -85,3 +86,32 @@ def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
         else:
             assert not moves[first:].any(), ends
             assert found is not None and found.startswith(failure)
+
+
+def test_a_run_is_finished_while_sleeves_that_are_done_are_still_on() -> None:
+    """Stages are of a while ago; what is seen now counts as well."""
+    looked = []
+
+    def are_on(x: Any, joints: Any) -> bool:
+        looked.append((x.shape, joints.shape))
+        return bool(x[0, 2] > 1.0)
+
+    policy = _Policy("hangs")
+    policy.planner = SimpleNamespace(are_on=are_on)
+    mpc = GlobalMpc(policy, _PERIOD, _DELAY, waits=True)
+    context = mpc.CreateDefaultContext()
+    for port in range(3):
+        size = mpc.get_input_port(port).size()
+        mpc.get_input_port(port).FixValue(context, np.full(size, 2.0 if port == 0 else 0.0))
+    shown = context.get_discrete_state(0).value().copy()
+    for stages, height, finished in (
+        ((2, 2), 2.0, True),
+        ((2, 2), 0.5, False),
+        ((1, 2), 2.0, False),
+        ((2, 0), 2.0, False),
+    ):
+        shown[:2] = stages
+        context.SetDiscreteState(0, shown)
+        mpc.get_input_port(0).FixValue(context, np.full(3, height))
+        assert mpc.is_finished(context) == finished
+    assert looked == [((1, 3), (6, 3))] * 2

@@ -123,6 +123,19 @@ def test_plan_lowers_its_cost_and_keeps_the_speed_limit(
     assert plan.reason in ("small_step", "no_descent", "iterations")
 
 
+def test_a_plan_may_be_asked_to_be_slow_but_for_what_is_on_its_way(
+    setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
+) -> None:
+    controller, x, targets = setting
+    start = np.full((HORIZON, 2, 3), 0.05)
+    person = [Obstacles.none()] * HORIZON
+    plan = controller.solve(x, np.zeros_like(x), targets, person, start, 1, max_speed=0.01)
+    np.testing.assert_allclose(plan.velocity[0], start[0], atol=1e-12)
+    assert np.linalg.norm(plan.velocity[1:], axis=2).max() == pytest.approx(0.01)
+    faster = controller.solve(x, np.zeros_like(x), targets, person, start, 1, max_speed=1.0)
+    assert 0.01 < np.linalg.norm(faster.velocity[1:], axis=2).max() <= 0.15 + 1e-12
+
+
 def test_a_plan_is_as_good_as_its_budget_allows(
     setting: tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveTarget]],
 ) -> None:

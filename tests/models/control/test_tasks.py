@@ -373,6 +373,25 @@ def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: Ta
     assert max(drawn) > 0.01
 
 
+def test_a_waiting_sleeve_is_not_drawn_further_while_the_other_is_at_its_hand(
+    planner: TaskPlanner,
+) -> None:
+    """It would draw that armhole away from it."""
+    p, q = planner.parameters, joints()
+    q[5] = q[2] + [0.0, -0.1, 0.0]  # hands beside each other: the garment reaches from anywhere
+    axis, other = arm_axes(q)
+    for s, distance in ((0.5, 0.3), (0.5, 0.1), (0.1, 0.1)):
+        facts = SleeveFacts(False, 0.0, distance, 0.1, 0.0)
+        given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=s), facts))
+        sleeves = [SleeveState(axis.G(s), axis.D(s)), SleeveState(other.G(0.0), other.D(0.0))]
+        waiting, _ = planner.targets(given, sleeves, np.stack([q] * 2), STEP)
+        asked = axis.coordinates(waiting.position[0]).s
+        if distance > p.near_distance:
+            assert asked > 1.0
+        else:
+            assert asked == pytest.approx(max(s, p.stages.waiting_progress), abs=1e-6)
+
+
 def test_sleeves_are_on_while_both_arms_are_far_enough_in_them(planner: TaskPlanner) -> None:
     q, kept = joints(), planner.parameters.stages.kept_progress
     axes, angle = arm_axes(q), np.linspace(0.0, 2.0 * np.pi, len(planner.armholes[0]), False)
