@@ -36,7 +36,7 @@ _MOST_CORNERS = 4
 # A node goes at most this many times as far as a pair lacks. Where prescribed nodes leave only one
 # with a small weight, or one barred from nearly that direction, it would be thrown (34 m/s for a
 # coat on the floor); other pairs hold it better.
-_MOST_LEVER = 4.0
+MOST_LEVER = 4.0
 
 
 @nb.njit(cache=True, nogil=True)
@@ -350,7 +350,7 @@ def _mobility(nodes, weights, inverse_mass, barred, n0, n1, n2):  # type: ignore
         reach = abs(weights[m]) * inverse_mass[node]
         total += reach * abs(weights[m]) * max(0.0, 1.0 - across * across)
         furthest = max(furthest, reach)
-    return total if furthest <= _MOST_LEVER * total else 0.0
+    return total if furthest <= MOST_LEVER * total else 0.0
 
 
 @nb.njit(cache=True, nogil=True)

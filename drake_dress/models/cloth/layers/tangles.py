@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba as nb
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -25,6 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
 from drake_dress.models.cloth.layers.closest import NODE_TRIANGLE
 from drake_dress.models.cloth.layers.neighbours import Pairs, Passing
+from drake_dress.models.cloth.layers.passes import MOST_LEVER
 from drake_dress.models.cloth.layers.piercing import piercing_edges, piercings
 
 # A line whose direction to go is less sure than this is led back slower.
@@ -93,8 +95,9 @@ class Tangles:
     def at(self, x: FloatArray, tangled: BoolArray) -> Tangle:
         """Returns the tangle of nodes (n,) that `everywhere` or `near` told at `x` (n,3), m."""
         found = self._piercings(x, tangled)
-        astray = self._astray(found[:, 0])
-        around = self._grown(tangled | astray, _AROUND)
+        around = self._grown(tangled, _AROUND)
+        # further in, they follow: a cut-off sleeve is not drawn back as a whole
+        astray = self._astray(found[:, 0]) & around
         return Tangle(found[:, 0], found[:, 1], Passing(tangled, astray, around))
 
     def lead_back(
@@ -124,17 +127,11 @@ class Tangles:
         push = ways.direction[:, None, :] - across[:, :, None] * bar
         push *= (inverse_mass[ways.node] * ways.weights)[:, :, None]
         mobility = np.einsum("mi,mij,mj->m", ways.weights, push, ways.direction)
+        furthest = np.abs(inverse_mass[ways.node] * ways.weights).max(axis=1, initial=0.0)
         push /= np.maximum(mobility, 1e-300)[:, None, None]
-        push[mobility <= 0.0] = 0.0
-        wanted = step * ways.speed
+        push[(mobility <= 0.0) | (furthest > MOST_LEVER * mobility)] = 0.0
         moved = dx.copy()
-        for _ in range(_PASSES):
-            going = np.einsum("mi,mij,mj->m", ways.weights, moved[ways.node], ways.direction)
-            lack = np.maximum(0.0, wanted - going)
-            # as many at once as move a node share what they lack, both sides alike
-            times = np.bincount(ways.node[lack > 0.0].ravel(), minlength=len(x))
-            lack /= np.maximum(times[ways.node].max(axis=1, initial=1), 1)
-            np.add.at(moved, ways.node, push * lack[:, None, None])
+        _project(ways.node, ways.weights, ways.direction, push, step * ways.speed, _PASSES, moved)
         return moved
 
     def _shorter(self, x: FloatArray, tangle: Tangle) -> _Ways:
@@ -278,3 +275,28 @@ def _barycentric(point: FloatArray, corner: FloatArray) -> FloatArray:
     scale = 1.0 / (uu * vv - uv * uv)
     second, third = (vv * wu - uv * wv) * scale, (uu * wv - uv * wu) * scale
     return np.array([1.0 - second - third, second, third])
+
+
+@nb.njit(cache=True, nogil=True)
+def _project(node, weights, direction, push, wanted, passes, dx):  # type: ignore[no-untyped-def]
+    """Moves `dx` (n,3), m, in place until each way goes as far as is wanted, (m,) m.
+
+    One way after the other: each is a projection onto a half-space, so that ways which cannot be
+    gone together move what they share to and fro, but never further.
+    """
+    for _ in range(passes):
+        for m in range(wanted.shape[0]):
+            going = 0.0
+            for k in range(node.shape[1]):
+                i = node[m, k]
+                going += weights[m, k] * (
+                    direction[m, 0] * dx[i, 0]
+                    + direction[m, 1] * dx[i, 1]
+                    + direction[m, 2] * dx[i, 2]
+                )
+            lack = wanted[m] - going
+            if lack <= 0.0:
+                continue
+            for k in range(node.shape[1]):
+                for c in range(3):
+                    dx[node[m, k], c] += lack * push[m, k, c]
