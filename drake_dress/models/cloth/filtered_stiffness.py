@@ -11,7 +11,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
-from drake_dress.models.cloth.forces import deformation, gather, polar, scatter
+from drake_dress.models.cloth.forces import deformation, gather, polar, put_stress, scatter
 
 # Rows that a triangle has in a block.
 PLAIN_ROWS = 14
@@ -98,17 +98,7 @@ def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore
     for b in range(block.shape[0]):
         gather(z, nodes, b, tile)
         for l in range(LANES):
-            a0, a1, b0, b1 = (
-                gradient[b, 0, l],
-                gradient[b, 1, l],
-                gradient[b, 2, l],
-                gradient[b, 3, l],
-            )
-            u0, u1, u2 = tile[l], tile[LANES + l], tile[2 * LANES + l]
-            v0, v1, v2 = tile[3 * LANES + l], tile[4 * LANES + l], tile[5 * LANES + l]
-            d00, d01 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1
-            d10, d11 = u1 * a0 + v1 * b0, u1 * a1 + v1 * b1
-            d20, d21 = u2 * a0 + v2 * b0, u2 * a1 + v2 * b1
+            d00, d01, d10, d11, d20, d21 = deformation(tile, gradient, b, l)
             r00, r01, r10 = block[b, 0, l], block[b, 1, l], block[b, 2, l]
             r11, r20, r21 = block[b, 3, l], block[b, 4, l], block[b, 5, l]
             n0, n1, n2 = block[b, 6, l], block[b, 7, l], block[b, 8, l]
@@ -126,12 +116,7 @@ def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore
             d11 = scale * (w * d11 + spin * r10 - n1 * o1)
             d20 = scale * (w * d20 - spin * r21 - n2 * o0)
             d21 = scale * (w * d21 + spin * r20 - n2 * o1)
-            tile[l] = d00 * a0 + d01 * a1
-            tile[LANES + l] = d10 * a0 + d11 * a1
-            tile[2 * LANES + l] = d20 * a0 + d21 * a1
-            tile[3 * LANES + l] = d00 * b0 + d01 * b1
-            tile[4 * LANES + l] = d10 * b0 + d11 * b1
-            tile[5 * LANES + l] = d20 * b0 + d21 * b1
+            put_stress(tile, gradient, b, l, d00, d01, d10, d11, d20, d21)
         scatter(tile, nodes, b, product)
 
 

@@ -196,10 +196,7 @@ def _stretch_both(x, z, nodes, gradient, stretch, force, product):  # type: igno
         gather(z, nodes, b, other)
         for l in range(LANES):
             a0, a1, b0, b1, area = _row(gradient, b, l)
-            u0, u1, u2, v0, v1, v2 = _edges(tile, l)
-            f00, f01 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1
-            f10, f11 = u1 * a0 + v1 * b0, u1 * a1 + v1 * b1
-            f20, f21 = u2 * a0 + v2 * b0, u2 * a1 + v2 * b1
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
             r = polar(f00, f01, f10, f11, f20, f21)
             w = stretch * area
             d00, d01 = w * (r[0] - f00), w * (r[1] - f01)
@@ -226,15 +223,8 @@ def _stretch_product(x, z, nodes, gradient, stretch, product):  # type: ignore[n
         gather(z, nodes, b, other)
         for l in range(LANES):
             a0, a1, b0, b1, area = _row(gradient, b, l)
-            u0, u1, u2, v0, v1, v2 = _edges(tile, l)
-            r = polar(
-                u0 * a0 + v0 * b0,
-                u0 * a1 + v0 * b1,
-                u1 * a0 + v1 * b0,
-                u1 * a1 + v1 * b1,
-                u2 * a0 + v2 * b0,
-                u2 * a1 + v2 * b1,
-            )
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
+            r = polar(f00, f01, f10, f11, f20, f21)
             w = stretch * area
             u0, u1, u2, v0, v1, v2 = _edges(other, l)
             _put(other, l, _times(r, _normal(r), w, a0, a1, b0, b1, u0, u1, u2, v0, v1, v2))
@@ -252,15 +242,8 @@ def _stretch_products(x, y, z, nodes, gradient, stretch, of_y, of_z):  # type: i
         gather(z, nodes, b, second)
         for l in range(LANES):
             a0, a1, b0, b1, area = _row(gradient, b, l)
-            u0, u1, u2, v0, v1, v2 = _edges(tile, l)
-            r = polar(
-                u0 * a0 + v0 * b0,
-                u0 * a1 + v0 * b1,
-                u1 * a0 + v1 * b0,
-                u1 * a1 + v1 * b1,
-                u2 * a0 + v2 * b0,
-                u2 * a1 + v2 * b1,
-            )
+            f00, f01, f10, f11, f20, f21 = deformation(tile, gradient, b, l)
+            r = polar(f00, f01, f10, f11, f20, f21)
             n = _normal(r)
             w = stretch * area
             u0, u1, u2, v0, v1, v2 = _edges(first, l)

@@ -93,9 +93,8 @@ class LayeredCloth:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
         tangle = self._tangle(state)
         expected = self._layers.expect(state.x, self.time_step * state.v)
-        kept = expected
-        if tangle is not None:
-            kept = replace(expected, pairs=expected.pairs.without(tangle.passing))
+        passing = None if tangle is None else tangle.passing
+        kept = replace(expected, pairs=expected.pairs.without(passing))
         given = replace(influences, bonds=self._bonds(state, kept.pairs))
         after, info = self._integrator.step(state, obstacles, held_velocity, given, guess)
         near = find_proximity(state.x, obstacles, self.material.margin)
@@ -103,7 +102,6 @@ class LayeredCloth:
         w = inverse_mass(self.mass, after.mode)
         if tangle is not None:
             after = self._led_back(state, after, w, barred, tangle, expected.pairs)
-        passing = None if tangle is None else tangle.passing
         return self._apart(state, after, w, barred, kept, passing), info
 
     def _tangle(self, state: ClothState) -> Tangle | None:

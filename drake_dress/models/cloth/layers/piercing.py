@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
 
 
 def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArray:
@@ -20,14 +22,7 @@ def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArra
     e = elements
     found = piercings(x, e.edge, e.triangle)
     if rings > 0 and len(found):
-        reach = within_rings(elements, rings)
-        near = np.array(
-            [
-                any(np.isin(reach[int(node)], e.triangle[t]).any() for node in e.edge[k])
-                for k, t in found
-            ]
-        )
-        found = found[~near]
+        found = found[told_apart(found, elements, within_rings(elements, rings))]
     return found
 
 
@@ -50,6 +45,15 @@ def piercings(x: FloatArray, edge: IntArray, triangle: IntArray) -> IntArray:
     found: IntArray = _pierced(position, edge, triangle[order], low[order, axis], axis, longest)
     found[:, 1] = order[found[:, 1]]
     return found
+
+
+def told_apart(found: IntArray, elements: Elements, reach: Sequence[IntArray]) -> BoolArray:
+    """Returns (k,) which edges and triangles (k,2) are no neighbours, `reach` of `within_rings`."""
+    edge, triangle = elements.edge, elements.triangle
+    apart = [
+        not any(np.isin(reach[int(node)], triangle[t]).any() for node in edge[k]) for k, t in found
+    ]
+    return np.array(apart, dtype=np.bool_)
 
 
 def within_rings(elements: Elements, rings: int) -> list[IntArray]:

@@ -196,18 +196,17 @@ class LayerSeparation:
         self._slack = max(self.thickness, _SLACK * self._edge)
         self._nothing_barred = np.zeros((self._n, 3))
 
-    def expect(self, x: FloatArray, dx: FloatArray, passing: Passing | None = None) -> Expected:
+    def expect(self, x: FloatArray, dx: FloatArray) -> Expected:
         """Returns the pairs that may come near each other in a displacement like `dx` (n,3), m.
 
         Args:
             x: (n,3) positions at the start of the step, m.
             dx: (n,3) what it may be, m.
-            passing: as of `correct`.
         """
         motion = relative_motion(self._topology, x, dx)
         room = _EXPECTED * self._edge
         near = self.thickness + self._slack + 2.0 * room
-        return Expected(self._finder.find(x, motion, near).without(passing), dx, room)
+        return Expected(self._finder.find(x, motion, near), dx, room)
 
     def correct(
         self,

@@ -17,6 +17,7 @@ No history is needed: line and sides are those of the moment.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba as nb
 import numpy as np
@@ -27,7 +28,12 @@ from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, I
 from drake_dress.models.cloth.layers.closest import NODE_TRIANGLE
 from drake_dress.models.cloth.layers.neighbours import Pairs, Passing
 from drake_dress.models.cloth.layers.passes import MOST_LEVER
-from drake_dress.models.cloth.layers.piercing import piercing_edges, piercings
+from drake_dress.models.cloth.layers.piercing import (
+    piercing_edges,
+    piercings,
+    told_apart,
+    within_rings,
+)
 
 # A line whose direction to go is less sure than this is led back slower.
 _SURE = 0.5
@@ -137,7 +143,10 @@ class Tangles:
     def _shorter(self, x: FloatArray, tangle: Tangle) -> _Ways:
         """Returns how the lines become shorter along which layers meet."""
         e = self._elements
-        rows = [self.meeting(x, int(k), int(t)) for k, t in zip(*_rows(tangle), strict=True)]
+        rows = [
+            self.meeting(x, int(k), int(t))
+            for k, t in zip(tangle.edge, tangle.triangle, strict=True)
+        ]
         weights = np.array([row[0] for row in rows]).reshape(-1, 5)
         way = np.array([row[1] for row in rows]).reshape(-1, 3)
         node = np.concatenate([e.edge[tangle.edge], e.triangle[tangle.triangle]], axis=1)
@@ -195,14 +204,12 @@ class Tangles:
         triangle = np.flatnonzero(marked[e.triangle].all(axis=1))
         found = piercings(x, e.edge[edge], e.triangle[triangle])
         found = np.stack([edge[found[:, 0]], triangle[found[:, 1]]], axis=1)
-        apart = [not self._joined(int(k), int(t)) for k, t in found]
-        return found[np.array(apart, dtype=np.bool_)]
+        return found[told_apart(found, e, self._reach)]
 
-    def _joined(self, k: int, t: int) -> bool:
-        """Returns whether an edge and a triangle are too close on the mesh to be told apart."""
-        near = np.zeros(self._elements.node_count, dtype=np.bool_)
-        near[self._elements.triangle[t]] = True
-        return bool(self._grown(near, self._rings)[self._elements.edge[k]].any())
+    @cached_property
+    def _reach(self) -> list[IntArray]:
+        """Who belongs together; few garments ever ask."""
+        return within_rings(self._elements, self._rings)
 
     def _grown(self, marked: BoolArray, rings: int) -> BoolArray:
         edge = self._elements.edge
@@ -217,10 +224,6 @@ class Tangles:
         marked[self._elements.edge[found[:, 0]]] = True
         marked[self._elements.triangle[found[:, 1]]] = True
         return marked
-
-
-def _rows(tangle: Tangle) -> tuple[list[int], list[int]]:
-    return tangle.edge.tolist(), tangle.triangle.tolist()
 
 
 def _back_through(tangle: Tangle, pairs: Pairs) -> _Ways:
