@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for d, h, n in itertools.product(options.spacings, options.steps, options.iterations)
     ]
     try:
-        runs = [_read(path, options.moments) for path in options.log]
+        runs = [read_run(path, options.moments) for path in options.log]
     except UserError as error:
         print(f"prediction: {error}", file=sys.stderr)
         return 2
@@ -135,7 +135,8 @@ def _numbers(text: str) -> list[float]:
     return values
 
 
-def _read(path: Path, count: int) -> Run:
+def read_run(path: Path, count: int) -> Run:
+    """Returns the run of a log, and `count` moments of it that leave 3 s to foresee."""
     with RunLog.open(path) as log:
         scenario = logged_scenario(log)
         mesh = build_garment(scenario.garment, scenario.plant.spacing, path.parent)
@@ -171,7 +172,7 @@ def _foresee(runs: Sequence[Run], variant: Variant | None) -> Foresight:
         cloth = None if variant is None else _cloth(run, belief, variant)
         with RunLog.open(run.path) as log:
             for moment in run.moments:
-                lab = _Moment(run, belief, seen, log, float(moment))
+                lab = Moment(run, belief, seen, log, float(moment))
                 if cloth is None or variant is None:
                     foreseen = lab.with_grippers()
                 else:
@@ -211,7 +212,7 @@ def _errors(a, b) -> tuple[float, float]:  # type: ignore[no-untyped-def]
     return float(np.linalg.norm(a.p_c - b.p_c)), float(angle)
 
 
-class _Moment:
+class Moment:
     """What was, and what came, seen with the controller's mesh."""
 
     def __init__(self, run: Run, belief: GarmentMesh, seen, log: RunLog, time: float) -> None:  # type: ignore[no-untyped-def]

@@ -64,7 +64,7 @@ class _Solve:
         v: np.ndarray,
         joints: np.ndarray,
         now: float,
-        steps: int,
+        steps: float,
     ) -> _Finished:
         begin = clock.perf_counter()
         state, decision = self.policy.decide(memory, x, v, joints, now, steps)
@@ -203,7 +203,7 @@ class GlobalMpc(LeafSystem):
             np.zeros_like(x),
             np.tile(joints, (p.horizon + 1, 1, 1)),
             0.0,
-            round(self._period / p.time_step),
+            self._period / p.time_step,
         )
         while not wait([solving], _REHEARSAL_STEP).done:
             if stopped():
@@ -253,7 +253,7 @@ class GlobalMpc(LeafSystem):
         memory = context.get_abstract_state(self._memory).get_value()
         # periods that were missed are gone, too
         periods = max(1, round((now - progress.begun_at) / self._period))
-        steps = round(periods * self._period / self._policy.parameters.time_step)
+        steps = periods * self._period / self._policy.parameters.time_step
         pending = self._submit(memory, x, v, joints, now, steps)
         self._set_progress(state, _Progress(pending, now))
 

@@ -34,7 +34,7 @@ class _Policy:
     def initial_state(self) -> Any:
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
 
-    def decide(self, memory: Any, x: Any, v: Any, joints: Any, now: float, steps: int) -> Any:
+    def decide(self, memory: Any, x: Any, v: Any, joints: Any, now: float, steps: float) -> Any:
         n = self.parameters.horizon
         if now > _FAILS:
             if self.ends == "raises":

@@ -126,7 +126,7 @@ class DressingPolicy:
         v: FloatArray,
         joints: FloatArray,
         time: float,
-        elapsed_steps: int = 5,
+        elapsed_steps: float = 5.0,
     ) -> tuple[PolicyState, Decision]:
         """Returns the next state and the decision.
 
@@ -137,8 +137,8 @@ class DressingPolicy:
             joints: (N+1,6,3) predicted shoulder, elbow, hand of left, then right arm, m; row 0
                 is now.
             time: now, s.
-            elapsed_steps: how many prediction steps passed since the last decision, for the start
-                of the descent.
+            elapsed_steps: how many prediction steps passed since the last decision, whole or not:
+                what of its plan is on its way, and the start of the descent.
         """
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
@@ -147,9 +147,7 @@ class DressingPolicy:
         if not p.plans:
             return replace(state, stages=stages), Decision(self._rest(x), assignment, target)
         obstacles = person_obstacles(self.person, joints, p.time_step)
-        guess = np.concatenate(
-            [state.velocity[elapsed_steps:], np.repeat(state.velocity[-1:], elapsed_steps, axis=0)]
-        )[: p.horizon]
+        guess = later(state.velocity, elapsed_steps)
         leftward = headings(joints[1:]).leftward
         least = p.tasks.stages.creeping_progress
         settling = all(fact.linked and fact.s >= least for fact in assignment.facts)
@@ -182,3 +180,16 @@ class DressingPolicy:
             armhole=np.tile(centers, (n, 1, 1)),
             force=np.zeros((n, 2)),
         )
+
+
+def later(velocity: FloatArray, steps: float) -> FloatArray:
+    """Returns the velocities (N,…) of a plan from `steps` of its steps on, the mean in each step.
+
+    Beyond its end the last one goes on.
+    """
+    whole = int(np.floor(steps + 1e-9))
+    part, n = max(0.0, steps - whole), len(velocity)
+    held = np.concatenate([velocity, np.repeat(velocity[-1:], whole + 1, axis=0)])
+    now, following = held[whole : whole + n], held[whole + 1 : whole + 1 + n]
+    mean: FloatArray = (1.0 - part) * now + part * following
+    return mean

@@ -56,9 +56,10 @@ class Preparation:
     outside the hand, and further back (against v_f) until it is in line: so the hand comes in by
     the open front. An arm that comes from anywhere else meets the outside of the front panel, with
     the armhole's centre at the hand and the hand not in it; so an opening that the hand does not
-    see stays outside. The garment does not reach that far with its other sleeve on an arm: the
-    second one goes where the hand comes to see it. One that faces the hand is drawn along its own
-    normal, and along the forearm once the hand is in it: further inward it would be pulled past it.
+    see stays outside. One that missed the hand goes where the hand comes to see it. The garment
+    does not reach that far with its other sleeve on an arm: the second one goes around the hand.
+    One that faces the hand is drawn along its own normal, and along the forearm once the hand is
+    in it: further inward it would be pulled past it.
 
     Attributes:
         parameters: settings.
@@ -106,10 +107,13 @@ class Preparation:
         inside = facing * _ramp(depth, -0.02, 0.02)
         # not over the hand before it is in line: what is beside goes first
         ahead = np.where(depth < 0.0, _ramp(beside, p.funnel_wide, p.funnel_narrow), 1.0)
-        if self.outlook is not None:
+        if self.outlook is not None or self.tethered:
             onward = (1.0 - inside) * sleeve.v_c + inside * forearm
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
-            there: FloatArray = hand + (1.0 - facing) * self.outlook + facing * onward
+            unseen = self.outlook
+            if unseen is None:
+                unseen = self._around(offset, outside - hand, to)
+            there: FloatArray = hand + (1.0 - facing) * unseen + facing * onward
             return there
         barred = self._barred
         aside = (1.0 - facing) * distance_aside(offset, direction)[:, None]
@@ -126,6 +130,25 @@ class Preparation:
             return goal
         return np.where(waits, self._behind(sleeve, outside, to), goal)
 
+    def _around(self, offset: FloatArray, outside: FloatArray, to: Heading) -> FloatArray:
+        """Returns the way (N,3) of a tethered armhole that its hand does not see, from the hand, m.
+
+        Outward first, as far back as it misses hands from, then forward beside the hand: the panel
+        in front of the armhole has to pass on the hand's outer side.
+
+        Args:
+            offset: (N,3) of the hand from the armhole's centre now, m.
+            outside: (N,3) of the place outside the hand, from the hand, m.
+            to: heading of the person.
+        """
+        p, inward = self.parameters, to.inward(self.side)
+        outward = np.einsum("ij,ij->i", offset, inward)[:, None]
+        passing = _ramp(outward, p.passing_from, p.passing_beside)
+        behind = outside - p.retreat_distance * to.front
+        beside = -p.passing_outward * inward - p.passing_behind * to.front
+        way: FloatArray = (1.0 - passing) * behind + passing * beside
+        return way
+
     @property
     def _barred(self) -> float:
         """How far the garment bars the hand's sight of the opening, 0 to 1."""
@@ -140,17 +163,16 @@ class Preparation:
         """
         p = self.parameters
         facing = (1.0 - self._barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
-        if self.outlook is None:
+        if self.outlook is None and not self.tethered:
             return facing
         return np.maximum(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
 
     def _behind(self, sleeve: SleeveState, outside: FloatArray, to: Heading) -> FloatArray:
         """Returns places behind `outside` (N,3), the further behind the less it is in line."""
         p = self.parameters
-        behind = p.tethered_behind_distance if self.tethered else p.behind_distance
         error = distance_aside(sleeve.p_c - outside, to.front)[:, None]
         wait = p.approach_slope * np.maximum(0.0, error - 2.0 * p.aside_free)
-        place: FloatArray = outside - np.minimum(wait, behind) * to.front
+        place: FloatArray = outside - np.minimum(wait, p.behind_distance) * to.front
         return place
 
 

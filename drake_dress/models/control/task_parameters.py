@@ -68,15 +68,20 @@ class TaskParameters:
             been led inward. led_approach: to such an arm, if it is the first one, from `led_after`
             misses on.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
-        tethered_behind_distance: the same with the other sleeve on, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
         withdrawal_distance: behind the shoulders, to where both sleeves are taken back, m.
         swing_reach: how far from the first armhole the second one is swung back, as a share of the
             distance between both at rest.
         swing_outward: outward part of the way there, for each part backward.
         widening: growth of the cap of l_h with each attempt that missed the hand.
-        outlook_distance: from the hand, within which a tethered sleeve goes where it is seen, m.
-        outlook_reach: share of the distance between both armholes at rest at which it stays then.
+        passing_outward, passing_behind: how far outward of a hand that does not see it, and behind
+            it, a tethered armhole is asked to be in the end, m: the panel before it is as wide.
+        passing_from, passing_beside: so far outward of the hand it begins to come forward, and is
+            asked to be that far forward, m; from less the panel would come before the hand.
+        outlook_distance: from the hand, within which a sleeve that missed it goes where it is seen,
+            m.
+        longest_reach: share of the distance between both armholes at rest to which the garment is
+            taken to be drawn out.
         clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
             the hand is before the opening.
         funnel_wide: hand this far beside the normal of an opening that it sees clearly: the opening
@@ -133,14 +138,17 @@ class TaskParameters:
     flat: float = 0.65
     steep: float = 0.47
     behind_distance: float = 0.30
-    tethered_behind_distance: float = 0.15
     retreat_distance: float = 0.15
     withdrawal_distance: float = 0.65
     swing_reach: float = 0.9
     swing_outward: float = 0.5
     widening: float = 0.1
+    passing_outward: float = 0.15
+    passing_behind: float = 0.05
+    passing_from: float = 0.08
+    passing_beside: float = 0.12
     outlook_distance: float = 0.35
-    outlook_reach: float = 1.04
+    longest_reach: float = 1.04
     clear_sight: float = 0.9
     funnel_wide: float = 0.07
     funnel_narrow: float = 0.03

@@ -33,6 +33,7 @@ from drake_dress.models.dressing.stages import (
     Task,
     advance_stages,
     eases,
+    look,
     retreats,
     swings,
     withdraws,
@@ -143,12 +144,13 @@ class TaskPlanner:
         p = self.parameters
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
         missed = stages.attempts
-        linked = [self._linked(x, joints, side) for side in (0, 1)]
+        linked = [self.is_linked(x, joints, side) for side in (0, 1)]
         ways = [choose_approach(p, axes[i].D(0.0), to, i, missed[i], linked[1 - i]) for i in (0, 1)]
         facts = (
             self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
             self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
         )
+        stages, facts = look(stages, facts, p.stages, time)
         goals = [self._waypoint(axes[i], to, facts[i], i, ways[i]) for i in (0, 1)]
         distance = float(np.linalg.norm(goals[0] - goals[1]))
         stages, tasks = advance_stages(stages, facts, p.stages, distance, time)
@@ -159,8 +161,8 @@ class TaskPlanner:
             (eases(stages, 0, facts, p.stages, time), eases(stages, 1, facts, p.stages, time)),
             stages.attempts,
             (
-                self._outlook(x, joints[2], to, sleeves, 0, linked, missed[0]),
-                self._outlook(x, joints[5], to, sleeves, 1, linked, missed[1]),
+                self._outlook(x, joints[2], to, sleeves[0], 0, linked, missed[0]),
+                self._outlook(x, joints[5], to, sleeves[1], 1, linked, missed[1]),
             ),
             withdraws(stages, facts, p.stages, time),
             (
@@ -168,6 +170,19 @@ class TaskPlanner:
                 swings(stages, 1, facts, p.stages, time),
             ),
         )
+
+    def is_linked(self, x: FloatArray, joints: FloatArray, side: int) -> bool:
+        """Returns whether an arm passes through its armhole.
+
+        Args:
+            x: (n,3) the garment, m.
+            joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
+            side: of the arm.
+        """
+        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
+        interior = torso_interior(joints[0], joints[3])
+        loop = x[self.armholes[side]]
+        return abs(arm_linking_number(loop, shoulder, elbow, hand, interior)) == 1
 
     def are_on(self, x: FloatArray, joints: FloatArray) -> bool:
         """Returns whether both sleeves are on their arms, as far up as one that is done may slip.
@@ -179,7 +194,7 @@ class TaskPlanner:
         least = self.parameters.stages.kept_progress
         sides = zip((0, 1), arm_axes(joints), self.sleeves(x), strict=True)
         return all(
-            float(axis.coordinates(sleeve.p_c).s) >= least and self._linked(x, joints, side)
+            float(axis.coordinates(sleeve.p_c).s) >= least and self.is_linked(x, joints, side)
             for side, axis, sleeve in sides
         )
 
@@ -219,37 +234,25 @@ class TaskPlanner:
             self._target(assignment, 1, arms, to, sleeves, time_step),
         )
 
-    def _linked(self, x: FloatArray, joints: FloatArray, side: int) -> bool:
-        """Returns whether an arm passes through its armhole."""
-        shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
-        interior = torso_interior(joints[0], joints[3])
-        loop = x[self.armholes[side]]
-        return abs(arm_linking_number(loop, shoulder, elbow, hand, interior)) == 1
-
     def _outlook(
         self,
         x: FloatArray,
         hand: FloatArray,
         to: Heading,
-        sleeves: Sequence[SleeveState],
+        sleeve: SleeveState,
         side: int,
         linked: Sequence[bool],
         missed: int,
     ) -> FloatArray | None:
-        """Returns where, from the hand, a sleeve is seen by it, (3,) m, if it is near.
+        """Returns where, from the hand, a sleeve that missed it is seen by it, (3,) m, if near.
 
-        A tethered one, for it does not reach any further, or one that missed the hand.
+        None for a tethered one, which goes around.
         """
-        p, sleeve, other = self.parameters, sleeves[side], sleeves[1 - side]
-        near = np.linalg.norm(hand - sleeve.p_c) < p.outlook_distance
-        tethered = linked[1 - side]
-        if linked[side] or not near or not (tethered or missed > 0):
+        near = np.linalg.norm(hand - sleeve.p_c) < self.parameters.outlook_distance
+        if linked[0] or linked[1] or not near or missed == 0:
             return None
-        reach = p.outlook_reach * self._reach if tethered else np.inf
         loop, normal = self.armholes[side], sleeve.v_c
-        move = move_into_sight(
-            x, self.mesh.faces, loop, normal, hand, other.p_c, reach, to.rotation.T
-        )
+        move = move_into_sight(x, self.mesh.faces, loop, normal, hand, to.rotation.T)
         place: FloatArray = sleeve.p_c + move - hand
         return place
 
@@ -374,14 +377,13 @@ class TaskPlanner:
             k = 1 - side
             other, soon = self._preparation(given, k, arms[k], to), Heading(to.rotation[1:])
             places = other.places(arms[k].hand[1:], arms[k].forearm[1:], soon, sleeves[k])
-            progress = []
-            for j, (axis, place) in enumerate(zip(mine[1:], places, strict=True)):
-                stays = j > 0 and axis is mine[j] and np.array_equal(place, places[j - 1])
-                progress.append(progress[-1] if stays else self._waiting_progress(axis, place))
             if given.facts[k].hand_distance < p.near_distance:
-                # not now: it would draw the other armhole away from the hand that is going in
-                furthest = max(fact.s, p.stages.waiting_progress)
-                progress = [min(s, furthest) for s in progress]
+                # up or down, it would draw the other armhole away from its hand
+                stays = max(fact.s, p.stages.waiting_progress)
+                reached = self._reaching(mine, places, p.longest_reach)
+                progress = [min(s, stays) for s in reached]
+            else:
+                progress = self._reaching(mine, places, p.waiting_reach)
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])
@@ -440,22 +442,31 @@ class TaskPlanner:
         """
         p, way = self.parameters, other - waiting
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        lacking = np.clip(length - p.outlook_reach * self._reach, 0.0, p.largest_aside)
+        lacking = np.clip(length - p.longest_reach * self._reach, 0.0, p.largest_aside)
         aside: FloatArray = way * (lacking / np.maximum(length, p.largest_aside))
         return aside
 
-    def _waiting_progress(self, axis: ArmAxis, other: FloatArray) -> float:
-        """Returns the largest s from which the garment reaches `other` (3,), m.
+    def _reaching(self, axes: Sequence[ArmAxis], others: FloatArray, share: float) -> list[float]:
+        """Returns the largest s at N times from which the garment reaches `others` (N,3), m.
 
-        Higher up than that the garment holds the other sleeve back; lower down it could slip off
-        (J_w).
+        Higher up than that the garment holds the other sleeve back; lower down than
+        `waiting_progress` it could slip off (J_w).
+
+        Args:
+            axes: (N + 1) of the arm, the first one now.
+            others: (N,3) where the other sleeve goes, m.
+            share: of the distance between both armholes at rest, that it reaches.
         """
-        p = self.parameters
-        least = p.stages.waiting_progress
-        steps = np.linspace(2.0, least, 41)
-        offset = axis.points(steps) - other
-        reached = np.einsum("ij,ij->i", offset, offset) < (p.waiting_reach * self._reach) ** 2
-        return float(steps[np.argmax(reached)]) if reached.any() else least
+        steps = np.linspace(2.0, self.parameters.stages.waiting_progress, 41)
+        progress: list[float] = []
+        for j, (axis, place) in enumerate(zip(axes[1:], others, strict=True)):
+            if j > 0 and axis is axes[j] and np.array_equal(place, others[j - 1]):
+                progress.append(progress[-1])
+                continue
+            offset = axis.points(steps) - place
+            reached = np.einsum("ij,ij->i", offset, offset) < (share * self._reach) ** 2
+            progress.append(float(steps[np.argmax(reached)] if reached.any() else steps[-1]))
+        return progress
 
 
 def _place(point: FloatArray) -> Place:

@@ -21,8 +21,8 @@ _AROUND = _CUBE[_CUBE.any(axis=1)]
 _AROUND = _AROUND / np.linalg.norm(_AROUND, axis=1, keepdims=True)
 _MOVES = np.vstack([np.zeros((1, 3)), *(size * _AROUND for size in (0.05, 0.10, 0.15, 0.20))])
 # Prices of a move, m: of an opening that is not seen, of one that is seen aslant, and of a metre
-# beyond reach or too near.
-_UNSEEN, _ASLANT, _BEYOND = 0.4, 0.1, 2.0
+# too near.
+_UNSEEN, _ASLANT, _CLOSE = 0.4, 0.1, 2.0
 # Distance at which an opening is looked at, m: nearer a panel lies on the hand, and follows it.
 _NEAREST = 0.13
 # Share of an opening that is enough to see.
@@ -78,14 +78,12 @@ def move_into_sight(
     loop: npt.NDArray[np.integer],
     normal: FloatArray,
     eye: FloatArray,
-    held: FloatArray,
-    reach: float,
     frame: FloatArray,
 ) -> FloatArray:
-    """Returns the move (3,), m, by which an opening comes into sight: short and within reach.
+    """Returns the move (3,), m, by which an opening comes into sight, a short one.
 
     The garment is taken to move as it is. A panel that bars the way mostly does so by a few
-    centimetres: 5 to 10 cm forward and upward are enough where further outward is out of reach.
+    centimetres.
 
     Args:
         x: (n,3) garment, m.
@@ -93,8 +91,6 @@ def move_into_sight(
         loop: (k,) nodes around the opening, in order.
         normal: (3,) of the opening, unit, to the side from which it is entered.
         eye: (3,) where one looks from, m.
-        held: (3,) centre of another opening that stays where it is, m.
-        reach: how far apart both may be, m.
         frame: (3,3) rows are the unit vectors between and along which it is moved.
     """
     center = x[loop].mean(axis=0)
@@ -103,9 +99,8 @@ def move_into_sight(
         to_eye = eye - move - center
         distance = float(np.linalg.norm(to_eye))
         aslant = 1.0 - float(to_eye @ normal) / max(distance, 1e-9)
-        beyond = max(0.0, float(np.linalg.norm(center + move - held)) - reach)
-        beyond += max(0.0, _NEAREST - distance)
-        price = float(np.linalg.norm(move)) + _ASLANT * aslant + _BEYOND * beyond
+        close = max(0.0, _NEAREST - distance)
+        price = float(np.linalg.norm(move)) + _ASLANT * aslant + _CLOSE * close
         if price < least:
             unseen = max(0.0, _ENOUGH - free_sight(x, faces, loop, eye - move))
             price += _UNSEEN * unseen

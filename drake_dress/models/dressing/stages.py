@@ -81,6 +81,9 @@ class StageParameters:
         least_sight: share of the opening that a hand has to see for it to be drawn over it.
         lost_sight: share below which the garment bars the hand: sight goes to and fro while cloth
             moves, and an armhole that turned back each time would never get there.
+        sight_time: for which a hand that its armhole is about to meet counts as seeing it after it
+            did, s: at 10 cm the rim and the panel beside it bar most of what was seen from 15 cm,
+            and an armhole that turned back then never got there.
         missed_distance: an armhole that has gone this far past the hand without the arm in it
             is taken back, m.
         waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
@@ -115,6 +118,7 @@ class StageParameters:
     prepared_distance: float = 0.03
     least_sight: float = 0.5
     lost_sight: float = 0.25
+    sight_time: float = 1.3
     missed_distance: float = 0.08
     waiting_progress: float = 0.3
     done_progress: float = 1.925
@@ -152,6 +156,7 @@ class StageState:
         met: where the hand was when the armhole met it, m, or nearer to it since; None while it
             does not meet it.
         close_since: since when the armhole is close to the hand, s; None while it is not.
+        seen: when the hand last saw the armhole that meets it, s; None if it did not since a miss.
     """
 
     stage: tuple[Stage, Stage] = (Stage.PREPARE, Stage.PREPARE)
@@ -164,6 +169,7 @@ class StageState:
     stalled: tuple[float, float] = (0.0, 0.0)
     met: tuple[Place | None, Place | None] = (None, None)
     close_since: tuple[float | None, float | None] = (None, None)
+    seen: tuple[float | None, float | None] = (None, None)
 
 
 def advance_stages(
@@ -209,7 +215,35 @@ def advance_stages(
         tasks[n] = Task.WAIT
         if facts[n].s >= 0.6 * parameters.waiting_progress:
             tasks[f] = Task.PREPARE if state.stage[f] == Stage.PREPARE else Task.DRESS
+    if tasks[f] == Task.REST and not any(on_arm):
+        # its time to be prepared in, after which it counts as having missed its hand, has not begun
+        state = _with(state, f, since=time)
     return state, (tasks[0], tasks[1])
+
+
+def look(
+    state: StageState,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    parameters: StageParameters,
+    time: float,
+) -> tuple[StageState, tuple[SleeveFacts, SleeveFacts]]:
+    """Returns the stages with what hands see now, and facts in which they still see what they saw.
+
+    Args:
+        state: stages so far.
+        facts: of left and right sleeve.
+        parameters: thresholds.
+        time: now, s.
+    """
+    kept = list(facts)
+    for side, fact in enumerate(facts):
+        meets = fact.hand_distance < parameters.meeting_distance and not fact.linked
+        seen = state.seen[side]
+        if meets and fact.sight >= parameters.least_sight:
+            state = _with(state, side, seen=time)
+        elif meets and seen is not None and time - seen < parameters.sight_time:
+            kept[side] = replace(fact, sight=1.0)
+    return state, (kept[0], kept[1])
 
 
 def _choose_first(facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters) -> int:
@@ -355,6 +389,7 @@ def _again(state: StageState, side: int, time: float) -> StageState:
         attempts=state.attempts[side] + 1,
         met=None,
         close_since=None,
+        seen=None,
     )
 
 

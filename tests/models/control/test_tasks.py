@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given as drawn
+from hypothesis import strategies as st
 
 from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.control.task_parameters import TaskParameters
@@ -187,13 +189,13 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
+def test_a_sleeve_that_missed_goes_where_it_is_seen_then_in_line_then_on(
     planner: TaskPlanner, side: int
 ) -> None:
     axes = arm_axes(joints())
     hand, away = axes[side].G(0.0), np.array([-0.1, 0.02, -0.06])
     normal = np.array([0.6, 0.0, 0.8])
-    on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+    other = SleeveFacts(False, 0.0, hand_distance=0.5, prepared_error=0.5, passed=0.0)
     outlook = (away, None) if side == 0 else (None, away)
     rows = np.stack([joints()] * (HORIZON + 1))
 
@@ -202,7 +204,7 @@ def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
         sleeve = SleeveState(hand - 0.1 * normal + [0.0, beside, 0.0], normal)
         sleeves = [sleeve, SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))]
         off = SleeveFacts(False, 0.0, 0.2, 0.2, 0.0, sight=sight)
-        order = (off, on) if side == 0 else (on, off)
+        order = (off, other) if side == 0 else (other, off)
         given = Assignment(
             (Task.PREPARE, Task.PREPARE), order, (retreats, retreats), outlook=outlook
         )
@@ -221,6 +223,38 @@ def test_a_tethered_sleeve_goes_where_it_is_seen_then_in_line_then_on(
     np.testing.assert_allclose(asked(1.0, False, between), hand + 0.5 * (before + beyond))
     # one that has just missed the hand keeps away first, seen or not
     assert np.linalg.norm(asked(1.0, True) - hand) > planner.parameters.retreat_distance
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@drawn(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
+def test_a_tethered_sleeve_goes_around_the_hand_that_does_not_see_it(
+    planner: TaskPlanner, side: int, outward: float, ahead: float, up: float
+) -> None:
+    """Outward and far back first; forward only where the panel passes beside the hand."""
+    p, q = planner.parameters, joints()
+    axes, to = arm_axes(q), heading(q)
+    hand, out = axes[side].G(0.0), -to.inward(side)
+    place = hand + outward * out + ahead * to.front + [0.0, 0.0, up]
+    sleeve = SleeveState(place, np.array([0.6, 0.0, 0.8]))
+    waits = SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))
+    off = SleeveFacts(False, 0.0, float(np.linalg.norm(hand - place)), 0.2, 0.0, sight=0.0)
+    on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+    given = Assignment(
+        (Task.PREPARE, Task.WAIT) if side == 0 else (Task.WAIT, Task.PREPARE),
+        (off, on) if side == 0 else (on, off),
+    )
+    both = [sleeve, waits] if side == 0 else [waits, sleeve]
+    rows = np.stack([q] * (HORIZON + 1))
+    asked = planner.targets(given, both, rows, STEP)[side].position[0] - hand
+    behind = -float(asked @ to.front)
+    assert float(asked @ out) > p.passing_from
+    if outward < p.passing_from:
+        assert behind > p.retreat_distance
+    elif outward > p.passing_beside:
+        assert behind == pytest.approx(p.passing_behind)
+        assert float(asked @ out) == pytest.approx(p.passing_outward)
+    else:
+        assert behind >= p.passing_behind
 
 
 def test_the_first_sleeve_comes_in_line_before_it_is_drawn_over_the_hand(
@@ -343,7 +377,7 @@ def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: Ta
     p, facts = planner.parameters, SleeveFacts(False, 0.0, 0.5, 0.5, 0.0)
     given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=1.5), facts))
     reach = p.waiting_reach * armholes_apart(planner)
-    longest = p.outlook_reach * armholes_apart(planner)
+    longest = p.longest_reach * armholes_apart(planner)
     held, drawn = [], []
     for across in np.linspace(0.0, 0.8, 17):  # the right hand comes over to the left arm
         q = joints()
@@ -373,23 +407,42 @@ def test_a_waiting_sleeve_is_as_far_up_as_lets_the_other_be_prepared(planner: Ta
     assert max(drawn) > 0.01
 
 
-def test_a_waiting_sleeve_is_not_drawn_further_while_the_other_is_at_its_hand(
-    planner: TaskPlanner,
+@pytest.mark.parametrize(("apart", "stay"), [(0.1, 4), (0.4, 3), (0.9, 0)])
+def test_a_waiting_sleeve_stays_while_the_other_is_at_its_hand(
+    planner: TaskPlanner, apart: float, stay: int
 ) -> None:
-    """It would draw that armhole away from it."""
+    """Up or down, it would draw that armhole away; but a garment drawn out is let down."""
     p, q = planner.parameters, joints()
-    q[5] = q[2] + [0.0, -0.1, 0.0]  # hands beside each other: the garment reaches from anywhere
+    q[5] = q[2] + [0.0, -apart, 0.0]
     axis, other = arm_axes(q)
-    for s, distance in ((0.5, 0.3), (0.5, 0.1), (0.1, 0.1)):
-        facts = SleeveFacts(False, 0.0, distance, 0.1, 0.0)
-        given = Assignment((Task.WAIT, Task.PREPARE), (replace(facts, linked=True, s=s), facts))
+    longest, stayed = p.longest_reach * armholes_apart(planner), 0
+    for s in (0.1, 0.5, 0.9, 1.3):
+        far = SleeveFacts(False, 0.0, 1.1 * p.near_distance, 0.1, 0.0)
+        near = replace(far, hand_distance=0.5 * p.near_distance)
         sleeves = [SleeveState(axis.G(s), axis.D(s)), SleeveState(other.G(0.0), other.D(0.0))]
-        waiting, _ = planner.targets(given, sleeves, np.stack([q] * 2), STEP)
-        asked = axis.coordinates(waiting.position[0]).s
-        if distance > p.near_distance:
-            assert asked > 1.0
-        else:
-            assert asked == pytest.approx(max(s, p.stages.waiting_progress), abs=1e-6)
+
+        tasks = (Task.WAIT, Task.PREPARE)
+        (place, to), (further, _) = (
+            [t.position[0] for t in planner.targets(given, sleeves, np.stack([q] * 2), STEP)]
+            for given in (
+                Assignment(tasks, (replace(facts, linked=True, s=s), facts))
+                for facts in (near, far)
+            )
+        )
+        stays = max(s, p.stages.waiting_progress)
+        if np.linalg.norm(axis.G(stays) - to) < longest:
+            np.testing.assert_allclose(place, axis.G(stays), atol=1e-6)
+            stayed += 1
+        elif stays > p.stages.waiting_progress:
+            # no further up, and the other one in reach or all that is allowed done for it
+            assert np.linalg.norm(place - to) < np.linalg.norm(axis.G(stays) - to)
+            lowest = axis.G(p.stages.waiting_progress)
+            short = np.linalg.norm(lowest - to) - longest
+            assert np.linalg.norm(place - to) < longest + max(0.0, short) + 1e-6
+        if apart == 0.1 and s < 1.0:
+            # from further off it is drawn up, to where it lets the other one be
+            assert axis.coordinates(further).s > 1.0
+    assert stayed == stay
 
 
 def test_sleeves_are_on_while_both_arms_are_far_enough_in_them(planner: TaskPlanner) -> None:

@@ -11,6 +11,7 @@ from drake_dress.models.dressing.stages import (
     Task,
     advance_stages,
     eases,
+    look,
     retreats,
     swings,
     withdraws,
@@ -168,6 +169,57 @@ def test_a_hand_that_loses_part_of_its_sight_is_not_given_up() -> None:
     state, _ = advance_stages(StageState(), (further, facts()), P, FAR, 0.0)
     state, _ = advance_stages(state, (further, facts()), P, FAR, P.barred_timeout + 0.1)
     assert state.attempts == (0, 0)
+
+
+def test_a_hand_that_was_seen_by_is_seen_by_for_a_while() -> None:
+    """Close by, rim and panel bar what was seen from further off; a miss forgets it."""
+    barred = SleeveFacts(False, 0.0, 0.5 * P.meeting_distance, 0.1, passed=0.0, sight=0.0)
+    sees = replace(barred, sight=P.least_sight)
+    far = replace(barred, hand_distance=1.1 * P.meeting_distance)
+
+    def sight(state: StageState, fact: SleeveFacts, time: float) -> float:
+        _, (other, found) = look(state, (facts(), fact), P, time)
+        assert other == facts() and replace(found, sight=fact.sight) == fact
+        return found.sight
+
+    assert sight(StageState(), barred, 0.1) == 0.0
+    state, kept = look(StageState(), (facts(), sees), P, 1.0)
+    assert kept == (facts(), sees)
+    soon, late = 1.0 + 0.9 * P.sight_time, 1.0 + 1.1 * P.sight_time
+    assert sight(state, barred, soon) == 1.0 and sight(state, barred, late) == 0.0
+    assert sight(state, far, soon) == 0.0
+    assert sight(state, replace(barred, linked=True), soon) == 0.0
+    # seen again meanwhile
+    state, _ = look(state, (facts(), sees), P, soon)
+    assert sight(state, barred, late) == 1.0
+    gone = replace(barred, passed=2.0 * P.missed_distance)
+    dressing = replace(state, stage=(Stage.PREPARE, Stage.DRESS), first=1)
+    missed, _ = advance_stages(dressing, (facts(), gone), P, FAR, soon)
+    assert missed.attempts == (0, 1)
+    assert sight(missed, barred, soon) == 0.0
+
+
+def test_a_sleeve_that_rests_has_not_missed_its_hand() -> None:
+    """It is barred from it for as long as the other one takes, and then has all its time."""
+    barred = SleeveFacts(False, 0.0, 0.3, 0.2, passed=0.0, sight=0.0)
+    state, coming = StageState(first=0), facts(hand=0.6)
+    for time in np.arange(0.0, 4.0 * P.barred_timeout, 0.5):
+        state, tasks = advance_stages(state, (coming, barred), P, FAR, float(time))
+        assert tasks == (Task.PREPARE, Task.REST)
+    begun = float(time)
+    on = facts(linked=True, s=P.waiting_progress)
+    for time in np.arange(begun + 0.5, begun + P.barred_timeout, 0.5):
+        state, tasks = advance_stages(state, (on, barred), P, FAR, float(time))
+        assert tasks[0] == Task.WAIT and state.attempts[1] == 0
+    state, _ = advance_stages(state, (on, barred), P, FAR, begun + P.barred_timeout + 0.6)
+    assert state.attempts[1] == 1
+    # one that rests again, while the first sleeve has slipped down, keeps away as it was told to
+    slipped = facts(linked=True, s=0.1 * P.waiting_progress)
+    began = state.since[1]
+    for after in np.arange(0.1, P.retreat_time, 0.4):
+        state, tasks = advance_stages(state, (slipped, barred), P, FAR, began + float(after))
+        assert tasks == (Task.WAIT, Task.REST) and retreats(state, 1, P, began + float(after))
+    assert not retreats(state, 1, P, began + P.retreat_time)
 
 
 def _meeting(hand: float, armhole: float) -> SleeveFacts:
