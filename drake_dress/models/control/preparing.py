@@ -97,8 +97,11 @@ class Preparation:
         cap = p.tethered_approach_distance if self.tethered else p.approach_distance
         cap *= 1.0 + p.widening * min(self.attempts, 3)
         outside = hand - cap * direction
+        back: FloatArray = (
+            outside - (p.passing_back if self.tethered else p.retreat_distance) * to.front
+        )
         if self.retreat:
-            return outside - p.retreat_distance * to.front
+            return back
         offset = hand - sleeve.p_c
         # Depth of the hand behind the opening, and how far it is beside the opening's normal.
         depth = (offset @ -sleeve.v_c)[:, None]
@@ -112,7 +115,7 @@ class Preparation:
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
             unseen = self.outlook
             if unseen is None:
-                unseen = self._around(offset, outside - hand, to)
+                unseen = self._around(offset, back - hand, to)
             there: FloatArray = hand + (1.0 - facing) * unseen + facing * onward
             return there
         barred = self._barred
@@ -130,23 +133,22 @@ class Preparation:
             return goal
         return np.where(waits, self._behind(sleeve, outside, to), goal)
 
-    def _around(self, offset: FloatArray, outside: FloatArray, to: Heading) -> FloatArray:
+    def _around(self, offset: FloatArray, back: FloatArray, to: Heading) -> FloatArray:
         """Returns the way (N,3) of a tethered armhole that its hand does not see, from the hand, m.
 
-        Outward first, as far back as it misses hands from, then forward beside the hand: the panel
-        in front of the armhole has to pass on the hand's outer side.
+        Outward and back first, then forward beside the hand: the panel in front of the armhole has
+        to pass on the hand's outer side.
 
         Args:
             offset: (N,3) of the hand from the armhole's centre now, m.
-            outside: (N,3) of the place outside the hand, from the hand, m.
+            back: (N,3) of the place outward and back, from the hand, m.
             to: heading of the person.
         """
         p, inward = self.parameters, to.inward(self.side)
         outward = np.einsum("ij,ij->i", offset, inward)[:, None]
         passing = _ramp(outward, p.passing_from, p.passing_beside)
-        behind = outside - p.retreat_distance * to.front
         beside = -p.passing_outward * inward - p.passing_behind * to.front
-        way: FloatArray = (1.0 - passing) * behind + passing * beside
+        way: FloatArray = (1.0 - passing) * back + passing * beside
         return way
 
     @property

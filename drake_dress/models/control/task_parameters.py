@@ -69,6 +69,8 @@ class TaskParameters:
             misses on.
         behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
         retreat_distance: how much further back a sleeve goes that missed the hand, m.
+        passing_back: the same of a tethered one, m: as far back as the panel before it needs to
+            pass behind the hand. Drawn further back, it pulls the first sleeve off its arm.
         withdrawal_distance: behind the shoulders, to where both sleeves are taken back, m.
         swing_reach: how far from the first armhole the second one is swung back, as a share of the
             distance between both at rest.
@@ -139,6 +141,7 @@ class TaskParameters:
     steep: float = 0.47
     behind_distance: float = 0.30
     retreat_distance: float = 0.15
+    passing_back: float = 0.08
     withdrawal_distance: float = 0.65
     swing_reach: float = 0.9
     swing_outward: float = 0.5

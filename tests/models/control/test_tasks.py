@@ -249,7 +249,7 @@ def test_a_tethered_sleeve_goes_around_the_hand_that_does_not_see_it(
     behind = -float(asked @ to.front)
     assert float(asked @ out) > p.passing_from
     if outward < p.passing_from:
-        assert behind > p.retreat_distance
+        assert behind > p.passing_back
     elif outward > p.passing_beside:
         assert behind == pytest.approx(p.passing_behind)
         assert float(asked @ out) == pytest.approx(p.passing_outward)
