@@ -100,7 +100,7 @@ class TaskParameters:
         near_position, near_direction: factors on W and Q then.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
         dressing_position: factor on W once both are: the last centimetres cost less than what the
-            armhole lies askew on the shoulder.
+            armhole lies askew on the shoulder. Also of a waiting sleeve that may slip off.
         waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
             lets the other one use.
         largest_aside: how far a waiting sleeve is drawn aside at most, m: hands that hang 0.58 m

@@ -445,6 +445,18 @@ def test_a_waiting_sleeve_stays_while_the_other_is_at_its_hand(
     assert stayed == stay
 
 
+def test_a_waiting_sleeve_that_may_slip_off_counts_for_more(planner: TaskPlanner) -> None:
+    p, q = planner.parameters, joints()
+    axis, other = arm_axes(q)
+    least, off = p.stages.waiting_progress, SleeveFacts(False, 0.0, 0.3, 0.3, 0.0)
+    weights = []
+    for s in (0.5 * least, 1.5 * least):
+        given = Assignment((Task.WAIT, Task.PREPARE), (replace(off, linked=True, s=s), off))
+        sleeves = [SleeveState(axis.G(s), axis.D(s)), SleeveState(other.G(0.0), other.D(0.0))]
+        weights.append(planner.targets(given, sleeves, np.stack([q] * 2), STEP)[0].position_weight)
+    assert weights[0] > 2.0 * weights[1] == 2.0
+
+
 def test_sleeves_are_on_while_both_arms_are_far_enough_in_them(planner: TaskPlanner) -> None:
     q, kept = joints(), planner.parameters.stages.kept_progress
     axes, angle = arm_axes(q), np.linspace(0.0, 2.0 * np.pi, len(planner.armholes[0]), False)
