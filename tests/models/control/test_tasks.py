@@ -254,7 +254,7 @@ def test_a_tethered_sleeve_goes_around_the_hand_that_does_not_see_it(
         assert behind == pytest.approx(p.passing_behind)
         assert float(asked @ out) == pytest.approx(p.passing_outward)
     else:
-        assert behind >= p.passing_behind
+        assert behind >= p.passing_behind - 1e-9
 
 
 def test_the_first_sleeve_comes_in_line_before_it_is_drawn_over_the_hand(
