@@ -14,29 +14,26 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.logged import logged_policy
-from benchmarks.prediction import Moment, read_run
+from benchmarks.logged import logged_policy, opened
+from benchmarks.prediction import SEEN, Moment, read_run
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.control.person_model import person_obstacles
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.dressing.sight import distance_to_opening
-from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.garment.transfer import barycentric_transfer
-from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
 # How far is looked ahead, and the time between moments, s.
 _AHEAD, _BETWEEN = 2.0, 1.0
 # A hand this close to the surface that spans its armhole is one that may go in, m.
 _NEAR = 0.12
-# The plant's garment is seen before and after a moment for its velocity, s.
-_SEEN = 1.0 / 30.0
 
 
 @dataclass(frozen=True)
@@ -63,9 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     found: list[Entry] = []
     try:
-        for k, path in enumerate(options.log):
-            found += entries(path)
-            print(f"{k + 1}/{len(options.log)} {path}", file=sys.stderr, flush=True)
+        for path, log in opened(options.log):
+            found += entries(path, log)
     except UserError as error:
         print(f"entering: {error}", file=sys.stderr)
         return 2
@@ -78,7 +74,10 @@ def table(found: Sequence[Entry]) -> Table:
     into = [e for e in found if e.really.within]
     out = [e for e in found if not e.really.within]
     rows = []
-    for name, of in (("as they moved", _moving), ("where they were", _staying)):
+    for name, of in (
+        ("as they moved", attrgetter("moving")),
+        ("where they were", attrgetter("staying")),
+    ):
         error = [1e3 * float(np.linalg.norm(of(e).armhole - e.really.armhole)) for e in found]
         rows.append(
             [
@@ -92,32 +91,23 @@ def table(found: Sequence[Entry]) -> Table:
     return Table(f"Second hands, {_AHEAD:g} s ahead", header, rows)
 
 
-def _moving(entry: Entry) -> Ahead:
-    return entry.moving
-
-
-def _staying(entry: Entry) -> Ahead:
-    return entry.staying
-
-
-def entries(path: Path) -> Iterator[Entry]:
+def entries(path: Path, log: RunLog) -> Iterator[Entry]:
     """Yields what came and what was foreseen after each moment of a run."""
-    with RunLog.open(path) as log:
-        _, policy = logged_policy(log)
-        run = read_run(path, 1)
-        seen = barycentric_transfer(run.mesh, policy.mesh)
-        last = log.time[-1] - _AHEAD - 2.0 * _SEEN
-        for time in np.arange(_BETWEEN, last, _BETWEEN):
-            moment = Moment(run, policy.mesh, seen, log, float(time))
-            joints = moment.joints(np.zeros(1))[0]
-            x = moment.plant(0.0)
-            on = [_within(policy, x, joints, side) for side in (0, 1)]
-            if sum(on) != 1:
-                continue
-            side = on.index(False)
-            rim = x[policy.planner.armholes[side]]
-            if distance_to_opening(rim, joints[3 * side + 2]) < _NEAR:
-                yield _entry(moment, policy, side)
+    _, policy = logged_policy(log)
+    run = read_run(path, 1)
+    seen = barycentric_transfer(run.mesh, policy.mesh)
+    last = log.time[-1] - _AHEAD - 2.0 * SEEN
+    for time in np.arange(_BETWEEN, last, _BETWEEN):
+        moment = Moment(run, policy.mesh, seen, log, float(time))
+        joints = moment.joints(np.zeros(1))[0]
+        x = moment.plant(0.0)
+        on = [policy.planner.is_linked(x, joints, side) for side in (0, 1)]
+        if sum(on) != 1:
+            continue
+        side = on.index(False)
+        rim = x[policy.planner.armholes[side]]
+        if distance_to_opening(rim, joints[3 * side + 2]) < _NEAR:
+            yield _entry(moment, policy, side)
 
 
 def _entry(moment: Moment, policy: DressingPolicy, side: int) -> Entry:
@@ -135,23 +125,16 @@ def _entry(moment: Moment, policy: DressingPolicy, side: int) -> Entry:
 def _led(moment: Moment, policy: DressingPolicy, joints: FloatArray) -> FloatArray:
     """Returns the controller's garment (n,3), m, led by grippers past arms at joints (N+1,6,3)."""
     cloth, h = policy.controller.cloth, policy.parameters.time_step
-    way = moment.grippers(h * np.arange(len(joints)))
-    counts = [len(policy.mesh.grasp[side]) for side in SIDES]
     obstacles = person_obstacles(policy.person, joints, h)
-    x = moment.plant(0.0)
-    v = (moment.plant(_SEEN) - moment.plant(-_SEEN)) / (2.0 * _SEEN)
-    for j, around in enumerate(obstacles):
-        x, v, _, _ = cloth.step(x, v, np.repeat(way[j + 1] - way[j], counts, axis=0), around)
+    x, v = moment.plant(0.0), moment.velocity()
+    for motion, around in zip(moment.motion(h * np.arange(len(joints))), obstacles, strict=True):
+        x, v, _, _ = cloth.step(x, v, motion, around)
     return x
 
 
 def _ahead(policy: DressingPolicy, x: FloatArray, joints: FloatArray, side: int) -> Ahead:
-    sleeve: SleeveState = policy.planner.sleeves(x)[side]
-    return Ahead(_within(policy, x, joints, side), sleeve.p_c)
-
-
-def _within(policy: DressingPolicy, x: FloatArray, joints: FloatArray, side: int) -> bool:
-    return policy.planner.is_linked(x, joints, side)
+    planner = policy.planner
+    return Ahead(planner.is_linked(x, joints, side), planner.sleeves(x)[side].p_c)
 
 
 if __name__ == "__main__":

@@ -41,6 +41,8 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
 AFTER = (1.0, 2.0, 3.0)
+# The garment is seen so long before and after a moment for its velocity, s.
+SEEN = 1.0 / 30.0
 _GRIPPERS = "as the grippers"
 
 
@@ -231,6 +233,16 @@ class Moment:
         found: FloatArray = np.asarray(self._seen @ x)
         return found
 
+    def velocity(self) -> FloatArray:
+        """Returns that of the plant's garment (m,3) at the controller's nodes, m/s."""
+        found: FloatArray = (self.plant(SEEN) - self.plant(-SEEN)) / (2.0 * SEEN)
+        return found
+
+    def motion(self, after: FloatArray) -> FloatArray:
+        """Returns (k - 1,held,3) how what is held went between k times, m."""
+        counts = [len(self._belief.grasp[side]) for side in SIDES]
+        return np.repeat(np.diff(self.grippers(after), axis=0), counts, axis=1)
+
     def sleeve(self, x: FloatArray, side: int):  # type: ignore[no-untyped-def]
         """Returns the state of a sleeve of the garment at `x`."""
         return sleeve_state(x, self._belief.loops[f"{SIDES[side]}_armhole"], self._signs[side])
@@ -276,16 +288,13 @@ class Moment:
         """Returns the garment as foreseen, and times of a second of it: alone, with gradient."""
         steps = round(AFTER[-1] / h)
         at = h * np.arange(steps + 1)
-        way, joints = self.grippers(at), self.joints(at)
-        obstacles = person_obstacles(self._run.person, joints, h)
-        counts = [len(self._belief.grasp[side]) for side in SIDES]
-        x, d = self.plant(0.0), 1.0 / 30.0
-        v = (self.plant(d) - self.plant(-d)) / (2.0 * d)
+        obstacles = person_obstacles(self._run.person, self.joints(at), h)
+        motion = self.motion(at)
+        x, v = self.plant(0.0), self.velocity()
         foreseen, tapes = [], []
         begin = time.perf_counter()
         for j in range(steps):
-            motion = np.repeat(way[j + 1] - way[j], counts, axis=0)
-            x, v, _, tape = cloth.step(x, v, motion, obstacles[j])
+            x, v, _, tape = cloth.step(x, v, motion[j], obstacles[j])
             tapes.append(tape)
             if any(abs(at[j + 1] - after) < 1e-9 for after in AFTER):
                 foreseen.append(x)

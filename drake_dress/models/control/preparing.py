@@ -110,7 +110,7 @@ class Preparation:
         inside = facing * _ramp(depth, -0.02, 0.02)
         # not over the hand before it is in line: what is beside goes first
         ahead = np.where(depth < 0.0, _ramp(beside, p.funnel_wide, p.funnel_narrow), 1.0)
-        if self.outlook is not None or self.tethered:
+        if self._seeks_sight:
             onward = (1.0 - inside) * sleeve.v_c + inside * forearm
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
             unseen = self.outlook
@@ -152,6 +152,11 @@ class Preparation:
         return way
 
     @property
+    def _seeks_sight(self) -> bool:
+        """Whether it goes to where its hand comes to see it."""
+        return self.tethered or self.outlook is not None
+
+    @property
     def _barred(self) -> float:
         """How far the garment bars the hand's sight of the opening, 0 to 1."""
         stages = self.parameters.stages
@@ -165,7 +170,7 @@ class Preparation:
         """
         p = self.parameters
         facing = (1.0 - self._barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
-        if self.outlook is None and not self.tethered:
+        if not self._seeks_sight:
             return facing
         return np.maximum(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
 

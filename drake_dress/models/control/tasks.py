@@ -392,10 +392,9 @@ class TaskPlanner:
         if task == Task.HOLD:
             # as far beside the arm as it is
             position = position + sleeves[side].p_c - mine[0].G(fact.s)
-        weight = p.dressing_position if given.facts[0].linked and given.facts[1].linked else 1.0
-        if task == Task.WAIT and fact.s < p.stages.waiting_progress:
-            # about to slip off
-            weight = p.dressing_position
+        both = given.facts[0].linked and given.facts[1].linked
+        slips = task == Task.WAIT and fact.s < p.stages.waiting_progress
+        weight = p.dressing_position if both or slips else 1.0
         return SleeveTarget(position, direction, weight, p.dressing_direction)
 
     def _drawn_progress(self, given: Assignment, side: int, times: Sequence[float]) -> list[float]:

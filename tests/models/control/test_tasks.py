@@ -188,15 +188,17 @@ def test_an_arm_that_was_led_inward_is_gone_about_along_its_forearm(
             assert np.allclose(asked, along) == due
 
 
+@pytest.mark.parametrize("tethered", [False, True])
 @pytest.mark.parametrize("side", [0, 1])
-def test_a_sleeve_that_missed_goes_where_it_is_seen_then_in_line_then_on(
-    planner: TaskPlanner, side: int
+def test_a_sleeve_goes_where_it_is_seen_then_in_line_then_on(
+    planner: TaskPlanner, side: int, tethered: bool
 ) -> None:
+    """One that missed its hand, or whose other one is on its arm, which goes around."""
     axes = arm_axes(joints())
     hand, away = axes[side].G(0.0), np.array([-0.1, 0.02, -0.06])
     normal = np.array([0.6, 0.0, 0.8])
-    other = SleeveFacts(False, 0.0, hand_distance=0.5, prepared_error=0.5, passed=0.0)
-    outlook = (away, None) if side == 0 else (None, away)
+    other = SleeveFacts(tethered, 0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+    outlook = (None, None) if tethered else (away, None) if side == 0 else (None, away)
     rows = np.stack([joints()] * (HORIZON + 1))
 
     def asked(sight: float, retreats: bool, beside: float = 0.2) -> np.ndarray:
@@ -212,6 +214,8 @@ def test_a_sleeve_that_missed_goes_where_it_is_seen_then_in_line_then_on(
         found: np.ndarray = planner.targets(given, both, rows, STEP)[side].position[0]
         return found
 
+    if tethered:
+        away = asked(0.0, False) - hand
     np.testing.assert_allclose(asked(0.0, False), hand + away)
     p = planner.parameters
     before, beyond = -p.funnel_distance * normal, p.overshoot * normal
@@ -422,12 +426,10 @@ def test_a_waiting_sleeve_stays_while_the_other_is_at_its_hand(
         sleeves = [SleeveState(axis.G(s), axis.D(s)), SleeveState(other.G(0.0), other.D(0.0))]
 
         tasks = (Task.WAIT, Task.PREPARE)
+        given = [Assignment(tasks, (replace(f, linked=True, s=s), f)) for f in (near, far)]
         (place, to), (further, _) = (
-            [t.position[0] for t in planner.targets(given, sleeves, np.stack([q] * 2), STEP)]
-            for given in (
-                Assignment(tasks, (replace(facts, linked=True, s=s), facts))
-                for facts in (near, far)
-            )
+            [t.position[0] for t in planner.targets(g, sleeves, np.stack([q] * 2), STEP)]
+            for g in given
         )
         stays = max(s, p.stages.waiting_progress)
         if np.linalg.norm(axis.G(stays) - to) < longest:
