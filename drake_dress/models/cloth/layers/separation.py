@@ -48,6 +48,8 @@ _PASSES_AT_ONCE = 4
 _TAKE_BACK = 8
 _ROUNDS = 6
 _ZONE_ROUNDS = 40
+# How often those that would still cross are given way to: what yields moves its neighbours.
+_YIELDS = 3
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ class SeparationRecord:
             change of velocity.
         frame: (3,3) axes in which directions and barred directions are expressed, as columns:
             those of an observer who turns with the garment, where it turns far.
-        inverse_mass: (n,) as given; barred: (n,3) as given, in the frame's axes.
+        inverse_mass: (n,) as given, or as what yielded has it; barred: (n,3) likewise, in the
+            frame's axes.
         thin: pairs left closer than the thickness asks for, after the last part.
         crossing: pairs that could not be kept apart, over all parts: only where motions that are
             prescribed leave no way. unparted: (4 crossing,) their nodes.
@@ -172,7 +175,8 @@ class LayerSeparation:
     Limitations: layers slide on each other without friction; nodes and edges that are joined by
     `rings` edges or fewer are not told apart (a fold may close on itself there); layers that cross
     at the start stay crossed; an impulse knows nothing of the person, who has to be given as
-    inverse masses and barred directions.
+    inverse masses and barred directions; what yields enters the person, and contact has to drive
+    it out again.
 
     Args:
         elements: the mesh.
@@ -216,6 +220,7 @@ class LayerSeparation:
         barred: FloatArray | None = None,
         expected: Expected | None = None,
         passing: Passing | None = None,
+        yielding: FloatArray | None = None,
     ) -> tuple[FloatArray, SeparationRecord]:
         """Returns the corrected displacement (n,3), m, and how it came about.
 
@@ -229,22 +234,49 @@ class LayerSeparation:
                 slips on the person), zero for the others; None for no such node.
             expected: of `expect` at `x`; saves a search where `dx` is nearly what was expected.
             passing: who may pass through whom; None for nobody.
+            yielding: (n,) 1/kg of nodes where nothing bars them, 0 for those whose motion is
+                prescribed whatever it costs. Those that would cross are moved by it: a fold that is
+                pinched between an arm and a chest makes room for itself in the flesh, and slips
+                where it stuck. None where nothing yields.
 
         Raises:
             ValueError: an array has another shape.
         """
         x, dx = (np.ascontiguousarray(k, dtype=np.float64) for k in (x, dx))
         w = np.ascontiguousarray(inverse_mass, dtype=np.float64)
+        m = self._nothing_barred if barred is None else np.ascontiguousarray(barred, np.float64)
+        free = np.zeros(self._n) if yielding is None else np.ascontiguousarray(yielding, np.float64)
         for name, array, shape in (
             ("x", x, (self._n, 3)),
             ("dx", dx, (self._n, 3)),
             ("inverse_mass", w, (self._n,)),
+            ("barred", m, (self._n, 3)),
+            ("yielding", free, (self._n,)),
         ):
             if array.shape != shape:
                 raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
-        m = self._nothing_barred if barred is None else np.ascontiguousarray(barred, np.float64)
-        if m.shape != (self._n, 3):
-            raise ValueError(f"barred has shape {m.shape}, expected {(self._n, 3)}")
+        corrected, record = self._correct(x, dx, w, m, expected, passing)
+        given = np.zeros(self._n, dtype=np.bool_)
+        for _ in range(_YIELDS):
+            crossing = record.unparted
+            crossing = crossing[(free[crossing] > 0.0) & ~given[crossing]]
+            if not len(crossing):
+                break
+            given[crossing] = True
+            w, m = np.where(given, free, w), np.where(given[:, None], 0.0, m)
+            corrected, record = self._correct(x, dx, w, m, expected, passing)
+        return corrected, record
+
+    def _correct(
+        self,
+        x: FloatArray,
+        dx: FloatArray,
+        w: FloatArray,
+        m: FloatArray,
+        expected: Expected | None,
+        passing: Passing | None,
+    ) -> tuple[FloatArray, SeparationRecord]:
+        """Returns what `correct` does where nothing yields."""
         proposed, frame = dx, np.eye(3)
         motion = relative_motion(self._topology, x, dx)
         furthest = 2.0 * float(motion.reach.max())
