@@ -20,8 +20,8 @@ from drake_dress.models.cloth.filtered_cg import HELD, STICK
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.layers.bonds import Bonds
-from drake_dress.models.cloth.layers.neighbours import Pairs, Passing
-from drake_dress.models.cloth.layers.separation import Expected, LayerSeparation
+from drake_dress.models.cloth.layers.neighbours import Passing
+from drake_dress.models.cloth.layers.separation import LayerSeparation
 from drake_dress.models.cloth.layers.tangles import Tangle, Tangles
 from drake_dress.models.cloth.material import Material
 
@@ -35,6 +35,8 @@ _RESISTANCE = 1000.0
 # Speed at which layers that have crossed are led back, m/s: a fold of 2 cm is out in 0.2 s, for its
 # neighbours help. With three times that what was pinched flew apart at 3 m/s.
 _WAY_OUT = 0.03
+# How far astray nodes look for the layer that they are behind, by the mean edge length.
+_BEHIND = 0.5
 
 
 class Integrator(Protocol):
@@ -82,6 +84,7 @@ class LayeredCloth:
         self._layers = LayerSeparation(integrator.elements, thickness)
         self._tangles = Tangles(integrator.elements)
         self._resistance = _RESISTANCE * float(np.median(self.mass))
+        self._behind = _BEHIND * float(integrator.elements.edge_rest_length.mean())
 
     def step(
         self,
@@ -93,17 +96,15 @@ class LayeredCloth:
     ) -> tuple[ClothState, Any]:
         """Returns the state one time step later; see `ImplicitCloth.step`."""
         tangle = self._tangle(state)
-        expected = self._layers.expect(state.x, self.time_step * state.v)
         passing = None if tangle is None else tangle.passing
-        kept = replace(expected, pairs=expected.pairs.without(passing))
-        given = replace(influences, bonds=self._bonds(state, kept.pairs))
+        given = replace(influences, bonds=self._bonds(state, passing))
         after, info = self._integrator.step(state, obstacles, held_velocity, given, guess)
         near = find_proximity(state.x, obstacles, self.material.margin)
         barred = np.where((near.gap < _ON_THE_PERSON)[:, None], near.normal, 0.0)
         w = inverse_mass(self.mass, after.mode)
         if tangle is not None:
-            after = self._led_back(state, after, w, barred, tangle, expected.pairs)
-        return self._apart(state, after, w, barred, kept, passing), info
+            after = self._led_back(state, after, w, barred, tangle)
+        return self._apart(state, after, w, barred, passing), info
 
     def _tangle(self, state: ClothState) -> Tangle | None:
         """Returns what pierces, if anything does."""
@@ -118,10 +119,10 @@ class LayeredCloth:
         w: FloatArray,
         barred: FloatArray,
         tangle: Tangle,
-        pairs: Pairs,
     ) -> ClothState:
         """Returns `after` with layers on their way back that have crossed."""
         h, dx = self.time_step, after.x - before.x
+        pairs = self._layers.pairs(before.x, h * before.v, self._behind)
         moved = self._tangles.lead_back(tangle, before.x, dx, w, barred, pairs, _WAY_OUT * h)
         change = moved - dx
         return replace(after, x=before.x + moved, v=after.v + change / h)
@@ -132,13 +133,12 @@ class LayeredCloth:
         after: ClothState,
         w: FloatArray,
         barred: FloatArray,
-        expected: Expected,
         passing: Passing | None,
     ) -> ClothState:
         """Returns `after` with layers kept apart."""
         dx = after.x - before.x
         yielding = np.where(after.mode == HELD, 0.0, 1.0 / self.mass)
-        moved, record = self._layers.correct(before.x, dx, w, barred, expected, passing, yielding)
+        moved, record = self._layers.correct(before.x, dx, w, barred, passing, yielding)
         x, v = after.x, after.v
         pushed = pushed_nodes(record.rate_change)
         if pushed.any():
@@ -150,12 +150,12 @@ class LayeredCloth:
             tangled = self._tangles.near(x, tangled)
         return replace(after, x=x, v=v, tangled=tangled.astype(np.int32))
 
-    def _bonds(self, state: ClothState, pairs: Pairs) -> Bonds:
-        """Returns those of `pairs` that would come closer than layers keep by themselves."""
+    def _bonds(self, state: ClothState, passing: Passing | None) -> Bonds:
+        """Returns the pairs that would come closer than layers keep by themselves."""
         h, thickness = self.time_step, self._layers.thickness
+        pairs = self._layers.pairs(state.x, h * state.v, thickness).without(passing)
         rate = np.einsum("pm,pmk,pk->p", pairs.weights, state.v[pairs.node], pairs.direction)
-        fall = np.einsum("pm,pk,k->p", pairs.weights, pairs.direction, self.gravity)
-        near = pairs.distance + h * np.minimum(rate + h * fall, 0.0) < thickness
+        near = pairs.distance + h * np.minimum(rate, 0.0) < thickness
         lacking = thickness - pairs.distance[near]
         # what is closer parts slowly, what is farther may come as near as layers keep
         share = np.where(lacking > 0.0, _RECOVERY, 1.0)

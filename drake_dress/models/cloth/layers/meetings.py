@@ -55,11 +55,13 @@ class Meetings:
     Args:
         topology: of the mesh.
         edge: mean length of its edges, m.
+        usual: distance that is often asked for, m: a search for less serves that as well.
     """
 
-    def __init__(self, topology: Topology, edge: float) -> None:
+    def __init__(self, topology: Topology, edge: float, usual: float = 0.0) -> None:
         self._t = topology
         self._edge = edge
+        self._usual = usual
         self._most = topology.node_count + 64
         self._last: _Search | None = None
 
@@ -70,7 +72,7 @@ class Meetings:
         """
         last = self._last
         if last is None or not self._holds(last, x, motion, near):
-            last = self._last = self._search(x, motion, near)
+            last = self._last = self._search(x, motion, max(near, self._usual))
         met: IntArray = _meeting(last.met, x, motion.rest, motion.spread, motion.longest, near)
         return met
 

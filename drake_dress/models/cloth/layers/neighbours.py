@@ -3,7 +3,8 @@
 Pairs are found through nodes: when a node and a triangle, or two edges, are closer than d, then
 two of their corners are within sqrt(d² + (ℓ_i² + ℓ_j²)/3), ℓ the longest edge at each. So one
 uniform grid of nodes is searched (`meetings`), and only nodes that see another layer are looked at
-further. A pair belongs to its two closest corners, hence it is found once.
+further. A pair belongs to its two closest corners, hence it is found once. What lies further apart
+than may be along where the cloth of one node faces, or along the line between both, is passed over.
 """
 
 from __future__ import annotations
@@ -73,11 +74,12 @@ class PairFinder:
     Args:
         topology: of the mesh.
         edge: mean length of its edges, m.
+        usual: see `Meetings`.
     """
 
-    def __init__(self, topology: Topology, edge: float) -> None:
+    def __init__(self, topology: Topology, edge: float, usual: float = 0.0) -> None:
         self._t = topology
-        self._meetings = Meetings(topology, edge)
+        self._meetings = Meetings(topology, edge, usual)
         self._capacity = 4 * topology.node_count + 64
 
     def find(self, x: FloatArray, motion: Motion, near: float) -> Pairs:
@@ -156,6 +158,10 @@ def _pairs_at(  # type: ignore[no-untyped-def]
     open_j = np.full(n, -1, dtype=np.int32)
     out_i = np.zeros(n)
     out_j = np.zeros(n)
+    # where cloth faces, and how high both parts of a meeting are along that
+    facing = _facing(x, triangle)
+    height_i = np.zeros(n)
+    height_j = np.zeros(n)
     count = 0
     for m in range(met.shape[0]):
         i, j = met[m, 0], met[m, 1]
@@ -168,6 +174,15 @@ def _pairs_at(  # type: ignore[no-untyped-def]
             ring_j[ring[k]] = m
         _open(x, i, j, m, gap2, ring_j, joined_start, joined, open_i, out_i)
         _open(x, j, i, m, gap2, ring_i, joined_start, joined, open_j, out_j)
+        parted = _parted(
+            x, facing[j], i, j, m, joined_start, joined, open_i, open_j, height_i, height_j
+        )
+        if parted <= bound:
+            parted = _parted(
+                x, facing[i], i, j, m, joined_start, joined, open_i, open_j, height_i, height_j
+            )
+        if parted > bound:
+            continue
         for swapped in range(2):
             p = j if swapped else i
             q = i if swapped else j
@@ -176,6 +191,7 @@ def _pairs_at(  # type: ignore[no-untyped-def]
                 t0, t1, t2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
                 belongs = True
                 ahead = 0.0
+                low = height_i[i] if swapped else height_j[j]
                 for c in range(3):
                     node = t0 if c == 0 else (t1 if c == 1 else t2)
                     if node == q:
@@ -184,7 +200,9 @@ def _pairs_at(  # type: ignore[no-untyped-def]
                         belongs = False
                         break
                     ahead = max(ahead, out_i[node] if swapped else out_j[node])
-                if belongs and gap2 - ahead <= allowed:
+                    low = max(low, height_i[node]) if swapped else min(low, height_j[node])
+                parted = height_j[j] - low if swapped else low - height_i[i]
+                if belongs and gap2 - ahead <= allowed and parted <= bound:
                     count = _add(
                         x, rest, near, NODE_TRIANGLE, p, t0, t1, t2,
                         pair, kind, weights, direction, distance, count,
@@ -194,9 +212,12 @@ def _pairs_at(  # type: ignore[no-untyped-def]
             if open_i[a] != m:
                 continue
             left = gap2 - out_i[a]
+            high = max(height_i[i], height_i[a])
             for kb in range(joined_start[j], joined_start[j + 1]):
                 b = joined[kb]
                 if open_j[b] != m or left - out_j[b] > allowed:
+                    continue
+                if min(height_j[j], height_j[b]) - high > bound:
                     continue
                 d2 = squared(x, a, b)
                 if d2 < gap2 or (d2 == gap2 and _before(a, b, i, j)):
@@ -223,6 +244,55 @@ def _open(  # type: ignore[no-untyped-def]
         later = d2 > gap2 or (d2 == gap2 and not _before(a, j, i, j))
         is_open[a] = m if later and ring_j[a] != m else -1
         out[a] = max(0.0, _along(x, i, j, a))
+
+
+@nb.njit(cache=True, nogil=True)
+def _facing(x, triangle):  # type: ignore[no-untyped-def]
+    """Returns (n,3) where cloth faces at each node, unit vectors, or zeros."""
+    facing = np.zeros_like(x)
+    for t in range(triangle.shape[0]):
+        i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+        a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        n0, n1, n2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+        for c in range(3):
+            node = i if c == 0 else (j if c == 1 else k)
+            facing[node, 0] += n0
+            facing[node, 1] += n1
+            facing[node, 2] += n2
+    for i in range(x.shape[0]):
+        size = np.sqrt(facing[i, 0] ** 2 + facing[i, 1] ** 2 + facing[i, 2] ** 2)
+        if size > 0.0:
+            for c in range(3):
+                facing[i, c] /= size
+    return facing
+
+
+@nb.njit(cache=True, nogil=True)
+def _parted(  # type: ignore[no-untyped-def]
+    x, facing, i, j, m, joined_start, joined, open_i, open_j, height_i, height_j
+):
+    """Returns the gap between i and j, each with its open neighbours, along `facing` (3,), m.
+
+    Writes how high they are, mirrored so that j's part is the upper one.
+    """
+    n0, n1, n2 = facing[0], facing[1], facing[2]
+    high = n0 * x[i, 0] + n1 * x[i, 1] + n2 * x[i, 2]
+    low = n0 * x[j, 0] + n1 * x[j, 1] + n2 * x[j, 2]
+    if low < high:
+        n0, n1, n2, high, low = -n0, -n1, -n2, -high, -low
+    height_i[i], height_j[j] = high, low
+    for k in range(joined_start[i], joined_start[i + 1]):
+        a = joined[k]
+        if open_i[a] == m:
+            height_i[a] = n0 * x[a, 0] + n1 * x[a, 1] + n2 * x[a, 2]
+            high = max(high, height_i[a])
+    for k in range(joined_start[j], joined_start[j + 1]):
+        b = joined[k]
+        if open_j[b] == m:
+            height_j[b] = n0 * x[b, 0] + n1 * x[b, 1] + n2 * x[b, 2]
+            low = min(low, height_j[b])
+    return low - high
 
 
 @nb.njit(cache=True, nogil=True)

@@ -40,8 +40,6 @@ _FAR = 4.0
 _SLACK = 0.15
 # Part of the thickness that pairs may lose unseen by such corrections.
 _UNSEEN = 0.5
-# By which a displacement may differ from what was expected, by the mean edge length.
-_EXPECTED = 0.15
 _PASSES = 64
 _PASSES_AT_ONCE = 4
 # Passes that take needless impulses back.
@@ -110,27 +108,6 @@ class SeparationRecord:
         return sum(len(s.scale) for p in self.parts for s in p if isinstance(s, Impulses))
 
 
-@dataclass(frozen=True)
-class Expected:
-    """Pairs that were found for a displacement, and by how much another may differ from it.
-
-    Attributes:
-        pairs: what was found.
-        dx: (n,3) the displacement, m.
-        room: by which each node's may differ, what all have in common aside, m.
-    """
-
-    pairs: Pairs
-    dx: FloatArray
-    room: float
-
-    def of(self, dx: FloatArray) -> Pairs | None:
-        """Returns the pairs if they hold for `dx` (n,3), m, as well."""
-        apart = dx - self.dx
-        apart -= apart.mean(axis=0)
-        return self.pairs if largest_length(apart) <= self.room else None
-
-
 @dataclass
 class _Counts:
     thin: int = 0
@@ -196,21 +173,20 @@ class LayerSeparation:
         self._n = elements.node_count
         self._topology = make_topology(elements, rings)
         self._edge = float(elements.edge_rest_length.mean())
-        self._finder = PairFinder(self._topology, self._edge)
         self._slack = max(self.thickness, _SLACK * self._edge)
+        self._near = self.thickness + self._slack
+        self._finder = PairFinder(self._topology, self._edge, self._near)
         self._nothing_barred = np.zeros((self._n, 3))
 
-    def expect(self, x: FloatArray, dx: FloatArray) -> Expected:
-        """Returns the pairs that may come near each other in a displacement like `dx` (n,3), m.
+    def pairs(self, x: FloatArray, dx: FloatArray, within: float) -> Pairs:
+        """Returns the pairs that may come within a distance, m, in a displacement `dx` (n,3), m.
 
         Args:
             x: (n,3) positions at the start of the step, m.
-            dx: (n,3) what it may be, m.
+            dx: (n,3), m.
+            within: m.
         """
-        motion = relative_motion(self._topology, x, dx)
-        room = _EXPECTED * self._edge
-        near = self.thickness + self._slack + 2.0 * room
-        return Expected(self._finder.find(x, motion, near), dx, room)
+        return self._finder.find(x, relative_motion(self._topology, x, dx), within)
 
     def correct(
         self,
@@ -218,7 +194,6 @@ class LayerSeparation:
         dx: FloatArray,
         inverse_mass: FloatArray,
         barred: FloatArray | None = None,
-        expected: Expected | None = None,
         passing: Passing | None = None,
         yielding: FloatArray | None = None,
     ) -> tuple[FloatArray, SeparationRecord]:
@@ -232,7 +207,6 @@ class LayerSeparation:
                 of P⁻¹ says better than 1/m which layer yields.
             barred: (n,3) unit direction along which a node may not be moved (the normal where it
                 slips on the person), zero for the others; None for no such node.
-            expected: of `expect` at `x`; saves a search where `dx` is nearly what was expected.
             passing: who may pass through whom; None for nobody.
             yielding: (n,) 1/kg of nodes where nothing bars them, 0 for those whose motion is
                 prescribed whatever it costs. Those that would cross are moved by it: a fold that is
@@ -255,7 +229,7 @@ class LayerSeparation:
         ):
             if array.shape != shape:
                 raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
-        corrected, record = self._correct(x, dx, w, m, expected, passing)
+        corrected, record = self._correct(x, dx, w, m, passing)
         given = np.zeros(self._n, dtype=np.bool_)
         for _ in range(_YIELDS):
             crossing = record.unparted
@@ -264,7 +238,7 @@ class LayerSeparation:
                 break
             given[crossing] = True
             w, m = np.where(given, free, w), np.where(given[:, None], 0.0, m)
-            corrected, record = self._correct(x, dx, w, m, expected, passing)
+            corrected, record = self._correct(x, dx, w, m, passing)
         return corrected, record
 
     def _correct(
@@ -273,7 +247,6 @@ class LayerSeparation:
         dx: FloatArray,
         w: FloatArray,
         m: FloatArray,
-        expected: Expected | None,
         passing: Passing | None,
     ) -> tuple[FloatArray, SeparationRecord]:
         """Returns what `correct` does where nothing yields."""
@@ -293,14 +266,11 @@ class LayerSeparation:
         counts = _Counts(passing=passing)
         parts = []
         rate, lag = dx.copy(), np.zeros((1, 3))
-        known = None
-        if expected is not None and count == 1 and not turned:
-            known = expected.of(dx)
         for k in range(count):
             counts.stages = []
             part = rate / count if count > 1 else rate
             start = x + (k / count) * dx + lag if k else x
-            self._correct_part(start, part, w, m, counts, motion if count == 1 else None, known)
+            self._correct_part(start, part, w, m, counts, motion if count == 1 else None)
             if counts.stages:
                 if count > 1:
                     moved = np.any(part != rate / count, axis=1)
@@ -358,13 +328,12 @@ class LayerSeparation:
         barred: FloatArray,
         counts: _Counts,
         motion: Motion | None,
-        known: Pairs | None = None,
     ) -> None:
         """Corrects `dx` in place and notes what was done."""
         counts.thin = 0
         for _ in range(_ROUNDS):
-            pairs = known if known is not None else self._find(x, dx, counts.passing, motion)
-            motion = known = None
+            pairs = self._find(x, dx, counts.passing, motion)
+            motion = None
             counts.pairs = len(pairs.kind)
             if counts.pairs == 0:
                 return
@@ -384,7 +353,7 @@ class LayerSeparation:
     ) -> Pairs:
         if motion is None:
             motion = relative_motion(self._topology, x, dx)
-        return self._finder.find(x, motion, self.thickness + self._slack).without(passing)
+        return self._finder.find(x, motion, self._near).without(passing)
 
     def _impulses(
         self,

@@ -137,7 +137,7 @@ def test_what_is_led_back_keeps_momentum_and_what_holds_it() -> None:
     tangles = Tangles(e)
     tangled = tangles.everywhere(x)
     tangle, still = tangles.at(x, tangled), np.zeros_like(x)
-    pairs = LayerSeparation(e).expect(x, still).pairs
+    pairs = LayerSeparation(e).pairs(x, still, 0.01)
     rng = np.random.default_rng(0)
     mass, step = rng.uniform(0.5, 2.0, len(x)), 1e-3
     way = tangles.lead_back(tangle, x, still, 1.0 / mass, still, pairs, step)
