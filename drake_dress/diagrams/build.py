@@ -198,6 +198,7 @@ def station_parameters(scenario: schema.Scenario, mesh: GarmentMesh) -> StationP
         iterations=scenario.plant.iterations,
         tolerance=scenario.plant.tolerance,
         self_collision=scenario.plant.self_collision,
+        grasp_stiffness=scenario.plant.grasp_stiffness,
         effects=effects(scenario),
         measures=measures(person),
         posture=posture(person),

@@ -138,6 +138,7 @@ class StationParameters:
     implicitness: float = 1.0
     buckling_wavelength: float = 0.0
     self_collision: bool = False
+    grasp_stiffness: float = 3000.0
     effects: tuple[Effect, ...] = ()
     placement: ArmPlacement | None = None
     mode: str = "position_velocity"
@@ -220,6 +221,7 @@ def make_simulated_station(
             person.capsules,
             person.body_indices,
             Mounts(p.effects),
+            p.grasp_stiffness,
             p.beside,
         ),
     )

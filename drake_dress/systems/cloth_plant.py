@@ -13,6 +13,7 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.grasp import Pressing, press
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.contact.wrenches import body_wrenches
 from drake_dress.models.cloth.implicit import ClothState
@@ -55,6 +56,8 @@ class ClothPlant(LeafSystem):
     of the garment on the gripper, N. person_forces: list of ExternallyAppliedSpatialForce, one for
     each body that is touched. All outputs depend on discrete state only.
 
+    What a gripper holds gives way to a person who comes to where it is (`contact/grasp.py`).
+
     The garment is one step behind bodies and grippers: a step that begins at k·h, from what they do
     then, ends at (k + 1)·h, and may go on beside the rest of the diagram meanwhile.
 
@@ -67,6 +70,7 @@ class ClothPlant(LeafSystem):
         body_indices: body name to its index in the plant.
         mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
             limbs that do not know of it.
+        grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
         beside: whether steps are made in a process of their own, so that another core can do them.
     """
 
@@ -79,6 +83,7 @@ class ClothPlant(LeafSystem):
         capsules: Sequence[Capsule],
         body_indices: dict[str, BodyIndex],
         mounts: Mounts | None = None,
+        grasp_stiffness: float = 3000.0,
         beside: bool = False,
     ) -> None:
         super().__init__()
@@ -101,6 +106,7 @@ class ClothPlant(LeafSystem):
         self._begun: tuple[ClothState, FloatArray] | None = None
 
         self._mounts = mounts or Mounts([])
+        self._grasp_stiffness = grasp_stiffness
         self._moved_mass = self._mounts.moved_mass(cloth, self._side)
         limbs = [name for name in self._names if name.endswith("arm")]
         self._limb_of = np.array(
@@ -116,6 +122,8 @@ class ClothPlant(LeafSystem):
         self._tangled = self.DeclareDiscreteState(np.zeros(n))
         # Force and moment about the body's origin, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
+        # of the person on the held nodes, N
+        self._pressing = self.DeclareDiscreteState(np.zeros(3 * len(cloth.held)))
         self._mount = self.DeclareDiscreteState(MountState.at_rest(len(limbs)).flat())
         # what the step under way depends on beside the garment; not finite before the first one
         self._around = self.DeclareDiscreteState(np.full(self._surroundings.size, np.nan))
@@ -181,14 +189,14 @@ class ClothPlant(LeafSystem):
         h = self.cloth.time_step
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
         bodies = self.obstacles(context)
+        taken, pressing = self._taken(target, bodies)
         after = self._stepped(context)
         if not self._mounts.rigid:
             mount = self._mounted(context, after)
-            target += mount.held
             bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
+            taken, pressing = self._taken(target + mount.held, bodies)
             discrete.set_value(self._mount, mount.flat())
-        held = after.x[self.cloth.held]
-        velocity = (target[self._side] + self._offset - held) / h
+        velocity = (taken - after.x[self.cloth.held]) / h
         around = self._surroundings.flat(bodies, velocity)
         self._begin(after, around)
 
@@ -200,7 +208,20 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._reaction, after.reaction.ravel())
         discrete.set_value(self._solver, after.solver.ravel().astype(np.float64))
         discrete.set_value(self._tangled, after.tangled.astype(np.float64))
-        discrete.set_value(self._wrench, self._wrenches(context, after).ravel())
+        discrete.set_value(self._pressing, pressing.force.ravel())
+        discrete.set_value(self._wrench, self._wrenches(context, after, pressing).ravel())
+
+    def _taken(self, target: FloatArray, bodies: Obstacles) -> tuple[FloatArray, Pressing]:
+        """Returns where held nodes (k,3) are taken in a step, m, and how bodies press on them.
+
+        Args:
+            target: (2,3) of the grippers, m.
+            bodies: at the begin of the step.
+        """
+        taken = target[self._side] + self._offset
+        bodies = _after(bodies, self.cloth.time_step)
+        pressing = press(taken, self._side, bodies, self._grasp_stiffness)
+        return taken + pressing.displacement[self._side], pressing
 
     def _stepped(self, context: Context) -> ClothState:
         """Returns the garment after the step under way, if there is one."""
@@ -248,11 +269,15 @@ class ClothPlant(LeafSystem):
         h = self.cloth.time_step
         return self._mounts.step(mount, np.stack(pulled), force, h, self._moved_mass)
 
-    def _wrenches(self, context: Context, after: ClothState) -> FloatArray:
+    def _wrenches(self, context: Context, after: ClothState, pressing: Pressing) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
         poses = self._poses.Eval(context)
         origin = np.ascontiguousarray(frames(poses, self._index)[:, :, 3])
-        return body_wrenches(self._body_of, origin, after.x, after.owner, after.reaction)
+        owner, reaction = after.owner, after.reaction
+        if (pressing.owner >= 0).any():
+            owner, reaction = owner.copy(), reaction.copy()
+            owner[self.cloth.held], reaction[self.cloth.held] = pressing.owner, pressing.force
+        return body_wrenches(self._body_of, origin, after.x, owner, reaction)
 
     def _calc(self, index):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
@@ -266,7 +291,9 @@ class ClothPlant(LeafSystem):
 
     def _calc_contact_force(self, context: Context, output: BasicVector) -> None:
         reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3).copy()
-        reaction[self.cloth.held] = 0.0
+        reaction[self.cloth.held] = (
+            context.get_discrete_state(self._pressing).value().reshape(-1, 3)
+        )
         output.SetFromVector(reaction.ravel())
 
     def _calc_gripper_force(self, side: int):  # type: ignore[no-untyped-def]
@@ -274,7 +301,9 @@ class ClothPlant(LeafSystem):
 
         def calc(context: Context, output: BasicVector) -> None:
             reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3)
-            output.SetFromVector(-reaction[nodes].sum(axis=0))
+            pressing = context.get_discrete_state(self._pressing).value().reshape(-1, 3)
+            pulled = -reaction[nodes].sum(axis=0)
+            output.SetFromVector(pulled + pressing[self._side == side].sum(axis=0))
 
         return calc
 
@@ -290,3 +319,9 @@ class ClothPlant(LeafSystem):
             applied.F_Bq_W = SpatialForce(tau=wrench[k, :3], f=wrench[k, 3:])
             forces.append(applied)
         output.set_value(forces)
+
+
+def _after(bodies: Obstacles, h: float) -> Obstacles:
+    """Returns capsules where they will be `h` s later."""
+    end = bodies.velocity + np.cross(bodies.angular_velocity, bodies.b - bodies.a)
+    return Obstacles.resting(bodies.a + h * bodies.velocity, bodies.b + h * end, bodies.radius)

@@ -5,6 +5,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.station import Station
+from drake_dress.models.cloth.contact.detection import find_proximity
 from tests.systems.draped import H, draped_station
 
 
@@ -61,3 +62,31 @@ def test_garment_moves_the_arms(station: Station, request: pytest.FixtureRequest
     start = plant.GetPositions(here).copy()
     simulator.AdvanceTo(1.5)
     assert np.abs(plant.GetPositions(here) - start).max() > 0.005
+
+
+def test_an_arm_is_pushed_by_what_a_gripper_holds_and_not_passed_through() -> None:
+    station = draped_station(integrator="implicit")
+    simulator = Simulator(station.diagram)
+    context = simulator.get_mutable_context()
+    cloth = station.cloth
+    here = cloth.GetMyContextFromRoot(context)
+    left = cloth.cloth.held[: len(cloth.cloth.held) // 2]
+    limbs = cloth.obstacles(here)
+    middle = 0.5 * (limbs.a + limbs.b)
+    nearest = int(np.argmin(np.linalg.norm(middle - station.start_grippers[0], axis=1)))
+    goal = middle[nearest]
+    for side, where in (("left", goal), ("right", station.start_grippers[1])):
+        station.diagram.GetInputPort(f"{side}_gripper.position_command").FixValue(context, where)
+    pressed = 0.0
+    for k in range(1, 401):
+        simulator.AdvanceTo(k * H)
+        x = cloth.GetOutputPort("garment_position").Eval(here).reshape(-1, 3)
+        deepest = find_proximity(x[left], cloth.obstacles(here), 0.0).gap.min()
+        assert deepest > -3e-3
+        force = cloth.GetOutputPort("left_gripper_force").Eval(here)
+        pressed = max(pressed, float(np.linalg.norm(force)))
+        if pressed > 30.0:
+            break
+    away = station.start_grippers[0] - goal
+    # back along the way that it came
+    assert pressed > 30.0 and force @ away > 0.7 * pressed * np.linalg.norm(away)

@@ -108,6 +108,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "plant.body_time_step": (1e-4, 0.02),
     "plant.implicitness": (0.5, 1.0),
     "plant.buckling_wavelength": (0.0, 100.0),
+    # above, an arm that pushes is thrown back within a step
+    "plant.grasp_stiffness": (1.0, 1e4),
     "plant.iterations": (1, 1000),
     "plant.tolerance": (1e-10, 0.5),
     "shoulder_stiffness": (0.0, 1000.0),

@@ -223,6 +223,9 @@ class Plant:
     iterations: int = 40  # of the implicit integrator's linear solver, at most
     tolerance: float = 5e-2  # relative residual at which it stops
     self_collision: bool = True  # layers of the garment do not pass through each other
+    # of a gripper's arm and grasp where a person pushes against what it holds, N/m: an arm under
+    # impedance control, by the translational stiffness that libfranka's examples set
+    grasp_stiffness: float = 3000.0
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
