@@ -220,8 +220,8 @@ def make_simulated_station(
             grippers,
             person.capsules,
             person.body_indices,
-            Mounts(p.effects),
             p.grasp_stiffness,
+            Mounts(p.effects),
             p.beside,
         ),
     )

@@ -68,9 +68,9 @@ class ClothPlant(LeafSystem):
         start_grippers: (2,3) p_WG of left and right at time 0, m.
         capsules: of the person, fixed in their bodies.
         body_indices: body name to its index in the plant.
+        grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
         mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
             limbs that do not know of it.
-        grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
         beside: whether steps are made in a process of their own, so that another core can do them.
     """
 
@@ -82,8 +82,8 @@ class ClothPlant(LeafSystem):
         start_grippers: FloatArray,
         capsules: Sequence[Capsule],
         body_indices: dict[str, BodyIndex],
+        grasp_stiffness: float,
         mounts: Mounts | None = None,
-        grasp_stiffness: float = 3000.0,
         beside: bool = False,
     ) -> None:
         super().__init__()
@@ -189,9 +189,11 @@ class ClothPlant(LeafSystem):
         h = self.cloth.time_step
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
         bodies = self.obstacles(context)
-        taken, pressing = self._taken(target, bodies)
-        after = self._stepped(context)
-        if not self._mounts.rigid:
+        if self._mounts.rigid:
+            taken, pressing = self._taken(target, bodies)
+            after = self._stepped(context)
+        else:
+            after = self._stepped(context)
             mount = self._mounted(context, after)
             bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
             taken, pressing = self._taken(target + mount.held, bodies)
