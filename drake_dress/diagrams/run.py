@@ -83,26 +83,29 @@ def run_scenario(
 
     with claimed("--out", out):
         begin = clock.perf_counter()
-        with RunLogWriter(
-            out / RUN_FILES[0],
-            garment=p.garments.plant,
-            scenario_text=resolved_yaml(scenario),
-            version=__version__,
-            seed=scenario.seed,
-            radius=p.station.person.radius,
-            capsule_radius=[c.radius for c in p.station.person.capsules],
-            estimate_garment=p.garments.belief,
-            bases=arm_bases(p.station.robots),
-            estimated=isinstance(p.station, HardwareStation),
-            results=RUN_FILES[1:],
-        ) as writer:
+        with (
+            caught_interrupt() as interrupt,
+            RunLogWriter(
+                out / RUN_FILES[0],
+                garment=p.garments.plant,
+                scenario_text=resolved_yaml(scenario),
+                version=__version__,
+                seed=scenario.seed,
+                radius=p.station.person.radius,
+                capsule_radius=[c.radius for c in p.station.person.capsules],
+                estimate_garment=p.garments.belief,
+                bases=arm_bases(p.station.robots),
+                estimated=isinstance(p.station, HardwareStation),
+                results=RUN_FILES[1:],
+            ) as writer,
+        ):
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
             with left_out_of_garbage():
-                ending = _simulate(dressing, simulator, scenario.duration, realtime_rate)
+                ending = _simulate(dressing, simulator, scenario.duration, realtime_rate, interrupt)
             _note(dressing, simulator, ending, writer)
         wall_time = clock.perf_counter() - begin
-        return concluded(out, wall_time, report, ending.interrupt)
+        return concluded(out, wall_time, report, interrupt if ending.interrupted else None)
 
 
 def _parts(
@@ -178,20 +181,24 @@ class Ending:
     `behind` is real time, s, by which a run on hardware fell behind the rate that was asked for.
     """
 
-    interrupt: Interrupt | None = None
+    interrupted: bool = False
     fault: str | None = None
     behind: float = 0.0
 
 
 def _simulate(
-    dressing: Dressing, simulator: Simulator, duration: float, realtime_rate: float
+    dressing: Dressing,
+    simulator: Simulator,
+    duration: float,
+    realtime_rate: float,
+    interrupt: Interrupt,
 ) -> Ending:
     """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
     simulator.set_target_realtime_rate(realtime_rate)
     if isinstance(dressing.station, HardwareStation):
-        early = _made_ready(dressing, dressing.station)
-        if early is not None:
-            return Ending(early)
+        _make_ready(dressing, dressing.station, interrupt)
+        if interrupt.is_set():
+            return Ending(interrupted=True)
     simulator.Initialize()
     hardware = isinstance(dressing.station, HardwareStation)
     pace = SteadyPace(simulator) if hardware else None
@@ -201,18 +208,15 @@ def _simulate(
     console = Console(stderr=True)
     done_since, told = np.inf, 0.0
     fault: str | None = None
-    with (
-        caught_interrupt() as interrupt,
-        Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            console=console,
-            disable=not terminal,
-        ) as progress,
-    ):
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:5.1f} of {task.total:.0f} s simulated"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not terminal,
+    ) as progress:
         task = progress.add_task("dressing", total=duration)
         now = 0.0
         while now < duration and not interrupt.is_set() and fault is None:
@@ -234,18 +238,14 @@ def _simulate(
             done_since = min(done_since, now) if finished else np.inf
             if now - done_since >= _STAY:
                 break
-        ended = interrupt if interrupt.is_set() else None
-        return Ending(ended, fault, 0.0 if pace is None else pace.lost)
+        return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
 
 
-def _made_ready(dressing: Dressing, station: HardwareStation) -> Interrupt | None:
-    """Has controllers solve once and takes what comes meanwhile; returns a signal that came."""
-    with caught_interrupt() as interrupt:
-        print("rehearsing: each controller solves once", flush=True)
-        garment, joints = station.heard.garment, station.heard.person
-        dressing.rehearse(garment, joints, interrupt.is_set)
-        station.catch_up()
-        return interrupt if interrupt.is_set() else None
+def _make_ready(dressing: Dressing, station: HardwareStation, interrupt: Interrupt) -> None:
+    """Has controllers solve once, unless a signal comes, and takes what comes meanwhile."""
+    print("rehearsing: each controller solves once", flush=True)
+    dressing.rehearse(station.heard.garment, station.heard.person, interrupt.is_set)
+    station.catch_up()
 
 
 def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
