@@ -23,7 +23,7 @@ from drake_dress.file_output import (
 from drake_dress.interrupt import interrupt_of, signals_raised
 from drake_dress.libraries import check_libraries, import_problem
 from drake_dress.machine import worker_count
-from drake_dress.shipped import shipped_scenario
+from drake_dress.shipped import scenario_file, shipped_scenarios
 from drake_dress.streams import forgiving_streams, keep_standard_descriptors
 from drake_dress.yaml_text import plain_value
 
@@ -53,17 +53,23 @@ BENCHMARKS = {
 }
 
 _EXAMPLES = """examples:
-  drake-dress run scenarios/dummy_standing.yaml
-  drake-dress run scenarios/dummy_varied.yaml --seed 3 --out out/try
-  drake-dress run scenarios/dummy_standing.yaml --set plant.material.friction=0.5 --no-meshcat
+  drake-dress scenarios
+  drake-dress run dummy_standing
+  drake-dress run dummy_varied --seed 3 --out out/try
+  drake-dress run my_scenario.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress dataset measured --hide random --seed 1 --out out/lab
-  drake-dress explain out/lab/measured.h5 --scenario scenarios/measured.yaml
-  drake-dress sim-station scenarios/lab.yaml
-  drake-dress run scenarios/lab.yaml --set station.kind=hardware
+  drake-dress explain out/lab/measured.h5 --scenario measured
+  drake-dress sim-station lab
+  drake-dress run lab --set station.kind=hardware
   drake-dress replay out/dummy_standing-seed0/run.h5
   drake-dress bench cloth --only draping,growth --json cloth.json
 
 exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input"""
+
+
+_OF_SCENARIO = "a YAML file, or the name of a scenario that ships; see drake-dress scenarios"
+# What `add_subparsers` returns.
+_Verbs = argparse._SubParsersAction
 
 
 class _Parser(argparse.ArgumentParser):
@@ -129,8 +135,25 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"drake-dress {__version__}")
     verbs = parser.add_subparsers(title="commands", dest="verb", required=True, metavar="COMMAND")
 
+    _add_run(verbs)
+    _add_sim_station(verbs)
+    _add_calibrate(verbs)
+    _add_replay(verbs)
+    _add_explain(verbs)
+    _add_dataset(verbs)
+    shipped = verbs.add_parser(
+        "scenarios", help="list the scenarios that ship, which verbs take by name"
+    )
+    shipped.set_defaults(command=_scenarios)
+    verbs.add_parser(
+        "bench", help="measure speed, accuracy and success; see drake-dress bench --help"
+    )
+    return parser
+
+
+def _add_run(verbs: _Verbs) -> None:
     run = verbs.add_parser("run", help="simulate a scenario and write log, report and replay")
-    run.add_argument("scenario", metavar="SCENARIO.yaml")
+    run.add_argument("scenario", metavar="SCENARIO", help=_OF_SCENARIO)
     run.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>")
     run.add_argument(
         "--set",
@@ -162,10 +185,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_report(run)
     run.set_defaults(command=_run)
 
+
+def _add_sim_station(verbs: _Verbs) -> None:
     lab = verbs.add_parser(
         "sim-station", help="play the lab behind the messages of hardware, for a run to drive"
     )
-    lab.add_argument("scenario", metavar="SCENARIO.yaml")
+    lab.add_argument("scenario", metavar="SCENARIO", help=_OF_SCENARIO)
     lab.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>-lab")
     lab.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     lab.add_argument("--seed", type=_seed, metavar="N", help="in place of the scenario's seed")
@@ -179,6 +204,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_report(lab)
     lab.set_defaults(command=_sim_station)
 
+
+def _add_calibrate(verbs: _Verbs) -> None:
     calibrate = verbs.add_parser(
         "calibrate", help="find where a camera stands, by a ChArUco board in a gripper"
     )
@@ -186,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
         "directory", metavar="DIR", nargs="?", help="with poses.csv (image,q1,…,q7) and pictures"
     )
     calibrate.add_argument(
-        "--scenario", metavar="SCENARIO.yaml", help="default: lab.yaml of the program's own"
+        "--scenario", metavar="SCENARIO", help="default: lab.yaml of the program's own"
     )
     calibrate.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     calibrate.add_argument(
@@ -205,16 +232,20 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--print-board", metavar="FILE.png", help="write the board to print")
     calibrate.set_defaults(command=_calibrate)
 
+
+def _add_replay(verbs: _Verbs) -> None:
     replay = verbs.add_parser("replay", help="show a log in Meshcat, with a slider")
     replay.add_argument("log", metavar="run.h5")
     replay.add_argument("--port", type=_port, metavar="PORT", help="default: a free one")
     replay.set_defaults(command=_replay)
 
+
+def _add_explain(verbs: _Verbs) -> None:
     explain = verbs.add_parser(
         "explain", help="show what the simulation gets wrong about measured data, and why"
     )
     explain.add_argument("measured", metavar="MEASURED", nargs="+", help=".h5, .npz or .csv")
-    explain.add_argument("--scenario", metavar="SCENARIO.yaml", required=True)
+    explain.add_argument("--scenario", metavar="SCENARIO", required=True)
     explain.add_argument("--out", metavar="DIR", help="default: out/explain-<first file>")
     explain.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     explain.add_argument(
@@ -222,6 +253,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     explain.set_defaults(command=_explain)
 
+
+def _add_dataset(verbs: _Verbs) -> None:
     dataset = verbs.add_parser("dataset", help="make data")
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
     hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
@@ -234,7 +267,7 @@ def _parser() -> argparse.ArgumentParser:
     hidden.add_argument("--seed", type=_whole, default=0, metavar="N")
     hidden.add_argument("--out", metavar="DIR", required=True)
     hidden.add_argument(
-        "--scenario", metavar="SCENARIO.yaml", help="default: measured.yaml of the program's own"
+        "--scenario", metavar="SCENARIO", help="default: measured.yaml of the program's own"
     )
     hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     hidden.add_argument(
@@ -255,11 +288,6 @@ def _parser() -> argparse.ArgumentParser:
         help="default 0.05",
     )
     hidden.set_defaults(command=_dataset_measured)
-
-    verbs.add_parser(
-        "bench", help="measure speed, accuracy and success; see drake-dress bench --help"
-    )
-    return parser
 
 
 def _add_report(verb: argparse.ArgumentParser) -> None:
@@ -282,7 +310,7 @@ def _calibrate(options: argparse.Namespace) -> int:
     if options.directory is None:
         raise UserError("calibrate", "", "expected DIR, or --print-board FILE.png")
     directory = Path(options.directory)
-    source = shipped_scenario("lab") if options.scenario is None else Path(options.scenario)
+    source = scenario_file("lab" if options.scenario is None else options.scenario)
     if not os.path.isdir(directory):
         raise UserError(str(directory), "", "no such directory, expected one with poses.csv")
     scenario = load_scenario(source, options.set)
@@ -296,8 +324,8 @@ def _sim_station(options: argparse.Namespace) -> int:
     from drake_dress.diagrams.lab import run_lab
     from drake_dress.diagrams.scenario import load_scenario
 
-    scenario = load_scenario(options.scenario, options.set, options.seed)
-    source = Path(options.scenario)
+    source = scenario_file(options.scenario)
+    scenario = load_scenario(source, options.set, options.seed)
     default = Path("out") / f"{source.stem}-seed{scenario.seed}-lab"
     out = _directory(options.out, default, RUN_FILES, [source])
     return run_lab(scenario, source, out, options.realtime_rate, options.report)
@@ -307,14 +335,22 @@ def _run(options: argparse.Namespace) -> int:
     from drake_dress.diagrams.run import run_scenario
     from drake_dress.diagrams.scenario import load_scenario
 
-    scenario = load_scenario(options.scenario, options.set, options.seed)
-    source = Path(options.scenario)
+    source = scenario_file(options.scenario)
+    scenario = load_scenario(source, options.set, options.seed)
     default = Path("out") / f"{source.stem}-seed{scenario.seed}"
     out = _directory(options.out, default, RUN_FILES, [source])
     beside = not options.one_process and worker_count() > 1
     return run_scenario(
         scenario, source, out, options.meshcat, options.realtime_rate, beside, options.report
     )
+
+
+def _scenarios(_: argparse.Namespace) -> int:
+    told = shipped_scenarios()
+    width = max(map(len, told), default=0) + 2
+    for name, summary in told.items():
+        print(f"{name:<{width}}{summary}")
+    return 0
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -327,9 +363,9 @@ def _explain(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.commands import explain_files
 
     default = Path("out") / f"explain-{Path(options.measured[0]).stem}"
-    inputs = [*options.measured, options.scenario]
-    out = _directory(options.out, default, EXPLAIN_FILES, inputs)
-    explain_files(options.measured, options.scenario, options.set, out, options.workers)
+    scenario = scenario_file(options.scenario)
+    out = _directory(options.out, default, EXPLAIN_FILES, [*options.measured, scenario])
+    explain_files(options.measured, str(scenario), options.set, out, options.workers)
     return 0
 
 
@@ -338,7 +374,7 @@ def _dataset_measured(options: argparse.Namespace) -> int:
     from drake_dress.discrepancy.generate import Sensors
     from drake_dress.discrepancy.motions import USUAL
 
-    scenario = options.scenario or shipped_scenario("measured")
+    scenario = scenario_file(options.scenario or "measured")
     out = _directory(options.out, Path(), DATASET_FILES, [scenario])
     sensors = Sensors(marker_noise=options.marker_noise, force_noise=options.force_noise)
     write_dataset(

@@ -2,13 +2,53 @@
 
 from __future__ import annotations
 
+import difflib
+import os
+import re
 from pathlib import Path
+
+from drake_dress.errors import UserError
+
+_PACKAGE = Path(__file__).parent
+# In a checkout, the folder in the package is a link, which not every system keeps.
+_FOLDERS = (_PACKAGE / "scenarios", _PACKAGE.parent / "scenarios")
 
 
 def shipped_scenario(name: str) -> Path:
     """Returns the file of a scenario, such as "lab"."""
-    package = Path(__file__).parent
-    # In a checkout, the folder in the package is a link, which not every system keeps.
-    folders = (package / "scenarios", package.parent / "scenarios")
-    files = [folder / f"{name}.yaml" for folder in folders]
+    files = [folder / f"{name}.yaml" for folder in _FOLDERS]
     return next((file for file in files if file.is_file()), files[0])
+
+
+def shipped_scenarios() -> dict[str, str]:
+    """Returns the names of all scenarios, each with the first sentence of its comment."""
+    folder = next((f for f in _FOLDERS if f.is_dir()), _FOLDERS[0])
+    return {file.stem: _summary(file) for file in sorted(folder.glob("*.yaml"))}
+
+
+def scenario_file(given: str) -> Path:
+    """Returns the file that the user means: a path, or the name of a scenario that ships.
+
+    A file of that name in the working directory goes before a scenario that ships.
+
+    Raises:
+        UserError: it is neither.
+    """
+    path = Path(given)
+    if os.path.exists(path) or path.suffix or path.name != given:
+        return path
+    names = list(shipped_scenarios())
+    if given in names:
+        return shipped_scenario(given)
+    near = difflib.get_close_matches(given, names, n=1)
+    expected = f"did you mean {near[0]}?" if near else f"expected a file or {', '.join(names)}"
+    raise UserError(given, "", f"no file and no scenario that ships, {expected}")
+
+
+def _summary(file: Path) -> str:
+    comment = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            break
+        comment.append(line.lstrip("# "))
+    return re.split(r"(?<=[.:]) ", " ".join(comment) + " ")[0].rstrip(" .:") + "."

@@ -221,7 +221,7 @@ def test_bad_scenario(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["run"], ["SCENARIO.yaml"]),
+        (["run"], ["SCENARIO"]),
         (["dance"], ["dance"]),
         ([], ["COMMAND"]),
         (["run", "no/such.yaml"], ["no/such.yaml", "no such file"]),
@@ -278,6 +278,7 @@ def test_what_is_no_regular_file_is_told_at_once(
     for path in (str(pipe), "/dev/zero", "/dev/null"):
         assert "no regular file" in refused(capsys, ["run", path])
     assert "cannot be read" in refused(capsys, ["run", str(tmp_path / ("a" * 300))])
+    assert "no scenario that ships" in refused(capsys, ["run", "a" * 300])
 
 
 def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:

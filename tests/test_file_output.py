@@ -77,7 +77,7 @@ def test_an_unusable_file_is_told_with_its_option(file: str, place: Path) -> Non
     assert tree(place) == before
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     names=st.lists(st.text("abc.", min_size=1, max_size=5), min_size=1, max_size=4),
     there=st.integers(0, 4),

@@ -45,7 +45,7 @@ def test_a_file_is_whole_until_a_byte_is_missing(
         assert state_of(path) is Hdf5State.TRUNCATED
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_wherever_a_file_is_cut_it_is_never_sound(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory

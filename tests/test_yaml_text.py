@@ -130,7 +130,7 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(VALUES)
 def test_what_is_written_is_read_back(value: Any) -> None:
     assert read_yaml("a.yaml", write_yaml({"a": value})) == {"a": value}
@@ -140,7 +140,7 @@ def test_what_is_written_is_read_back(value: Any) -> None:
 WORDS = st.text("0123456789+-._:eExob", min_size=1, max_size=8).filter(lambda w: w[0] not in "-:")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(WORDS)
 @example(".0_")
 @example("1__0.")

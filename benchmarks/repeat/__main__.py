@@ -3,8 +3,10 @@
     drake-dress bench repeat --set duration=12
 
 Alone and beside processes that keep every core busy, in one process and in several. Every dataset
-is compared with the first run's bit for bit, but for measured solve times. The exit status is 0 if
-all are the same, 1 if some differ.
+is compared with the first run's bit for bit, but for measured solve times. With `--against RUN.h5`
+they are compared with a log of another version, of the same scenario, instead: a change of
+structure leaves all numbers as they were. The exit status is 0 if all are the same, 1 if some
+differ.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from benchmarks.scenario_run import run_scenario
 from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.report.log import RunLog
 
 _NAME = "repeat"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -56,7 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.into is not None:
         around(options.into, _NAME)
     scenario = Path(options.scenario)
-    logs: list[Path] = []
+    reference = options.against
+    if reference is not None:
+        with RunLog.open(reference):
+            pass
     rows: list[list[str | int]] = []
     with caught_interrupt() as stop:
         for number, case in enumerate(CASES):
@@ -69,13 +75,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return stop.status
             if problem:
                 raise UserError("bench", _NAME, f"{case.name}: {problem}")
-            logs.append(out / "run.h5")
-            with h5py.File(logs[0]) as first, h5py.File(logs[-1]) as this:
+            log = out / "run.h5"
+            reference = reference or log
+            with h5py.File(reference) as first, h5py.File(log) as this:
                 count, different = numbers_that_differ(first, this)
                 samples = len(this["time"])
             rows.append([case.name, samples, count, len(different), ", ".join(different) or "–"])
             print(f"{case.name}: {count} datasets, {len(different)} differ", flush=True)
-    header = ["run", "samples", "datasets", "differ from the first run's", "which"]
+    of = "the first run's" if options.against is None else f"those of {options.against.name}"
+    header = ["run", "samples", "datasets", f"differ from {of}", "which"]
     shown = Table(f"{scenario.stem}, again", header, rows).text()
     print(f"\n{shown}")
     if options.into is not None:
@@ -109,6 +117,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
     parser.add_argument("--seed", type=seed_number, help="the scenario's own by default")
     parser.add_argument("--out", type=output_folder, default=Path("out/repeat"))
+    parser.add_argument(
+        "--against",
+        type=Path,
+        metavar="RUN.h5",
+        help="another version's log, compared with instead",
+    )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     add_into_option(parser, _NAME)
     return parser

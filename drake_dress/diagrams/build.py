@@ -16,6 +16,7 @@ from drake_dress.diagrams.dressing import LocalSetup, Rates
 from drake_dress.diagrams.hardware_station import Beliefs, HardwareParameters, Links
 from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
 from drake_dress.diagrams.scenario import schema
+from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.diagrams.station import (
     Sight,
     SimulatedStation,
@@ -27,14 +28,11 @@ from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
-from drake_dress.models.control.global_mpc import Weights
 from drake_dress.models.control.local_control import LocalController, constrained_ddp
 from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.models.control.task_parameters import TaskParameters
-from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, unique_edges
@@ -48,13 +46,11 @@ from drake_dress.models.human.body import (
     shoulder_height,
     shoulder_joint,
 )
-from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.prediction import (
     ConstantVelocityPredictor,
     MotionPredictor,
     StillPredictor,
 )
-from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
@@ -266,11 +262,12 @@ def controller_policy(
         max_speed=g.max_speed,
         plans=c.method != "local",
         budget=solve_budget(scenario),
-        weights=Weights(**vars(g.weights)),
-        tasks=TaskParameters(
+        weights=model_of(g.weights),
+        tasks=model_of(
+            c.tasks,
             progress_rate=g.progress_step / g.time_step,
             approach_distance=g.approach_distance,
-            stages=StageParameters(waiting_progress=g.waiting_progress),
+            stages=model_of(c.stages, waiting_progress=g.waiting_progress),
         ),
     )
     return DressingPolicy(mesh, material(c.material), shape, parameters)
@@ -318,12 +315,12 @@ def behaviour(scenario: schema.Scenario) -> Behaviour:
     return Behaviour(
         kind=kinds.get(b.kind, "dummy"),
         active=ActiveParameters(
-            following=FollowingParameters(**vars(b.following)),
+            following=model_of(b.following),
             max_hand_speed=b.max_hand_speed,
             max_joint_speed=b.max_joint_speed,
         ),
         motions=tuple(motion(m) for m in b.motions),
-        tremor=TremorParameters(**vars(b.tremor)) if b.tremor is not None else None,
+        tremor=model_of(b.tremor) if b.tremor is not None else None,
         seed=scenario.seed,
     )
 
@@ -405,7 +402,8 @@ def material(values: schema.Material) -> Material:
 
 def measures(person: schema.Person) -> BodyMeasures:
     """Returns the body's sizes."""
-    return BodyMeasures(**vars(person.measures))
+    body: BodyMeasures = model_of(person.measures)
+    return body
 
 
 def posture(person: schema.Person) -> Posture:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram
 from pydrake.systems.primitives import Multiplexer
 
-from drake_dress.diagrams.hardware_station import HardwareStation
+from drake_dress.diagrams.arms import ArmSetup
 from drake_dress.diagrams.station import Station
+from drake_dress.diagrams.wiring import Wiring
 from drake_dress.models.control.local_control import LocalController, LocalState
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
@@ -29,17 +30,19 @@ from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.safety_governor import SafetyGovernor
 
+_MOTION = ("position", "velocity")
+
 
 @dataclass(frozen=True)
 class Rates:
     """Periods and delays of the controllers, and of the plant, s."""
 
-    global_period: float = 0.5
-    global_delay: float = 0.2
-    command_period: float = 0.01
-    log_period: float = 1.0 / 30.0
-    arm_period: float = 0.005
-    plant_period: float = 0.004
+    global_period: float
+    global_delay: float
+    command_period: float
+    log_period: float
+    arm_period: float
+    plant_period: float
     arm_offset: float = 0.0005
 
 
@@ -144,145 +147,175 @@ def make_dressing(
         local: the local controller between plan and governor; the plan is followed when None.
         beside: whether controllers solve beside the rest, the global one in a process of its own.
     """
-    builder = DiagramBuilder()
-    lab = builder.AddNamedSystem("station", station.diagram)
+    w = Wiring(station)
     believed = predictor or StillPredictor()
     p = policy.parameters
-    predicted = builder.AddNamedSystem(
-        "human_predictor", HumanPredictor(believed, p.time_step, p.horizon)
-    )
-    mpc = builder.AddNamedSystem(
+    predicted = w.add("human_predictor", HumanPredictor(believed, p.time_step, p.horizon))
+    mpc = w.add(
         "global_mpc",
         GlobalMpc(
             policy,
             rates.global_period,
             rates.global_delay,
-            waits=not isinstance(station, HardwareStation),
+            waits=not station.in_real_time,
             beside=beside,
         ),
     )
-    if local is None:
-        asking = builder.AddNamedSystem("plan_follower", PlanFollower())
-    else:
-        asking = builder.AddNamedSystem("local_controller", local.system(beside))
-    governor = builder.AddNamedSystem(
+    asking = w.add(*_plan_to_request(local, beside))
+    governor = w.add(
         "safety_governor",
         SafetyGovernor(
             station.start_grippers, rates.command_period, limits, policy.person, policy.held_offsets
         ),
     )
-
-    def connect(source, output: str, target, port: str) -> None:  # type: ignore[no-untyped-def]
-        builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
-
-    connect(lab, "estimate.joint_position", predicted, "joint_position")
-    for quantity in ("position", "velocity"):
-        connect(lab, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
-    connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
+    w.connect(w.station, "estimate.joint_position", predicted, "joint_position")
+    for quantity in _MOTION:
+        w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
+    w.connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
     if local is not None:
-        soon = builder.AddNamedSystem(
-            "near_human_predictor", HumanPredictor(believed, local.joints_step, local.joints_count)
-        )
-        connect(lab, "estimate.joint_position", soon, "joint_position")
-        connect(lab, "estimate.garment_position", asking, "garment_position")
-        connect(soon, "predicted_joint_position", asking, "predicted_joint_position")
-        for side in SIDES:
-            connect(lab, f"{side}_gripper.position_measured", asking, f"{side}_gripper_position")
-    connect(mpc, "plan", asking, "plan")
-    connect(asking, "request_time", governor, "request_time")
-    connect(lab, "permission", governor, "permission")
-    connect(lab, "estimate.joint_position", governor, "joint_position")
-    for side in SIDES:
-        for quantity in ("position", "force"):
-            connect(
-                lab, f"{side}_gripper.{quantity}_measured", governor, f"{side}_gripper_{quantity}"
-            )
-        connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
-        if station.robots is None:
-            connect(governor, f"{side}_position_command", lab, f"{side}_gripper.position_command")
+        _add_local_inputs(w, local, believed, asking)
+    w.connect(mpc, "plan", asking, "plan")
+    _wire_governor(w, asking, governor)
     arms = None
-    if station.robots is not None:
-        arms = builder.AddNamedSystem(
-            "arm_controller",
-            ArmController(
-                station.robots.pair,
-                station.robots.start,
-                rates.arm_period,
-                policy.person,
-                rates.arm_offset,
-            ),
-        )
-        connect(lab, "estimate.joint_position", arms, "joint_position")
+    if station.robots is None:
         for side in SIDES:
-            connect(lab, f"{side}_arm.position_measured", arms, f"{side}_arm_position")
-            connect(lab, f"{side}_arm.stopped", arms, f"{side}_arm_stopped")
-            for quantity in ("position", "velocity"):
-                connect(governor, f"{side}_{quantity}_command", arms, f"{side}_{quantity}_command")
-                if lab.HasInputPort(f"{side}_arm.{quantity}"):
-                    connect(arms, f"{side}_arm_{quantity}_command", lab, f"{side}_arm.{quantity}")
-
-    true = lab.HasOutputPort("cheat_garment_position")
+            command = f"{side}_gripper.position_command"
+            w.connect(governor, f"{side}_position_command", w.station, command)
+    else:
+        arms = _add_arms(w, station.robots, policy, rates, governor)
     if writer is not None:
-        capsules = [(int(station.person.body_indices[c.body]), c) for c in station.person.capsules]
-        recorder = builder.AddNamedSystem(
-            "run_recorder",
-            RunRecorder(
-                writer,
-                mesh,
-                len(policy.mesh.rest_position),
-                capsules if true else policy.person,
-                rates.log_period,
-                rates.command_period,
-                local is not None,
-                None if arms is None else rates.plant_period,
-            ),
-        )
-        if arms is not None:
-            connect(arms, "clearance", recorder, "clearance")
-            for side in SIDES:
-                connect(arms, f"{side}_arm_position_command", recorder, f"{side}_arm_command")
-                for quantity in ("position", "velocity", "torque"):
-                    connect(
-                        lab, f"{side}_arm.{quantity}_measured", recorder, f"{side}_arm_{quantity}"
-                    )
-        if local is not None:
-            connect(asking, "solve_time", recorder, "local_solve_time")
-        if true:
-            for name in ("contact", "contact_force", "body_poses"):
-                connect(lab, f"cheat_{name}", recorder, name)
-        for name in ("garment_position", "joint_position"):
-            connect(lab, f"cheat_{name}" if true else f"estimate.{name}", recorder, name)
-        connect(lab, "estimate.joint_position", recorder, "estimated_joint_position")
-        connect(lab, "estimate.garment_position", recorder, "estimated_position")
-        connect(mpc, "stage", recorder, "stage")
-        connect(mpc, "solve_time", recorder, "solve_time")
-        connect(governor, "verdict", recorder, "verdict")
-        for side in SIDES:
-            for quantity in ("position", "force"):
-                connect(
-                    lab,
-                    f"{side}_gripper.{quantity}_measured",
-                    recorder,
-                    f"{side}_gripper_{quantity}",
-                )
+        solves = None if local is None else asking
+        _add_recorder(w, writer, mesh, policy, rates, mpc, governor, arms, solves)
     if meshcat is not None:
-        shown = builder.AddNamedSystem(
-            "garment_visualizer", GarmentVisualizer(meshcat, mesh.faces, len(mesh.rest_position))
-        )
-        grippers = builder.AddSystem(Multiplexer([3, 3]))
-        for i, side in enumerate(SIDES):
-            builder.Connect(
-                lab.GetOutputPort(f"{side}_gripper.position_measured"), grippers.get_input_port(i)
-            )
-        builder.Connect(grippers.get_output_port(), shown.GetInputPort("gripper_position"))
-        connect(
-            lab,
-            "cheat_garment_position" if true else "estimate.garment_position",
-            shown,
-            "garment_position",
-        )
-        connect(mpc, "target", shown, "targets")
-        connect(mpc, "stage", shown, "stage")
-    diagram = builder.Build()
+        _add_visualizer(w, meshcat, mesh, mpc)
+    diagram = w.builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, mpc, local)
+
+
+def _plan_to_request(
+    local: LocalSetup | None, beside: bool
+) -> tuple[str, PlanFollower | LocalCompensation]:
+    """Returns name and system of what turns plans into requested velocities."""
+    if local is None:
+        return "plan_follower", PlanFollower()
+    return "local_controller", local.system(beside)
+
+
+def _add_local_inputs(
+    w: Wiring, local: LocalSetup, believed: MotionPredictor, controller: LocalCompensation
+) -> None:
+    """Gives the local controller what it sees, and a prediction at steps of its own."""
+    soon = w.add(
+        "near_human_predictor", HumanPredictor(believed, local.joints_step, local.joints_count)
+    )
+    w.connect(w.station, "estimate.joint_position", soon, "joint_position")
+    w.connect(w.station, "estimate.garment_position", controller, "garment_position")
+    w.connect(soon, "predicted_joint_position", controller, "predicted_joint_position")
+    for side in SIDES:
+        measured = f"{side}_gripper.position_measured"
+        w.connect(w.station, measured, controller, f"{side}_gripper_position")
+
+
+def _wire_governor(
+    w: Wiring, asking: PlanFollower | LocalCompensation, governor: SafetyGovernor
+) -> None:
+    w.connect(asking, "request_time", governor, "request_time")
+    w.connect(w.station, "permission", governor, "permission")
+    w.connect(w.station, "estimate.joint_position", governor, "joint_position")
+    for side in SIDES:
+        for quantity in ("position", "force"):
+            measured = f"{side}_gripper.{quantity}_measured"
+            w.connect(w.station, measured, governor, f"{side}_gripper_{quantity}")
+        w.connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
+
+
+def _add_arms(
+    w: Wiring,
+    robots: ArmSetup,
+    policy: DressingPolicy,
+    rates: Rates,
+    governor: SafetyGovernor,
+) -> ArmController:
+    """Adds what moves both arms' joints so that grippers go where the governor commands."""
+    arms = w.add(
+        "arm_controller",
+        ArmController(robots.pair, robots.start, rates.arm_period, policy.person, rates.arm_offset),
+    )
+    w.connect(w.station, "estimate.joint_position", arms, "joint_position")
+    for side in SIDES:
+        w.connect(w.station, f"{side}_arm.position_measured", arms, f"{side}_arm_position")
+        w.connect(w.station, f"{side}_arm.stopped", arms, f"{side}_arm_stopped")
+        for quantity in _MOTION:
+            w.connect(governor, f"{side}_{quantity}_command", arms, f"{side}_{quantity}_command")
+            command = f"{side}_arm.{quantity}"
+            if w.station.HasInputPort(command):
+                w.connect(arms, f"{side}_arm_{quantity}_command", w.station, command)
+    return arms
+
+
+def _add_recorder(
+    w: Wiring,
+    writer: RunLogWriter,
+    mesh: GarmentMesh,
+    policy: DressingPolicy,
+    rates: Rates,
+    mpc: GlobalMpc,
+    governor: SafetyGovernor,
+    arms: ArmController | None,
+    local: LocalCompensation | None,
+) -> None:
+    """Adds what writes the log: the truth where it is known, else what is believed."""
+    person = w.of.person
+    capsules = [(int(person.body_indices[c.body]), c) for c in person.capsules]
+    recorder = w.add(
+        "run_recorder",
+        RunRecorder(
+            writer,
+            mesh,
+            len(policy.mesh.rest_position),
+            capsules if w.sees_truth else policy.person,
+            rates.log_period,
+            rates.command_period,
+            local is not None,
+            None if arms is None else rates.plant_period,
+        ),
+    )
+    if arms is not None:
+        w.connect(arms, "clearance", recorder, "clearance")
+        for side in SIDES:
+            w.connect(arms, f"{side}_arm_position_command", recorder, f"{side}_arm_command")
+            for quantity in ("position", "velocity", "torque"):
+                measured = f"{side}_arm.{quantity}_measured"
+                w.connect(w.station, measured, recorder, f"{side}_arm_{quantity}")
+    if local is not None:
+        w.connect(local, "solve_time", recorder, "local_solve_time")
+    if w.sees_truth:
+        for name in ("contact", "contact_force", "body_poses"):
+            w.connect(w.station, f"cheat_{name}", recorder, name)
+    for name in ("garment_position", "joint_position"):
+        w.connect(w.station, w.true(name), recorder, name)
+    w.connect(w.station, "estimate.joint_position", recorder, "estimated_joint_position")
+    w.connect(w.station, "estimate.garment_position", recorder, "estimated_position")
+    w.connect(mpc, "stage", recorder, "stage")
+    w.connect(mpc, "solve_time", recorder, "solve_time")
+    w.connect(governor, "verdict", recorder, "verdict")
+    for side in SIDES:
+        for quantity in ("position", "force"):
+            measured = f"{side}_gripper.{quantity}_measured"
+            w.connect(w.station, measured, recorder, f"{side}_gripper_{quantity}")
+
+
+def _add_visualizer(w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, mpc: GlobalMpc) -> None:
+    """Adds what shows garment, grippers and targets live."""
+    shown = w.add(
+        "garment_visualizer", GarmentVisualizer(meshcat, mesh.faces, len(mesh.rest_position))
+    )
+    grippers = w.builder.AddSystem(Multiplexer([3, 3]))
+    for i, side in enumerate(SIDES):
+        measured = w.station.GetOutputPort(f"{side}_gripper.position_measured")
+        w.builder.Connect(measured, grippers.get_input_port(i))
+    w.builder.Connect(grippers.get_output_port(), shown.GetInputPort("gripper_position"))
+    w.connect(w.station, w.true("garment_position"), shown, "garment_position")
+    w.connect(mpc, "target", shown, "targets")
+    w.connect(mpc, "stage", shown, "stage")

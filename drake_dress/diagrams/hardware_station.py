@@ -12,9 +12,10 @@
 
 from __future__ import annotations
 
+import json
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -22,7 +23,7 @@ import numpy as np
 from drake import lcmt_image_array, lcmt_panda_command, lcmt_panda_status, lcmt_point_cloud
 from pydrake.lcm import DrakeLcm
 from pydrake.manipulation import PandaCommandSender, PandaControlMode, PandaStatusReceiver
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.lcm import LcmInterfaceSystem, LcmPublisherSystem, LcmSubscriberSystem
 from pydrake.systems.sensors import LcmImageArrayToImages
 
@@ -37,8 +38,9 @@ from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
 from drake_dress.models.supervision.supervision import Patience, words
 from drake_dress.models.supervision.watch import WatchSettings
+from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_measurement import ArmMeasurement
-from drake_dress.systems.command_meter import CommandMeter
+from drake_dress.systems.command_meter import CommandMeter, process_age
 from drake_dress.systems.estimate_checks import GarmentCheck, PersonCheck
 from drake_dress.systems.lcm_inbox import (
     Check,
@@ -73,13 +75,13 @@ class Links:
         command_period: s. command_offset: of the first command, s.
     """
 
-    lcm_url: str = "udpm://239.255.76.67:7667?ttl=0"
-    status: str = "PANDA_STATUS"
-    command: str = "PANDA_COMMAND"
-    garment: str = "GARMENT_ESTIMATE"
-    person: str = "PERSON_ESTIMATE"
-    camera: str = "CAMERA"
-    command_period: float = 0.005
+    lcm_url: str
+    status: str
+    command: str
+    garment: str
+    person: str
+    camera: str
+    command_period: float
     command_offset: float = 0.001
 
     def of_arm(self, kind: str, side: str) -> str:
@@ -125,14 +127,14 @@ class HardwareParameters:
     node_count: int
     arms: tuple[SerialArm, SerialArm]
     beliefs: Beliefs
-    cameras: tuple[str, ...] = ()
-    stale_status: float = 0.05
-    stale_estimate: float = 0.2
-    stale_camera: float = 0.5
-    patience: Patience = field(default_factory=Patience)
-    wait: float = 10.0
-    start_distance: float = 0.02
-    start_angle: float = 0.1
+    cameras: tuple[str, ...]
+    stale_status: float
+    stale_estimate: float
+    stale_camera: float
+    patience: Patience
+    wait: float
+    start_distance: float
+    start_angle: float
     wall: bool = True
 
 
@@ -172,6 +174,33 @@ class HardwareStation(Station):
     meter: CommandMeter
     lcm: DrakeLcm
     heard: Heard
+
+    @property
+    def in_real_time(self) -> bool:
+        """Whether the world goes on while a controller solves."""
+        return True
+
+    def make_ready(self, rehearse: Callable[[FloatArray, FloatArray], None]) -> None:
+        """Has controllers solve once for what was heard first, and takes what comes meanwhile."""
+        print("rehearsing: each controller solves once", flush=True)
+        rehearse(self.heard.garment, self.heard.person)
+        self.catch_up()
+
+    def fault(self, root: Context) -> str | None:
+        """Returns what has been wrong for longer than patience lasts."""
+        return self.watch.conclusion(self.watch.GetMyContextFromRoot(root))
+
+    def note(self, root: Context, writer: RunLogWriter) -> None:
+        """Writes what was wrong with the sources, and when commands were sent."""
+        context = self.watch.GetMyContextFromRoot(root)
+        events = self.watch.events(context)
+        writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
+        writer.note("dropped_messages", json.dumps(self.watch.dropped(context)))
+        if self.meter.first is not None:
+            times, ages = self.meter.commands
+            writer.series("/station/command_time", times, "s")
+            writer.series("/station/status_age", ages, "s")
+            writer.note("start_up", process_age(self.meter.first))
 
     def catch_up(self) -> None:
         """Takes what has come while the diagram was made, so that a run begins with the newest."""

@@ -76,10 +76,10 @@ class JointParameters:
             angles in rising order.
     """
 
-    shoulder_stiffness: float = 2.0
-    shoulder_damping: float = 1.0
-    elbow_stiffness: float = 1.5
-    elbow_damping: float = 0.4
+    shoulder_stiffness: float = 6.0
+    shoulder_damping: float = 3.0
+    elbow_stiffness: float = 3.6
+    elbow_damping: float = 1.2
     abduction_limits: Limits = (-0.6, 2.6)
     extension_limits: Limits = (-2.6, 1.2)
     rotation_limits: Limits = (-1.2, 1.2)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,6 @@ from drake_dress.diagrams.arms import ArmReachError, arm_bases
 from drake_dress.diagrams.assemble import Garments, Parts, garments, hardware_parts, parts, wired
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.hardware_station import (
-    HardwareStation,
     NoBusError,
     NotAtStartError,
     StationSilentError,
@@ -38,7 +37,6 @@ from drake_dress.report.measures import Measures, measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import summarize, write_summary
 from drake_dress.report.web_page import open_page
-from drake_dress.systems.command_meter import process_age
 
 DONE, NOT_DRESSED = 0, 1
 # Simulated time between looks at the stages, s, and for which both sleeves must stay done.
@@ -78,7 +76,7 @@ def run_scenario(
     meshes, limits = garments(scenario, source)
     page = _open_meshcat() if meshcat else None
     p = _parts(scenario, source, meshes, limits, page, beside)
-    if isinstance(p.station, HardwareStation):
+    if p.station.in_real_time:
         realtime_rate = realtime_rate or 1.0
 
     with claimed("--out", out):
@@ -95,7 +93,7 @@ def run_scenario(
                 capsule_radius=[c.radius for c in p.station.person.capsules],
                 estimate_garment=p.garments.belief,
                 bases=arm_bases(p.station.robots),
-                estimated=isinstance(p.station, HardwareStation),
+                estimated=p.station.in_real_time,
                 results=RUN_FILES[1:],
             ) as writer,
         ):
@@ -103,7 +101,11 @@ def run_scenario(
             simulator = Simulator(dressing.diagram)
             with left_out_of_garbage():
                 ending = _simulate(dressing, simulator, scenario.duration, realtime_rate, interrupt)
-            _note(dressing, simulator, ending, writer)
+            p.station.note(simulator.get_context(), writer)
+            if p.station.in_real_time:
+                writer.note("behind", ending.behind)
+            if ending.fault is not None:
+                writer.note("ended_by", ending.fault)
         wall_time = clock.perf_counter() - begin
         return concluded(out, wall_time, report, interrupt if ending.interrupted else None)
 
@@ -144,25 +146,6 @@ def _parts(
         raise UserError(str(source), hardware, str(error)) from error
 
 
-def _note(dressing: Dressing, simulator: Simulator, ending: Ending, writer: RunLogWriter) -> None:
-    """Writes to the log what was wrong with hardware, and why the run ended if for that."""
-    if isinstance(dressing.station, HardwareStation):
-        watch = dressing.station.watch
-        watch_context = watch.GetMyContextFromRoot(simulator.get_context())
-        events = watch.events(watch_context)
-        writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
-        writer.note("dropped_messages", json.dumps(watch.dropped(watch_context)))
-        meter = dressing.station.meter
-        if meter.first is not None:
-            times, ages = meter.commands
-            writer.series("/station/command_time", times, "s")
-            writer.series("/station/status_age", ages, "s")
-            writer.note("start_up", process_age(meter.first))
-        writer.note("behind", ending.behind)
-    if ending.fault is not None:
-        writer.note("ended_by", ending.fault)
-
-
 def _open_meshcat() -> Meshcat | None:
     """Returns a page that listens on localhost only, and says where; None where none can be."""
     try:
@@ -195,13 +178,12 @@ def _simulate(
 ) -> Ending:
     """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
     simulator.set_target_realtime_rate(realtime_rate)
-    if isinstance(dressing.station, HardwareStation):
-        _make_ready(dressing, dressing.station, interrupt)
-        if interrupt.is_set():
-            return Ending(interrupted=True)
+    station = dressing.station
+    station.make_ready(partial(dressing.rehearse, stopped=interrupt.is_set))
+    if station.in_real_time and interrupt.is_set():
+        return Ending(interrupted=True)
     simulator.Initialize()
-    hardware = isinstance(dressing.station, HardwareStation)
-    pace = SteadyPace(simulator) if hardware else None
+    pace = SteadyPace(simulator) if station.in_real_time else None
     context = dressing.mpc.GetMyContextFromRoot(simulator.get_context())
     stage_port = dressing.mpc.GetOutputPort("stage")
     terminal = sys.stderr.isatty()
@@ -227,7 +209,7 @@ def _simulate(
                 # no command without a log of it: commands end, and arms stop by themselves
                 fault = f"log: cannot be written: {error}"
                 break
-            fault = _station_fault(dressing, simulator) or dressing.mpc.failure(context)
+            fault = station.fault(simulator.get_context()) or dressing.mpc.failure(context)
             stage = stage_port.Eval(context)
             names = [("prepare", "dress", "done")[int(s)] for s in stage]
             progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")
@@ -239,21 +221,6 @@ def _simulate(
             if now - done_since >= _STAY:
                 break
         return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
-
-
-def _make_ready(dressing: Dressing, station: HardwareStation, interrupt: Interrupt) -> None:
-    """Has controllers solve once, unless a signal comes, and takes what comes meanwhile."""
-    print("rehearsing: each controller solves once", flush=True)
-    dressing.rehearse(station.heard.garment, station.heard.person, interrupt.is_set)
-    station.catch_up()
-
-
-def _station_fault(dressing: Dressing, simulator: Simulator) -> str | None:
-    """Returns why the station ends the run; None while it does not."""
-    if not isinstance(dressing.station, HardwareStation):
-        return None
-    watch = dressing.station.watch
-    return watch.conclusion(watch.GetMyContextFromRoot(simulator.get_context()))
 
 
 def concluded(out: Path, wall_time: float, report: bool, interrupt: Interrupt | None) -> int:

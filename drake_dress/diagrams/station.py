@@ -32,6 +32,7 @@ from their joints; a floating gripper measures itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,7 +43,7 @@ from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.arms import (
@@ -85,6 +86,7 @@ from drake_dress.models.human.body import (
     shoulder_joint,
 )
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_measurement import ArmMeasurement
 from drake_dress.systems.cloth_plant import ClothPlant
 from drake_dress.systems.delay import delayed
@@ -108,9 +110,12 @@ ARM_STATUS = (
 # Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
 _SETTLING_TIME = 1.6
 _SETTLING_DAMPING = 0.03
+# Beyond this a node's motion is none of a garment's, m/s: a hem that swings does 1.7, a fall from a
+# table 4.
+_BROKEN_SPEED = 20.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StationParameters:
     """What the simulated station is made of; SI units.
 
@@ -127,21 +132,21 @@ class StationParameters:
     arms: dict[Side, ArmPose]
     joints: JointParameters
     behaviour: Behaviour = field(default_factory=Behaviour)
-    gripper_max_speed: float = 0.25
-    gripper_max_acceleration: float = 2.0
-    distance_behind: float = 0.45
+    gripper_max_speed: float
+    gripper_max_acceleration: float
+    distance_behind: float
     height_offset: float = 0.0
     lateral_offset: float = 0.0
-    integrator: str = "implicit"
-    iterations: int = 40
-    tolerance: float = 5e-3
-    implicitness: float = 1.0
-    buckling_wavelength: float = 0.0
-    self_collision: bool = False
-    grasp_stiffness: float = 3000.0
+    integrator: str
+    iterations: int
+    tolerance: float
+    implicitness: float
+    buckling_wavelength: float
+    self_collision: bool
+    grasp_stiffness: float
     effects: tuple[Effect, ...] = ()
     placement: ArmPlacement | None = None
-    mode: str = "position_velocity"
+    mode: str
     cameras: tuple[Camera, ...] = ()
     beside: bool = False
 
@@ -175,6 +180,25 @@ class Station:
     start_grippers: FloatArray
     robots: ArmSetup | None
 
+    @property
+    def in_real_time(self) -> bool:
+        """Whether the world goes on while a controller solves."""
+        return False
+
+    def make_ready(self, rehearse: Callable[[FloatArray, FloatArray], None]) -> None:
+        """Is called once, before a run begins.
+
+        Args:
+            rehearse: has all controllers solve once, for a garment (m,3) and joints (6,3), m.
+        """
+
+    def fault(self, root: Context) -> str | None:
+        """Returns why the station ends the run; None while it does not."""
+        return None
+
+    def note(self, root: Context, writer: RunLogWriter) -> None:
+        """Writes to the log what the station alone knows of a run that is over."""
+
 
 @dataclass(frozen=True)
 class SimulatedStation(Station):
@@ -183,6 +207,16 @@ class SimulatedStation(Station):
     plant: MultibodyPlant
     scene_graph: SceneGraph
     cloth: ClothPlant
+
+    def fault(self, root: Context) -> str | None:
+        """Returns that the garment moves as no garment does, where its simulation broke down."""
+        velocity = self.cloth.GetOutputPort("garment_velocity").Eval(
+            self.cloth.GetMyContextFromRoot(root)
+        )
+        speed = float(np.linalg.norm(velocity.reshape(-1, 3), axis=1).max())
+        if speed <= _BROKEN_SPEED:
+            return None
+        return f"plant: the garment's simulation broke down, a node moves at {speed:.0f} m/s"
 
 
 def make_simulated_station(
@@ -202,56 +236,17 @@ def make_simulated_station(
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.body_time_step)
     body = body_with_effects(p.measures, p.effects)
     person = add_person(plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
-    robots = None
+    robots, arms = None, None
     if p.placement is not None:
         robots = robots_at_start(p, p.placement, body, person)
         arms = add_arms(plant, {side: p.placement.base(side) for side in SIDES})
     plant.Finalize()
 
-    hung, grippers = hung_garment(p), start_grippers(p)
-    start = settled(p, hung)
-
-    cloth = builder.AddNamedSystem(
-        "cloth",
-        ClothPlant(
-            plant_integrator(p),
-            (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
-            start,
-            grippers,
-            person.capsules,
-            person.body_indices,
-            p.grasp_stiffness,
-            Mounts(p.effects),
-            p.beside,
-        ),
-    )
-    builder.Connect(plant.get_body_poses_output_port(), cloth.GetInputPort("body_poses"))
-    builder.Connect(
-        plant.get_body_spatial_velocities_output_port(),
-        cloth.GetInputPort("body_spatial_velocities"),
-    )
+    grippers = start_grippers(p)
+    cloth = _add_cloth(builder, plant, person, grippers, p)
     forces = cloth.GetOutputPort("person_forces")
-    motion: dict[tuple[Side, str], OutputPort] = {}
-    measured: dict[tuple[Side, str], OutputPort] = {
-        (side, "force"): cloth.GetOutputPort(f"{side}_gripper_force") for side in SIDES
-    }
-    if robots is None:
-        for i, side in enumerate(SIDES):
-            gripper = builder.AddNamedSystem(
-                f"{side}_gripper",
-                FloatingGripper(
-                    grippers[i],
-                    p.body_time_step,
-                    p.gripper_max_speed,
-                    p.gripper_max_acceleration,
-                ),
-            )
-            builder.ExportInput(
-                gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
-            )
-            for quantity in _MOTION:
-                motion[side, quantity] = gripper.GetOutputPort(f"{quantity}_measured")
-        measured |= motion
+    if robots is None or arms is None:
+        motion = measured = _add_floating_grippers(builder, grippers, p)
     else:
         measured = _wire_drivers(builder, plant, arms, robots, p)
         motion, load = _wire_tools(builder, plant, cloth, arms)
@@ -269,15 +264,8 @@ def make_simulated_station(
         p.mesh,
         cloth.GetOutputPort("garment_position"),
     )
-    # a gripper that were earlier than it reports would have to know the future
-    late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
-    for i, side in enumerate(SIDES):
-        for quantity in _MOTION:
-            first = grippers[i] if quantity == "position" else np.zeros(3)
-            port = delayed(builder, motion[side, quantity], first, p.body_time_step, late)
-            builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
-        for quantity in (*_MOTION, "force"):
-            builder.ExportOutput(measured[side, quantity], f"{side}_gripper.{quantity}_measured")
+    _connect_grippers(builder, cloth, motion, grippers, p)
+    _export_measured(builder, cloth, measured)
     if sight is not None:
         export_oracles(
             builder,
@@ -290,16 +278,97 @@ def make_simulated_station(
         )
         permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
         builder.ExportOutput(permission.get_output_port(), "permission")
-    for name in ("garment_position", "garment_velocity", "contact", "contact_force"):
-        builder.ExportOutput(cloth.GetOutputPort(name), f"cheat_{name}")
-    builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
-    builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
+    _export_truth(builder, cloth, plant)
     export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
     diagram.set_name("station")
     return SimulatedStation(diagram, person, grippers, robots, plant, scene_graph, cloth)
+
+
+# Output ports of grippers by side and quantity.
+_Ports = dict[tuple[Side, str], OutputPort]
+
+
+def _add_cloth(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    person: Person,
+    grippers: FloatArray,
+    p: StationParameters,
+) -> ClothPlant:
+    """Adds the garment as it hangs at first, in contact with the plant's bodies."""
+    cloth: ClothPlant = builder.AddNamedSystem(
+        "cloth",
+        ClothPlant(
+            plant_integrator(p),
+            (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
+            settled(p, hung_garment(p)),
+            grippers,
+            person.capsules,
+            person.body_indices,
+            p.grasp_stiffness,
+            Mounts(p.effects),
+            p.beside,
+        ),
+    )
+    for name in ("body_poses", "body_spatial_velocities"):
+        builder.Connect(plant.GetOutputPort(name), cloth.GetInputPort(name))
+    return cloth
+
+
+def _add_floating_grippers(
+    builder: DiagramBuilder, grippers: FloatArray, p: StationParameters
+) -> _Ports:
+    """Adds two grippers that nothing carries; returns the ports of their motion."""
+    motion = {}
+    for i, side in enumerate(SIDES):
+        gripper = builder.AddNamedSystem(
+            f"{side}_gripper",
+            FloatingGripper(
+                grippers[i], p.body_time_step, p.gripper_max_speed, p.gripper_max_acceleration
+            ),
+        )
+        builder.ExportInput(
+            gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
+        )
+        for quantity in _MOTION:
+            motion[side, quantity] = gripper.GetOutputPort(f"{quantity}_measured")
+    return motion
+
+
+def _connect_grippers(
+    builder: DiagramBuilder,
+    cloth: ClothPlant,
+    motion: _Ports,
+    grippers: FloatArray,
+    p: StationParameters,
+) -> None:
+    """Has the garment follow the grippers, as late as the effects say."""
+    # a gripper that were earlier than it reports would have to know the future
+    late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
+    for i, side in enumerate(SIDES):
+        for quantity in _MOTION:
+            first = grippers[i] if quantity == "position" else np.zeros(3)
+            port = delayed(builder, motion[side, quantity], first, p.body_time_step, late)
+            builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
+
+
+def _export_measured(builder: DiagramBuilder, cloth: ClothPlant, measured: _Ports) -> None:
+    for side in SIDES:
+        for quantity in _MOTION:
+            port = measured[side, quantity]
+            builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
+        force = measured.get((side, "force"), cloth.GetOutputPort(f"{side}_gripper_force"))
+        builder.ExportOutput(force, f"{side}_gripper.force_measured")
+
+
+def _export_truth(builder: DiagramBuilder, cloth: ClothPlant, plant: MultibodyPlant) -> None:
+    for name in ("garment_position", "garment_velocity", "contact", "contact_force"):
+        builder.ExportOutput(cloth.GetOutputPort(name), f"cheat_{name}")
+    builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
+    builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
 
 
 def _wire_drivers(

@@ -1,5 +1,6 @@
 """Runs of one seed are compared bit for bit."""
 
+import shutil
 from pathlib import Path
 
 import h5py
@@ -8,6 +9,8 @@ import pytest
 
 from benchmarks.logged import numbers_that_differ
 from benchmarks.repeat import __main__ as repeat
+from drake_dress.errors import UserError
+from tests.report import synthetic
 
 QUICK = ["plant.spacing=0.06", "controller.spacing=0.06", "duration=1.2"]
 
@@ -47,3 +50,31 @@ def test_a_run_is_the_same_under_load_and_in_several_processes(
     assert repeat.main(["--out", str(tmp_path), *settings]) == 0
     shown = capsys.readouterr().out
     assert shown.count("0 differ") == 2
+
+
+@pytest.mark.parametrize(("value", "status"), [(1.0, 0), (1.0 + 1e-15, 1)])
+def test_runs_are_compared_with_the_log_of_another_version(
+    value: float, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    garment = synthetic.coat(0.06)
+    before, made = tmp_path / "before.h5", tmp_path / "made.h5"
+    for path in (before, made):
+        synthetic.write(path, garment, synthetic.dressing(garment, count=3))
+    with h5py.File(made, "r+") as file:
+        file["garment/rest_position"][0, 0] *= value
+
+    def run_scenario(_: Path, out: Path, *__: object) -> tuple[None, None]:
+        out.mkdir(parents=True)
+        shutil.copy(made, out / "run.h5")
+        return None, None
+
+    monkeypatch.setattr(repeat, "run_scenario", run_scenario)
+    monkeypatch.setattr(repeat, "CASES", (repeat.CASES[0],))
+    assert repeat.main(["--out", str(tmp_path / "out"), "--against", str(before)]) == status
+
+
+def test_a_log_to_compare_with_that_cannot_be_read_is_told_before_anything_runs(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(UserError, match="missing.h5"):
+        repeat.main(["--out", str(tmp_path), "--against", str(tmp_path / "missing.h5")])

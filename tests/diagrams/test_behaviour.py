@@ -21,8 +21,6 @@ from drake_dress.diagrams.person import (
     joint_positions,
     person_arms,
 )
-from drake_dress.diagrams.station import StationParameters, make_simulated_station
-from drake_dress.models.cloth.material import Material
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.body import ArmPose, BodyMeasures
@@ -30,6 +28,7 @@ from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import Side
+from tests.systems.draped import draped_station
 
 M = BodyMeasures()
 JOINTS = JointParameters(6.0, 3.0, 3.6, 1.2)
@@ -134,17 +133,8 @@ def test_dummy_moves_to_the_bit_as_a_plant_with_tone_alone() -> None:
 
 
 def test_station_of_a_dummy_has_no_system_of_a_behaviour() -> None:
-    station = make_simulated_station(
-        StationParameters(
-            mesh=MESH,
-            material=Material(),
-            time_step=0.01,
-            body_time_step=0.01,
-            measures=M,
-            posture="standing",
-            arms=ARMS,
-            joints=JOINTS,
-        )
+    station = draped_station(
+        mesh=MESH, measures=M, arms=ARMS, joints=JOINTS, time_step=0.01, body_time_step=0.01
     )
     assert names(station.diagram) == {
         "MultibodyPlant",

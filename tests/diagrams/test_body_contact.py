@@ -27,7 +27,7 @@ def drawn(
     """Returns joints (6,3), m, before and after `forces` (3,), N, acted at some of them."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.004)
-    person = add_person(plant, M, posture, arms, JointParameters())
+    person = add_person(plant, M, posture, arms, JointParameters(2.0, 1.0, 1.5, 0.4))
     plant.Finalize()
     diagram = builder.Build()
     simulator = Simulator(diagram)

@@ -35,7 +35,7 @@ from drake_dress.diagrams.hardware_station import (
     listen,
     make_hardware_station,
 )
-from drake_dress.diagrams.lab import Lab, make_lab
+from drake_dress.diagrams.lab_diagram import Lab, make_lab
 from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
 from drake_dress.diagrams.scenario.schema import LabFault
 from drake_dress.models.arm.command_guard import Stop

@@ -34,7 +34,7 @@ from drake_dress.models.human.body import (
 FloatArray = npt.NDArray[np.float64]
 
 M = BodyMeasures()
-JOINTS = JointParameters()
+JOINTS = JointParameters(2.0, 1.0, 1.5, 0.4)
 OPEN: dict[Side, ArmPose] = {
     "left": ArmPose(np.deg2rad(45.0), np.deg2rad(25.0), 0.1, np.deg2rad(20.0)),
     "right": ArmPose(np.deg2rad(35.0), np.deg2rad(30.0), -0.2, np.deg2rad(10.0)),

@@ -207,7 +207,7 @@ WIDTHS = st.fixed_dictionaries(
 )
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(WIDTHS, st.integers(0, 2**32), st.booleans())
 def test_variation_acts_on_every_measure_and_within_its_width(
     widths: dict[str, float], seed: int, given_measures: bool

@@ -121,7 +121,7 @@ def pooled(estimates, information):
 
 
 @given(seed=seeds, count=st.integers(1, 4))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_direction_that_is_free_is_noise_of_standard_deviation_one_along_it(seed, count):
     rng = np.random.default_rng(seed)
     voice = rng.permutation(np.repeat(np.arange(count), 3))
@@ -145,7 +145,7 @@ def test_a_direction_that_is_free_is_noise_of_standard_deviation_one_along_it(se
     size=st.sampled_from([1e-3, 1.0, 1e3]),
     is_pooled=st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_bounded_solution_meets_its_conditions_of_optimality(seed, k, size, is_pooled):
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((30, k)) * size ** rng.uniform(-1.0, 1.0, k)
@@ -167,7 +167,7 @@ def test_a_bounded_solution_meets_its_conditions_of_optimality(seed, k, size, is
 
 
 @given(seed=seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_what_nothing_is_known_of_stays_as_near_to_zero_as_its_bounds_allow(seed):
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((50, 3))
@@ -203,7 +203,7 @@ def test_voices_scatter_no_more_than_the_most():
 
 
 @given(seed=seeds, k=st.integers(1, 3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_one_voice_alone_does_not_scatter_and_is_least_squares(seed, k):
     rng = np.random.default_rng(seed)
     columns, residual = rng.standard_normal((40, k)), 9.0 * rng.standard_normal(40)
@@ -234,7 +234,7 @@ def test_a_voice_that_knows_no_more_than_is_known_of_any_is_half_a_voice():
 
 
 @given(seed=seeds, k=st.integers(1, 3), count=st.integers(2, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_voices_are_pooled_by_the_random_effects_model(seed, k, count):
     """Each voice has an estimate of its own, of covariance N⁻¹ + τ² I, with Q(τ²) = dof.
 
@@ -267,7 +267,7 @@ def test_voices_are_pooled_by_the_random_effects_model(seed, k, count):
 
 
 @given(seed=seeds, k=st.integers(1, 3), shift=st.sampled_from([-5.0, 0.1, 5.0]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_how_far_voices_are_misled_is_the_mean_square_weighted_by_what_they_know(seed, k, shift):
     rng = np.random.default_rng(seed)
     voice = np.repeat(np.arange(3), 20)

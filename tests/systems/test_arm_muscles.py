@@ -50,7 +50,10 @@ def test_damping_is_relative_to_the_set_point_and_to_rest_without_its_rate() -> 
 def test_limits_are_widened_to_a_pose_beyond_them() -> None:
     beyond = ArmPose(0.2, 0.8, 0.1, -0.05)
     arms = person_arms(
-        BodyMeasures(), "standing", {"left": POSE, "right": beyond}, JointParameters()
+        BodyMeasures(),
+        "standing",
+        {"left": POSE, "right": beyond},
+        JointParameters(2.0, 1.0, 1.5, 0.4),
     )
     assert arms.limits[1, 0, 3] == pytest.approx(-0.05)
     assert arms.limits[0, 0, 3] == 0.0

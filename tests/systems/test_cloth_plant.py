@@ -90,3 +90,12 @@ def test_an_arm_is_pushed_by_what_a_gripper_holds_and_not_passed_through() -> No
     away = station.start_grippers[0] - goal
     # back along the way that it came
     assert pressed > 30.0 and force @ away > 0.7 * pressed * np.linalg.norm(away)
+
+
+@pytest.mark.parametrize("speed", [30.0, np.nan])
+def test_a_garment_that_moves_as_none_does_ends_the_run(station: Station, speed: float) -> None:
+    context = station.diagram.CreateDefaultContext()
+    assert station.fault(context) is None
+    velocity = station.cloth.GetMyMutableContextFromRoot(context).get_mutable_discrete_state(1)
+    velocity.SetAtIndex(7, speed)
+    assert f"broke down, a node moves at {speed:.0f} m/s" in str(station.fault(context))

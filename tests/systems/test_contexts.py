@@ -96,7 +96,7 @@ def _garment(station: SimulatedStation, context: Context) -> np.ndarray:
 class _Policy:
     """Asks for what it sees, and for what it has seen before."""
 
-    parameters: PolicyParameters = field(default_factory=PolicyParameters)
+    parameters: PolicyParameters = PolicyParameters(time_step=0.1, horizon=8)
     mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
 
     def initial_state(self) -> Any:

@@ -27,7 +27,7 @@ class _Policy:
     """Asks for motion, and stops to do so at a time."""
 
     ends: str
-    parameters: PolicyParameters = field(default_factory=PolicyParameters)
+    parameters: PolicyParameters = PolicyParameters(time_step=0.1, horizon=8)
     mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
     planner: Any = None
 

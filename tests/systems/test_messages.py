@@ -91,7 +91,7 @@ class Ear:
         return read("received").Eval(context), read("position").Eval(context)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.binary(max_size=700) | st.integers(0, 600))
 def test_garbage_is_counted_and_changes_nothing(garbage: bytes | int) -> None:
     ear = Ear()

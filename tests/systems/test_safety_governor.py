@@ -17,7 +17,7 @@ from drake_dress.systems.safety_governor import SafetyGovernor
 
 PERIOD = 0.01
 START = np.array([[0.0, 0.3, 1.4], [0.0, -0.3, 1.4]])
-LIMITS = SafetyLimits()
+LIMITS = SafetyLimits(person_distance=0.0, held_distance=0.0, least_distance=0.0)
 GRIPPER_SPEED = 0.25
 PERSON = PersonModel((), np.array([[0.0, 0.2, 1.4], [0.0, -0.2, 1.4]]), (0.05, 0.04, 0.04))
 # The left hand is ahead of the left gripper; the rest of both arms is far.

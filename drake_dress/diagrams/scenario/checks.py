@@ -14,6 +14,7 @@ from drake_dress.diagrams.scenario.schema import (
     Station,
 )
 from drake_dress.errors import UserError
+from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.human import motions
 from drake_dress.models.supervision.injection import sources_of
 
@@ -27,6 +28,12 @@ def check_controller(source: str, controller: Controller) -> None:
                 source,
                 f"controller.{name}.delay",
                 f"is {part.delay} s, expected less than the period, {part.period} s",
+            )
+    for name, least in LEAST_APPROACHES.items():
+        count = len(getattr(controller.tasks, name))
+        if count < least:
+            raise UserError(
+                source, f"controller.tasks.{name}", f"has {count} entries, expected {least} or more"
             )
     steps = mpc.delay / mpc.time_step
     if abs(steps - round(steps)) > 1e-6 or round(steps) >= mpc.horizon:

@@ -185,6 +185,95 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.passage": (0.0, 1e6),
     "weights.passage_radius": (0.0, 1.0),
     "weights.passage_length": (0.0, 2.0),
+    # shares, m and s, each wide of what was found useful
+    **{
+        f"stages.{name}": bounds
+        for bounds, names in {
+            (0.0, 1.0): ("least_sight", "lost_sight", "stall_progress", "alike"),
+            (0.0, 2.0): ("done_progress", "kept_progress", "creeping_progress"),
+            (0.0, 3.0): (
+                "prepared_distance",
+                "missed_distance",
+                "reach",
+                "meeting_distance",
+                "pushed_distance",
+                "lingering_distance",
+                "barred_distance",
+            ),
+            (0.0, 600.0): (
+                "sight_time",
+                "lingering_timeout",
+                "insertion_timeout",
+                "barred_timeout",
+                "stall_timeout",
+                "easing_time",
+                "retreat_time",
+                "withdrawal_time",
+                "swing_time",
+            ),
+            (1, 1000): ("withdrawal_after", "swing_after"),
+        }.items()
+        for name in names
+    },
+    **{
+        f"tasks.{name}": bounds
+        for bounds, names in {
+            (0.0, 1.0): ("flat", "steep", "clear_sight", "widening"),
+            (-1.0, 1.0): ("led_inward",),
+            (0, 1000): ("led_after",),
+            (0.0, 2.0): (
+                "tethered_approach_distance",
+                "behind_distance",
+                "retreat_distance",
+                "passing_back",
+                "withdrawal_distance",
+                "swing_reach",
+                "swing_outward",
+                "passing_outward",
+                "passing_behind",
+                "passing_from",
+                "passing_beside",
+                "outlook_distance",
+                "longest_reach",
+                "funnel_wide",
+                "funnel_narrow",
+                "funnel_distance",
+                "aside_free",
+                "overshoot",
+                "inside_radius",
+                "touch_distance",
+                "near_distance",
+                "waiting_reach",
+                "largest_aside",
+                "final_progress",
+                "held_progress",
+                "settling_speed",
+                "largest_lead",
+            ),
+            (0.0, 100.0): (
+                "approach_slope",
+                "near_position",
+                "near_direction",
+                "dressing_direction",
+                "dressing_position",
+            ),
+        }.items()
+        for name in names
+    },
+    **{
+        f"{group}.{name}": bounds
+        for group in ("approaches", "tethered_approaches", "led_approach")
+        for name, bounds in {
+            "share": (0.0, 1.0),
+            "orientation": (0.0, 1.0),
+            "emphasis": (0.0, 100.0),
+            "tilt": (0.0, 1.0),
+        }.items()
+    },
+    "local.return_speed": (0.0, 1.0),
+    "local.taut_share": (0.0, 1.0),
+    "local.coupled_share": (0.0, 1.0),
+    "local.released_share": (0.0, 1.0),
     "command_rate": (10.0, 1000.0),
     "safety.max_speed": (0.001, 2.0),
     "safety.max_acceleration": (0.01, 50.0),

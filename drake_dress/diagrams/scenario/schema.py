@@ -1,11 +1,36 @@
-"""What a scenario's YAML may say: plain dataclasses, which Drake's `yaml_load_typed` fills."""
+"""What a scenario's YAML may say: plain dataclasses, which Drake's `yaml_load_typed` fills.
+
+A default that a model has, too, is the model's: groups that are a model's settings mirror them,
+others refer to them. `tests/diagrams/test_defaults.py` holds both against each other.
+"""
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from drake_dress.diagrams.person import JointParameters
+from drake_dress.diagrams.scenario.fidelity import FIDELITIES
+from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
+from drake_dress.models.arm.status_check import JointBounds
+from drake_dress.models.cloth import material
+from drake_dress.models.control import global_mpc, local_model, policy, safety, task_parameters
+from drake_dress.models.dressing import stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.garment.load import MeshOptions
+from drake_dress.models.human import body, following, motions, tremor
+from drake_dress.models.human.active import ActiveParameters
+from drake_dress.models.supervision.garment_belief import GarmentBounds
+from drake_dress.models.supervision.garment_shape import ShapeBounds
+from drake_dress.models.supervision.person_belief import PersonBounds
+from drake_dress.models.supervision.person_pose import PoseBounds
+from drake_dress.models.supervision.supervision import Patience
+
+_STANDARD = FIDELITIES["standard"]
+_POLICY = policy.PolicyParameters()
+_LOCAL = local_model.LocalParameters
+_SAFETY = safety.SafetyLimits
 
 
 @dataclass
@@ -34,12 +59,13 @@ class Mesh:
     """A garment of the user's own, instead of the coat."""
 
     file: str = ""  # OBJ, PLY or STL, relative to the scenario
-    unit: str = "m"  # of its coordinates
-    scale: float = 1.0  # on all coordinates, beside the unit
+    unit: str = MeshOptions.unit  # of its coordinates
+    scale: float = MeshOptions.scale  # on all coordinates, beside the unit
     # Axis of the file that points up. With z the garment faces +x, with y +z, with x +y; a minus
     # sign turns it upside down.
-    up: str = "z"
-    weld: float = 0.0  # distance across which edges of seams are sewn, m; 0: equal nodes alone
+    up: str = MeshOptions.up
+    # distance across which edges of seams are sewn, m; 0: equal nodes alone
+    weld: float = MeshOptions.weld
     # Names of objects or groups, or sizes such as "<0.05 m" of parts that are connected.
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int]] = field(default_factory=dict)  # nodes in order, by loop name
@@ -58,35 +84,17 @@ class Garment:
 class Material:
     """A fabric, SI units; see models/cloth/material.py."""
 
-    surface_density: float = 0.3  # kg/m²
-    stretch_stiffness: float = 100.0  # N/m
-    bending_stiffness: float = 1.5e-3  # N·m
+    surface_density: float = material.Material.surface_density  # kg/m²
+    stretch_stiffness: float = material.Material.stretch_stiffness  # N/m
+    bending_stiffness: float = material.Material.bending_stiffness  # N·m
     damping: float = 0.003  # s, of the plant's integrator
-    friction: float = 0.3
-    margin: float = 0.003  # m, kept between node and skin
+    friction: float = material.Material.friction
+    margin: float = material.Material.margin  # m, kept between node and skin
 
 
-@dataclass
-class Measures:
-    """Body sizes, m, and masses, kg."""
-
-    shoulder_height: float = 1.40  # of the joints, standing
-    shoulder_width: float = 0.36  # joint to joint
-    upper_arm_length: float = 0.29
-    forearm_length: float = 0.32  # elbow to middle of the hand
-    upper_arm_radius: float = 0.045
-    forearm_radius: float = 0.038
-    hand_radius: float = 0.040
-    chest_width: float = 0.32
-    chest_depth: float = 0.20
-    torso_length: float = 0.52
-    hip_width: float = 0.32
-    neck_radius: float = 0.055
-    head_radius: float = 0.095
-    leg_length: float = 0.85
-    thigh_radius: float = 0.075
-    upper_arm_mass: float = 1.6
-    forearm_mass: float = 1.2
+@mirror_of(body.BodyMeasures)
+class Measures(Mirror):
+    """Body sizes, m, and masses, kg; see models/human/body.py."""
 
 
 @dataclass
@@ -103,20 +111,15 @@ class Arm:
 class Joints:
     """How the arms yield: N·m/rad and N·m·s/rad."""
 
-    shoulder_stiffness: float = 6.0
-    shoulder_damping: float = 3.0
-    elbow_stiffness: float = 3.6
-    elbow_damping: float = 1.2
+    shoulder_stiffness: float = JointParameters.shoulder_stiffness
+    shoulder_damping: float = JointParameters.shoulder_damping
+    elbow_stiffness: float = JointParameters.elbow_stiffness
+    elbow_damping: float = JointParameters.elbow_damping
 
 
-@dataclass
-class Following:
+@mirror_of(following.FollowingParameters)
+class Following(Mirror):
     """How a person gives way who lets the garment lead; see models/human/following.py."""
-
-    time_constant: float = 1.0  # in which a joint held away from where it was set is followed, s
-    threshold: float = 0.3  # of the torque at a joint, up to which nothing is followed, N·m
-    return_time_constant: float | None = None  # to the rest pose, s; empty: stays where it was led
-    max_speed: float = 1.0  # of a joint's set-point, rad/s
 
 
 @dataclass
@@ -124,9 +127,9 @@ class Reach:
     """The hand goes into the sleeve, once its armhole is near."""
 
     side: str = "both"
-    start: float = 0.0  # s, at the earliest
-    within: float = 0.25  # from hand to armhole, m
-    push: float = 0.05  # of the hand beyond the armhole; then it follows, m
+    start: float = motions.Reach.start  # s, at the earliest
+    within: float = motions.Reach.within  # from hand to armhole, m
+    push: float = motions.Reach.push  # of the hand beyond the armhole; then it follows, m
 
 
 @dataclass
@@ -135,7 +138,7 @@ class Turn:
 
     angle_deg: float = 15.0  # leftward
     start: float = 15.0  # s
-    duration: float = 3.0  # s
+    duration: float = motions.Turn.duration  # s
 
 
 @dataclass
@@ -144,8 +147,8 @@ class Withdraw:
 
     side: str = "both"
     start: float = 10.0  # s
-    duration: float = 4.0  # s
-    distance: float = 0.10  # m
+    duration: float = motions.Withdraw.duration  # s
+    distance: float = motions.Withdraw.distance  # m
 
 
 @dataclass
@@ -154,9 +157,9 @@ class Wave:
 
     side: str = "both"
     start: float = 10.0  # s
-    duration: float = 3.0  # s
-    amplitude: float = 0.05  # m
-    frequency: float = 1.0  # Hz
+    duration: float = motions.Wave.duration  # s
+    amplitude: float = motions.Wave.amplitude  # m
+    frequency: float = motions.Wave.frequency  # Hz
 
 
 @dataclass
@@ -169,12 +172,9 @@ class Motion:
     wave: Wave | None = None
 
 
-@dataclass
-class Tremor:
+@mirror_of(tremor.TremorParameters)
+class Tremor(Mirror):
     """Shaking of both hands; 4 to 12 Hz and up to 2 cm, see models/human/tremor.py."""
-
-    amplitude: float = 0.005  # of the hand, m
-    frequency: float = 5.0  # Hz
 
 
 @dataclass
@@ -186,8 +186,8 @@ class Behaviour:
     kind: str = "dummy"
     following: Following = field(default_factory=Following)
     motions: list[Motion] = field(default_factory=list)
-    max_hand_speed: float = 0.5  # of motions of the hand, m/s
-    max_joint_speed: float = 2.5  # likewise, rad/s
+    max_hand_speed: float = ActiveParameters.max_hand_speed  # of motions of the hand, m/s
+    max_joint_speed: float = ActiveParameters.max_joint_speed  # likewise, rad/s
     tremor: Tremor | None = None
 
 
@@ -210,18 +210,20 @@ class Plant:
     # fine, standard or quick: gives what is not given of spacing, time_step, body_time_step,
     # implicitness, buckling_wavelength and tolerance; see fidelity.py
     fidelity: str = "standard"
-    spacing: float = 0.025  # of the garment's mesh, m
-    time_step: float = 0.010  # of the garment, s
-    body_time_step: float = 0.010  # of arms, grippers and the person's joints, s
+    spacing: float = _STANDARD["spacing"]  # of the garment's mesh, m
+    time_step: float = _STANDARD["time_step"]  # of the garment, s
+    body_time_step: float = _STANDARD[
+        "body_time_step"
+    ]  # of arms, grippers and the person's joints, s
     integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
     # of the implicit integrator: 1 is implicit Euler, which damps more the longer the step; near
     # 0.5 it is of second order and may begin to jitter
-    implicitness: float = 0.7
+    implicitness: float = _STANDARD["implicitness"]
     # of it: shortest wrinkle that the mesh can take, in spacings; what cloth would evade by shorter
     # ones gives way. 0: never
-    buckling_wavelength: float = 3.0
+    buckling_wavelength: float = _STANDARD["buckling_wavelength"]
     iterations: int = 40  # of the implicit integrator's linear solver, at most
-    tolerance: float = 5e-2  # relative residual at which it stops
+    tolerance: float = _STANDARD["tolerance"]  # relative residual at which it stops
     self_collision: bool = True  # layers of the garment do not pass through each other
     # of a gripper's arm and grasp where a person pushes against what it holds, N/m: an arm under
     # impedance control, by the translational stiffness that libfranka's examples set
@@ -229,28 +231,24 @@ class Plant:
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
-@dataclass
-class Weights:
+@mirror_of(global_mpc.Weights)
+class Weights(Mirror):
     """Of the global controller's costs; see models/control/global_mpc.py."""
 
-    position: float = 1.0
-    direction: float = 0.05
-    speed: float = 0.125
-    safety: float = 3e-4
-    free_force: float = 5.0  # N
-    separation: float = 1.0
-    least_spread: float = 0.5  # share of the grippers' distance at rest
-    entering_spread: float = 0.85  # the same while a sleeve is entered
-    level: float = 20.0  # on a garment that is turned on edge
-    least_level: float = 0.5  # of the grippers' distance at rest: the left one is left of the right
-    clearance: float = 10.0
-    free_clearance: float = 0.05  # m
-    corridor: float = 3.0  # on cloth that hangs ahead of a hand that is to go in
-    corridor_radius: float = 0.06  # m
-    corridor_length: float = 0.12  # m
-    passage: float = 3.0  # on cloth that would cross the forearm if the hand were in the armhole
-    passage_radius: float = 0.06  # m
-    passage_length: float = 0.25  # m
+
+@mirror_of(task_parameters.Approach)
+class Approach(Mirror):
+    """A way to approach a hand; see models/control/task_parameters.py."""
+
+
+@mirror_of(stages.StageParameters, without=("waiting_progress",))
+class Stages(Mirror):
+    """Thresholds between the stages of a dressing; see models/dressing/stages.py."""
+
+
+@mirror_of(task_parameters.TaskParameters, without=("progress_rate", "approach_distance", "stages"))
+class Tasks(Mirror):
+    """Where the sleeves are sent; see models/control/task_parameters.py."""
 
 
 @dataclass
@@ -260,20 +258,23 @@ class GlobalMpc:
     period: float = 0.5  # between solves, s
     # From what is seen to the use of the plan, s, a multiple of time_step; or "measured": the least
     # such one that 95 % of the solves keep on this machine, of drake-dress bench delay.
-    delay: float = 0.4
-    time_step: float = 0.2  # of the prediction, s
-    horizon: int = 5  # steps
-    max_iterations: int = 3  # gradient steps per solve
+    delay: float = round(_POLICY.committed_steps * _POLICY.time_step, 9)
+    time_step: float = _POLICY.time_step  # of the prediction, s
+    horizon: int = _POLICY.horizon  # steps
+    max_iterations: int = _POLICY.max_iterations  # gradient steps per solve
     # Of a solve, in iterations of linear solves, of 0.1 to 0.2 ms; what is best when it is spent is
     # used. Any number if empty. On hardware a solve has a share of its delay instead.
-    budget: int | None = 3200
+    budget: int | None = _POLICY.budget.iterations
     delay_share: float = 0.9  # of the delay, that a solve may take on hardware
-    inner_iterations: int = 5  # of the garment's linear solve; 1 is the paper's scheme
-    max_speed: float = 0.12  # of a gripper, m/s
+    # of the garment's linear solve; 1 is the paper's scheme
+    inner_iterations: int = _POLICY.inner_iterations
+    max_speed: float = _POLICY.max_speed  # of a gripper, m/s
     weights: Weights = field(default_factory=Weights)
-    progress_step: float = 0.08  # advance of s asked for per step (k)
-    approach_distance: float = 0.20  # cap of l_h, m
-    waiting_progress: float = 0.3  # least s of a waiting sleeve
+    progress_step: float = round(
+        _POLICY.tasks.progress_rate * _POLICY.time_step, 9
+    )  # advance of s asked for per step (k)
+    approach_distance: float = _POLICY.tasks.approach_distance  # cap of l_h, m
+    waiting_progress: float = _POLICY.tasks.stages.waiting_progress  # least s of a waiting sleeve
     force_limit: float | None = None  # deprecated, N: is safety.force_limit now
 
 
@@ -283,18 +284,25 @@ class Local:
 
     period: float = 0.02  # between solves, s
     delay: float = 0.002  # from what is seen to the use of the solution, s
-    time_step: float = 0.05  # of the problem, s
-    horizon: int = 20  # steps
-    position: float = 1.0  # weight of sleeves
-    speed: float = 0.1  # weight of the grippers' speed, s²/m² of a step
-    max_speed: float = 0.12  # of a gripper, m/s
-    stretch: float = 1.0  # share of the distances that the garment reaches, that is used
-    beside: float = 0.04  # that a dressed sleeve may be beside its target, m
-    beside_speed: float = 0.05  # that it may move beside its arm, m/s
-    dragged: float = 0.04  # how far a hand is taken to be pushed by the garment, m
+    time_step: float = _LOCAL.time_step  # of the problem, s
+    horizon: int = _LOCAL.horizon  # steps
+    position: float = _LOCAL.position  # weight of sleeves
+    speed: float = _LOCAL.speed  # weight of the grippers' speed, s²/m² of a step
+    max_speed: float = _LOCAL.max_speed  # of a gripper, m/s
+    stretch: float = _LOCAL.stretch  # share of the distances that the garment reaches, that is used
+    beside: float = _LOCAL.beside  # that a dressed sleeve may be beside its target, m
+    beside_speed: float = _LOCAL.beside_speed  # that it may move beside its arm, m/s
+    # at which bounds that are exceeded come back where nothing is planned, m/s
+    return_speed: float = _LOCAL.return_speed
+    dragged: float = _LOCAL.dragged  # how far a hand is taken to be pushed by the garment, m
     # share of what a sleeve is off from where the plan foresaw it, that is made up for:
-    prepare_correction: float = 0.0  # while it is prepared
-    dress_correction: float = 1.0  # while it is drawn on
+    prepare_correction: float = _LOCAL.prepare_correction  # while it is prepared
+    dress_correction: float = _LOCAL.dress_correction  # while it is drawn on
+    # shares of what the garment reaches from a gripper and between the armholes: from which on a
+    # sleeve follows the other gripper, too; beyond which sleeves are coupled; below which no more
+    taut_share: float = _LOCAL.taut_share
+    coupled_share: float = _LOCAL.coupled_share
+    released_share: float = _LOCAL.released_share
     feedback: bool = True  # corrects between solves by the solution's gains
     solver: str = "constrained_ddp"  # or cone: Clarabel, exact and slower
 
@@ -307,6 +315,8 @@ class Controller:
     material: Material = field(default_factory=Material)
     method: str = "global"  # global plan alone, local compensation alone, or full: both
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
+    tasks: Tasks = field(default_factory=Tasks)
+    stages: Stages = field(default_factory=Stages)
     local: Local = field(default_factory=Local)
     # how the arms are believed to move on: still, or constant_velocity
     predictor: str = "still"
@@ -325,21 +335,25 @@ class Workspace:
 class Safety:
     """Limits that no controller's request gets past; see models/control/safety.py."""
 
-    max_speed: float = 0.25  # of a gripper's command, m/s
-    max_acceleration: float = 2.0  # the same, m/s²
-    max_braking: float = 6.0  # where the other limits need it; never exceeded, m/s²
-    force_limit: float = 17.0  # no pulling from here on, N; beyond it grippers give way
+    max_speed: float = _SAFETY.max_speed  # of a gripper's command, m/s
+    max_acceleration: float = _SAFETY.max_acceleration  # the same, m/s²
+    # where the other limits need it; never exceeded, m/s²
+    max_braking: float = _SAFETY.max_braking
+    # no pulling from here on, N; beyond it grippers give way
+    force_limit: float = _SAFETY.hard_force
     soft_force_limit: float | None = None  # pulling fades from here on, N; half of it if empty
-    force_filter_time: float = 0.05  # of the force's low-pass, s
-    yield_rate: float = 0.005  # speed of giving way per force beyond the limit, m/s/N
-    yield_speed: float = 0.1  # of giving way, at most, m/s
-    relax_speed: float = 0.02  # of giving way while stopped, m/s
-    stop_time: float = 0.5  # beyond the force limit, after which both grippers stop, s
-    max_lead: float = 0.02  # of a command before its gripper, m
-    stale_time: float = 0.1  # age at which a request is not obeyed any more, s
-    person_distance: float = 0.03  # of a gripper to the person's skin, m
-    held_distance: float = 0.008  # likewise of the cloth that it holds, m: a fold fits between
-    least_distance: float = 0.08  # between the grippers, m
+    force_filter_time: float = _SAFETY.filter_time  # of the force's low-pass, s
+    yield_rate: float = _SAFETY.yield_rate  # speed of giving way per force beyond the limit, m/s/N
+    yield_speed: float = _SAFETY.yield_speed  # of giving way, at most, m/s
+    relax_speed: float = _SAFETY.relax_speed  # of giving way while stopped, m/s
+    # beyond the force limit, after which both grippers stop, s
+    stop_time: float = _SAFETY.stop_time
+    max_lead: float = _SAFETY.max_lead  # of a command before its gripper, m
+    stale_time: float = _SAFETY.stale_time  # age at which a request is not obeyed any more, s
+    person_distance: float = _SAFETY.person_distance  # of a gripper to the person's skin, m
+    # likewise of the cloth that it holds, m: a fold fits between
+    held_distance: float = _SAFETY.held_distance
+    least_distance: float = _SAFETY.least_distance  # between the grippers, m
     largest_distance: float | None = None  # between the grippers, m; any if empty
     workspace: Workspace | None = None  # everywhere if empty
 
@@ -379,27 +393,39 @@ class Beliefs:
     """What messages of hardware may say to be believed; arms hold at what goes beyond it."""
 
     # Of an arm's status:
-    joint_leap: float = 0.05  # of a joint between messages beyond its speed limit, rad
-    torque_share: float = 2.0  # of a joint's torque limit that may push it from outside
+    joint_leap: float = JointBounds.leap  # of a joint between messages beyond its speed limit, rad
+    # of a joint's torque limit that may push it from outside
+    torque_share: float = JointBounds.torque_share
     # Of the person, against the scenario's measures and joints:
-    point_error: float = 0.03  # of a point, m; trackers of bodies are good to 1 to 3 cm
-    limb_share: float = 0.15  # by which a real limb may differ from the measures
-    shoulder_distance: float = 0.25  # of the shoulders' middle from where it is described, m
-    turn_deg: float = 100.0  # of the shoulders about the vertical
-    joint_room_deg: float = 10.0  # that a supple person's joints may go beyond the limits
-    person_speed: float = 3.0  # of a point, m/s; a hand that is drawn back in alarm
+    # of a point, m; trackers of bodies are good to 1 to 3 cm
+    point_error: float = PoseBounds.point_error
+    limb_share: float = PoseBounds.length_share  # by which a real limb may differ from the measures
+    # of the shoulders' middle from where it is described, m
+    shoulder_distance: float = PoseBounds.shoulder_distance
+    turn_deg: float = math.degrees(PoseBounds.turn)  # of the shoulders about the vertical
+    # that a supple person's joints may go beyond the limits
+    joint_room_deg: float = math.degrees(PoseBounds.joint_room)
+    person_speed: float = PersonBounds.speed  # of a point, m/s; a hand that is drawn back in alarm
     # for which a point that changed with each message may stay the same to the last bit, s; a real
     # tracker has noise; 0 does not judge it
-    frozen_time: float = 0.5
+    frozen_time: float = PersonBounds.frozen_time
     # Of the garment, against the controller's mesh and the grippers:
-    node_noise: float = 0.01  # standard deviation on each axis, m; depth cameras have 0.5 to 1 cm
-    strain: float = 0.25  # of an edge; coats stretch by 10 % in the hand, 20 % at most
-    least_edge: float = 0.6  # share of their length at rest, root mean square; folds shorten edges
-    grasp_distance: float = 0.12  # of the held nodes' middle from their gripper, m
-    garment_speed: float = 3.0  # of a node between messages, m/s; a hem that swings does 1.7
-    garment_velocity: float = 10.0  # of a node as it is reported, m/s: speed and its noise
-    velocity_error: float = 0.5  # of reported velocities against motion, m/s
-    frozen_travel: float = 0.01  # of a gripper while the garment stays the same, m; 0: not judged
+    # standard deviation on each axis, m; depth cameras have 0.5 to 1 cm
+    node_noise: float = ShapeBounds.node_noise
+    # of an edge; coats stretch by 10 % in the hand, 20 % at most
+    strain: float = ShapeBounds.strain
+    # share of their length at rest, root mean square; folds shorten edges
+    least_edge: float = ShapeBounds.least_edge
+    # of the held nodes' middle from their gripper, m
+    grasp_distance: float = ShapeBounds.grasp_distance
+    # of a node between messages, m/s; a hem that swings does 1.7
+    garment_speed: float = GarmentBounds.speed
+    # of a node as it is reported, m/s: speed and its noise
+    garment_velocity: float = GarmentBounds.velocity
+    # of reported velocities against motion, m/s
+    velocity_error: float = GarmentBounds.velocity_error
+    # of a gripper while the garment stays the same, m; 0: not judged
+    frozen_travel: float = GarmentBounds.frozen_travel
 
 
 @dataclass
@@ -419,8 +445,8 @@ class Hardware:
     stale_status: float = 0.05
     stale_estimate: float = 0.2  # the same
     stale_camera: float = 0.5  # the same
-    settle_time: float = 0.2  # for which all must be well before arms go on, s
-    patience: float = 3.0  # with what is wrong, before the run ends, s
+    settle_time: float = Patience.settle_time  # for which all must be well before arms go on, s
+    patience: float = Patience.fault  # with what is wrong, before the run ends, s
     wait: float = 10.0  # for the first messages, s
     start_distance: float = 0.02  # of a gripper from where the run begins, at most, m
     start_angle: float = 0.1  # of a joint, rad

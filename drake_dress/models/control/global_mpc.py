@@ -61,10 +61,10 @@ class Weights:
 
     position: float = 1.0
     direction: float = 0.05
-    speed: float = 0.5
-    safety: float = 1e-4
+    speed: float = 0.125
+    safety: float = 3e-4
     free_force: float = 5.0
-    separation: float = 10.0
+    separation: float = 1.0
     least_spread: float = 0.5
     entering_spread: float = 0.85
     level: float = 20.0

@@ -38,16 +38,16 @@ class PolicyParameters:
         budget: of a solve.
     """
 
-    time_step: float = 0.1
-    horizon: int = 8
-    max_iterations: int = 4
-    inner_iterations: int = 10
+    time_step: float = 0.2
+    horizon: int = 5
+    max_iterations: int = 3
+    inner_iterations: int = 5
     committed_steps: int = 2
     max_speed: float = 0.12
     weights: Weights = field(default_factory=Weights)
     tasks: TaskParameters = field(default_factory=TaskParameters)
     plans: bool = True
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = Budget(iterations=3200)
 
 
 @dataclass(frozen=True)

@@ -142,9 +142,9 @@ class SafetyLimits:
     stop_time: float = 0.5
     max_lead: float = 0.02
     stale_time: float = 0.1
-    person_distance: float = 0.0
-    held_distance: float = 0.0
-    least_distance: float = 0.0
+    person_distance: float = 0.03
+    held_distance: float = 0.008
+    least_distance: float = 0.08
     largest_distance: float = np.inf
     workspace: FloatArray | None = None
 

@@ -10,6 +10,9 @@ from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.human.heading import Heading
 
+# How many ways there must be: the first hand's best one depends on the forearm.
+LEAST_APPROACHES = {"approaches": 3, "tethered_approaches": 1}
+
 
 @dataclass(frozen=True)
 class Approach:
@@ -23,8 +26,8 @@ class Approach:
             vertical as far as it is asked to; turned up toward a steep forearm it hangs on edge.
     """
 
-    share: float
-    orientation: float
+    share: float = 0.25
+    orientation: float = 0.6
     emphasis: float = 1.0
     tilt: float = 1.0
 
@@ -115,6 +118,9 @@ class TaskParameters:
             4 cm once a second.
         largest_lead: advance of s that one of two sleeves on their arms may have on the other.
         stages: thresholds of the switching.
+
+    Raises:
+        ValueError: there are fewer ways to go about a hand than `LEAST_APPROACHES`.
     """
 
     progress_rate: float = 0.4
@@ -172,6 +178,12 @@ class TaskParameters:
     settling_speed: float = 0.03
     largest_lead: float = 0.6
     stages: StageParameters = field(default_factory=StageParameters)
+
+    def __post_init__(self) -> None:
+        for name, least in LEAST_APPROACHES.items():
+            count = len(getattr(self, name))
+            if count < least:
+                raise ValueError(f"{name} has {count} entries, expected {least} or more")
 
 
 def unit(v: FloatArray) -> FloatArray:

@@ -40,7 +40,7 @@ def refusal(path):
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 @given(data=st.data())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_flipped_and_missing_bytes_are_told_or_do_no_harm(whole, tmp_path_factory, kind, data):
     content = bytearray(whole[kind])
     begin = data.draw(st.integers(0, len(content) - 1))

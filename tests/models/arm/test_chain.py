@@ -1,7 +1,7 @@
 """Where links are, and how they move: against finite differences and known poses."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.arm.chain import moved_by, rotation_error
@@ -33,7 +33,6 @@ def test_stretched_upward_it_is_as_high_as_its_maker_says() -> None:
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(deadline=None)
 def test_the_jacobian_is_what_finite_differences_say(seed: int) -> None:
     q, e = drawn(seed), 1e-6
     links = ARM.links(q)
@@ -72,7 +71,6 @@ def test_where_it_stands_moves_all_of_it() -> None:
 
 
 @given(seed=st.integers(0, 2**31), angle=st.sampled_from([None, 0.0, 1e-9, np.pi - 1e-7, np.pi]))
-@settings(deadline=None)
 def test_a_rotation_error_is_the_way_there(seed: int, angle: float | None) -> None:
     _, start = rotation(seed + 1)
     vector, turn = rotation(seed, angle)

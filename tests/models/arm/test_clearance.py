@@ -28,7 +28,7 @@ def segments(seed: int) -> tuple[np.ndarray, ...]:
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_no_pair_of_points_is_nearer(seed: int) -> None:
     a, b, c, d = segments(seed)
     s, t = np.array([nearest(*ends) for ends in zip(a, b, c, d, strict=True)]).T[:, :, None]
@@ -61,7 +61,7 @@ def test_axes_that_cross_have_a_way_apart() -> None:
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_rates_are_what_finite_differences_say(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = panda(np.eye(4))

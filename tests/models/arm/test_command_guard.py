@@ -102,7 +102,7 @@ def test_it_goes_on_only_from_where_it_holds() -> None:
     np.testing.assert_allclose(resumed.position, START + 0.01, atol=1e-6)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.tuples(joints | small, joints | small, st.booleans()), min_size=1, max_size=30))
 def test_whatever_is_commanded_drives_stay_within_limits(
     commands: list[tuple[np.ndarray, np.ndarray, bool]],

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.arm.external_load import tool_force
@@ -15,7 +15,6 @@ shares = st.lists(st.floats(0.25, 0.75), min_size=7, max_size=7).map(np.array)
 
 
 @given(forces, shares)
-@settings(deadline=None)
 def test_force_is_found_from_its_own_torques(force: np.ndarray, share: np.ndarray) -> None:
     q = LIMITS.lower + share * (LIMITS.upper - LIMITS.lower)
     moves = ARM.tool_jacobian(ARM.links(q))[:3]

@@ -12,7 +12,7 @@ STEP = 0.005
 
 
 @given(seed=st.integers(0, 2**31), step=st.floats(1e-3, 0.02))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_whatever_is_chosen_no_limit_is_exceeded(seed: int, step: float) -> None:
     rng = np.random.default_rng(seed)
     q = rng.uniform(LIMITS.lower, LIMITS.upper)

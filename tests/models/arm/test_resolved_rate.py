@@ -38,7 +38,7 @@ def goals(arms: ArmPair, q: np.ndarray, velocity: np.ndarray) -> tuple[GripperGo
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_grippers_go_exactly_where_they_are_asked(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arms = pair()
@@ -56,7 +56,7 @@ def test_grippers_go_exactly_where_they_are_asked(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_no_limit_is_exceeded_whatever_is_asked(seed: int) -> None:
     """Goals that jump, far outside of what arms reach, through each other."""
     rng = np.random.default_rng(seed)

@@ -29,7 +29,7 @@ def test_load_is_eulers_for_the_shortest_wave_of_the_mesh() -> None:
     assert buckling_strain(finer, MATERIAL, 3.0)[0] == pytest.approx(4.0 * load[0] / 1500.0)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.floats(1.0, 1.2), st.floats(1.0, 1.2))
 def test_what_is_pulled_is_as_without(seed: int, along: float, across: float) -> None:
     x, e = sheet_elements(6, 7, 0.02)
@@ -59,7 +59,7 @@ def test_pushed_strip_bears_no_more_than_its_load(strain: float) -> None:
     assert bearing == pytest.approx(1500.0 * (min(strain, limit) + 0.02 * beyond), rel=1e-9)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_stiffness_is_the_derivative_of_force_in_the_plane(seed: int) -> None:
     """Where every triangle is pulled one way and pushed the other, far past its load."""
@@ -76,7 +76,7 @@ def test_stiffness_is_the_derivative_of_force_in_the_plane(seed: int) -> None:
     assert np.linalg.norm(found - difference) < 1e-5 * np.linalg.norm(difference)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_stiffness_is_symmetric_and_never_gains_energy(seed: int) -> None:
     x, e = sheet_elements(6, 7, 0.02)

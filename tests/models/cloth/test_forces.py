@@ -34,7 +34,7 @@ def test_no_force_at_rest() -> None:
     assert np.abs(force(e, x)).max() < 1e-12
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_force_turns_with_the_garment(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -45,7 +45,7 @@ def test_force_turns_with_the_garment(seed: int) -> None:
     np.testing.assert_allclose(force(e, bent @ turn.T + 0.3), expected, atol=1e-9)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_internal_forces_add_up_to_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -56,7 +56,7 @@ def test_internal_forces_add_up_to_nothing(seed: int) -> None:
     np.testing.assert_allclose(np.cross(bent, f).sum(axis=0), 0.0, atol=1e-10)
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(st.integers(0, 10_000))
 def test_stiffness_is_the_derivative_of_force(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -77,7 +77,7 @@ def test_tension_of_a_pulled_strip_is_stiffness_times_strain() -> None:
     assert tension == pytest.approx(STRETCH * 0.05 * width, rel=1e-6)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_filtered_stiffness_never_gains_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -100,7 +100,7 @@ def assert_optimal(p: LocalProblem, s: LocalSolution) -> None:
 
 
 @given(seed=seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_conditions_of_optimality_hold(seed: int) -> None:
     p = drawn(seed)
     assert_optimal(p, solve_constrained_ddp(p))
@@ -113,7 +113,7 @@ def replace_multipliers(s: LocalSolution) -> LocalSolution:
 
 
 @given(seed=seeds, sweeps=st.sampled_from([0, 1, 2, 20]), inside=st.sampled_from([1, 120]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_it_has_converged_only_where_it_ended_at_an_optimum(
     seed: int, sweeps: int, inside: int
 ) -> None:
@@ -160,7 +160,7 @@ def test_rows_without_room_are_told_and_none_is_left_out() -> None:
 
 
 @given(seed=seeds)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_the_cone_programme_finds_the_same_optimum(seed: int) -> None:
     p = drawn(seed)
     s, (exact, _) = solve_constrained_ddp(p), solve_cone_programme(p)
@@ -184,7 +184,7 @@ def test_without_bounds_it_is_least_squares() -> None:
 
 
 @given(seed=seeds)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_solution_is_its_own_start(seed: int) -> None:
     p = drawn(seed)
     s = solve_constrained_ddp(p)
@@ -196,7 +196,7 @@ def test_a_solution_is_its_own_start(seed: int) -> None:
 
 
 @given(seed=seeds, size=st.sampled_from([1e-3, 1.0, 1e3, 1e6]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_optimum_does_not_depend_on_the_start(seed: int, size: float) -> None:
     p = drawn(seed)
     best = solve_constrained_ddp(p)
@@ -238,7 +238,7 @@ def strict(p: LocalProblem) -> tuple[LocalProblem, LocalSolution]:
 
 
 @given(seed=seeds)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_gains_are_the_derivative_of_the_first_input_by_the_state(seed: int) -> None:
     p, s = strict(drawn(seed))
     assert (s.input_multiplier > 0.0).any() or (s.state_multiplier > 0.0).any()
@@ -325,7 +325,7 @@ sizes = st.tuples(st.integers(1, 8), st.integers(1, 7), st.integers(1, 5))
 
 
 @given(seed=seeds, size=sizes)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_problem_without_any_bound_has_an_optimum(seed: int, size: tuple[int, int, int]) -> None:
     p = unbounded(drawn_of_size(seed, *size))
     assert_optimal(p, solve_constrained_ddp(p))
@@ -333,7 +333,7 @@ def test_a_problem_without_any_bound_has_an_optimum(seed: int, size: tuple[int, 
 
 @given(seed=seeds, size=sizes)
 @example(seed=326, size=(7, 1, 5))  # slacks vanished before a far bound was kept
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_they_hold_whatever_the_numbers_of_steps_states_and_inputs(
     seed: int, size: tuple[int, int, int]
 ) -> None:
@@ -368,21 +368,21 @@ def assert_gains_lead_to_the_optimum(p: LocalProblem, s: LocalSolution, seed: in
 
 
 @given(seed=seeds)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_gains_lead_to_the_optimum_from_where_the_state_is_instead(seed: int) -> None:
     p, s = strict(drawn(seed))
     assert_gains_lead_to_the_optimum(p, s, seed)
 
 
 @given(seed=seeds, size=sizes)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_so_they_do_whatever_the_sizes(seed: int, size: tuple[int, int, int]) -> None:
     p, s = strict(drawn_of_size(seed, *size))
     assert_gains_lead_to_the_optimum(p, s, seed)
 
 
 @given(seed=seeds)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_a_multiplier_is_what_a_wider_bound_saves(seed: int) -> None:
     p, s = strict(drawn(seed))
     warm = s.v, s.state_multiplier, s.input_multiplier
@@ -416,7 +416,7 @@ def test_a_multiplier_is_what_a_wider_bound_saves(seed: int) -> None:
     has_guess=st.booleans(),
     is_warm=st.booleans(),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_whatever_it_ends_with_is_reported_as_it_is(
     seed: int, limits: Settings, has_guess: bool, is_warm: bool
 ) -> None:
@@ -472,7 +472,7 @@ def test_what_has_no_optimum_is_answered_by_standing_still(
 
 
 @given(seed=seeds, price=st.sampled_from([1e-3, 1e-2, 0.1, 1.0]))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_bounds_are_exceeded_that_cost_more_than_their_price(seed: int, price: float) -> None:
     p = replace(drawn(seed), price=price)
     s, (exact, _) = solve_constrained_ddp(p), solve_cone_programme(p, spills=True)

@@ -39,7 +39,9 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
         (loops[0], loops[1]),
         (signs[0], signs[1]),
         HORIZON,
-        Weights(direction=0.02, safety=1e-3, free_force=0.5, passage=2.0),
+        Weights(
+            direction=0.02, speed=0.5, safety=1e-3, free_force=0.5, separation=10.0, passage=2.0
+        ),
         0.15,
         8,
         0.2,
@@ -207,7 +209,7 @@ def entering() -> tuple[GlobalController, dict[str, FloatArray], list[SleeveTarg
         (mesh.loops["left_armhole"], mesh.loops["right_armhole"]),
         (loop_orientation(mesh, "left"), loop_orientation(mesh, "right")),
         len(kept["start"]),
-        Weights(),
+        Weights(speed=0.5, safety=1e-4, separation=10.0),
         0.12,
         3,
         0.44,

@@ -98,7 +98,7 @@ def test_a_target_far_away_is_gone_for_as_fast_as_a_gripper_may() -> None:
 
 
 @given(seed=st.integers(0, 2**31), coupled=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_no_bound_is_exceeded_by_a_start_within_them(seed: int, coupled: bool) -> None:
     rng = np.random.default_rng(seed)
     nominal = still(rng.uniform(0.3, 0.47))

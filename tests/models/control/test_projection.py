@@ -54,7 +54,7 @@ def test_no_point_of_the_sets_is_nearer(planes: int) -> None:
     assert compared > 20
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, 2**32 - 1))
 def test_projection_makes_an_obtuse_angle_with_every_point_of_the_sets(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -18,7 +18,7 @@ ELBOW = np.array([-0.05, 0.38, 1.20])
 SHOULDER = np.array([0.0, 0.18, 1.40])
 
 seeds = st.integers(0, 2**31)
-laws = settings(max_examples=40, deadline=None)
+laws = settings(max_examples=40)
 
 
 def random_arm(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:

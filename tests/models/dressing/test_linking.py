@@ -160,7 +160,7 @@ def test_wavy_loops_count_like_flat_ones(waves: int) -> None:
 random = st.integers(0, 2**31)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=random)
 def test_passages_equal_gauss_linking_with_a_closed_arm(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -179,7 +179,7 @@ def test_passages_equal_gauss_linking_with_a_closed_arm(seed: int) -> None:
     assert arm_linking_number(loop, *ARM) == round(gauss)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=random)
 def test_rigid_motion_changes_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -225,7 +225,7 @@ def _distance(loop: FloatArray, segment: FloatArray) -> float:
     return float(np.min(np.linalg.norm(loop - p - t[:, None] * d, axis=1)))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=random)
 def test_distances_and_volumes_are_those_of_vector_algebra(seed: int) -> None:
     p, q, r, s = np.random.default_rng(seed).normal(size=(4, 3))

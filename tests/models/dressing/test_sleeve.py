@@ -26,7 +26,7 @@ CENTERS: tuple[Center, Center] = ("arc_length", "keypoints")
 
 seeds = st.integers(0, 2**31)
 centers = st.sampled_from(CENTERS)
-laws = settings(max_examples=30, deadline=None)
+laws = settings(max_examples=30)
 
 
 def random_loop(seed: int, nodes: int = 17) -> FloatArray:

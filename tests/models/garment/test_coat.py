@@ -74,7 +74,7 @@ def test_coat_is_sound_and_meets_its_measures_at_every_spacing(name, spacing):
     check_measures(mesh, MODELS[name])
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12, derandomize=True)
 @given(data=st.data())
 def test_any_coat_is_sound_and_meets_its_measures(data):
     def draw(low, high):

@@ -35,7 +35,7 @@ def mesh_or_refusal(path):
     return mesh
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_damaged_lines_are_refused_or_do_no_harm(tmp_path_factory, data):
     lines = list(LINES)
@@ -76,7 +76,7 @@ def test_shifted_node_numbers_are_told(coat, by):
     check_plausible(RawMesh.of("coat", mesh.rest_position, mesh.faces.astype(int)))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, len(JACKET.rest_position) - 1), st.floats(0.4, 50.0), st.integers(0, 2))
 def test_a_node_that_is_thrown_off_is_named(node, far, axis):
     position = JACKET.rest_position.copy()

@@ -47,7 +47,7 @@ def test_a_sheet_that_is_rolled_up_keeps_them() -> None:
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_no_two_means_are_further_apart_than_their_cheapest_pairing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(7, 3)), rng.normal(size=(5, 3)) + 1.0

@@ -33,7 +33,7 @@ def quadrants():
     return (middle[:, 1] > 0.01) + 2 * (middle[:, 0] > 0.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(1e-7, 5e-3), st.integers(0, 2**32 - 1))
 def test_seams_within_the_distance_are_sewn_and_nothing_else(gap, seed):
     mesh, origin = in_panels(quadrants(), gap, seed)
@@ -49,7 +49,7 @@ def test_seams_within_the_distance_are_sewn_and_nothing_else(gap, seed):
     assert moved.max() <= 2 * gap
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.0, 0.02))
 def test_a_sound_mesh_stays_as_it_is(distance):
     mesh = RawMesh.of("coat", X, FACES)
@@ -68,7 +68,7 @@ def test_a_narrow_ribbon_is_not_sewn_to_itself():
     assert np.array_equal(seams_sewn(mesh, 0.008).faces, faces)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_equal_nodes_are_merged_in_any_order(seed):
     soup = X[FACES].reshape(-1, 3)

@@ -26,7 +26,7 @@ def with_fan(corners):
     return x, np.vstack([faces, np.array(fan, dtype=faces.dtype)])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.012, 0.2), st.integers(0, 8))
 def test_refined_mesh_is_the_same_surface_with_short_edges(longest, corners):
     x, faces = with_fan(corners) if corners >= 3 else (JACKET.rest_position, JACKET.faces)
@@ -67,7 +67,7 @@ def test_mesh_that_would_become_too_large_is_refused():
         refine(JACKET.rest_position, JACKET.faces, LOOPS, 0.002, most_nodes=5000)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(0.02, 0.08))
 def test_spacing_is_met_beside_a_long_fan(spacing):
     x, faces = with_fan(8)

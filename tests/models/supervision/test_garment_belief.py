@@ -34,7 +34,7 @@ PERIOD = 0.02
 COUNT = len(HUNG)
 
 # a mistake is found in each draw, or in none
-few = settings(max_examples=25, deadline=None)
+few = settings(max_examples=25)
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -173,7 +173,7 @@ def carried(count: int, velocity: np.ndarray, seed: int | None = None) -> list[M
     return messages
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seeds, seeds, st.floats(0.0, 0.9))
 def test_motion_within_the_bounds_is_believed(seed: int, way: int, share: float) -> None:
     velocity = share * BOUNDS.speed * rotation(way)[0]

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.supervision.garment_shape import ShapeBounds, impossible_shape
@@ -42,7 +42,6 @@ def test_greatest_mean_edge_is_that_of_a_stretched_garment_with_noise(noise: flo
     assert b.mean_edge[1] ** 2 == pytest.approx(float(np.mean(squares)), rel=0.01)
 
 
-@settings(deadline=None)
 @given(st.permutations(range(0, len(EDGES), 9)), st.floats(1.05, 3.0))
 def test_the_edge_that_is_told_is_the_one_most_beyond_its_length(
     order: list[int], factor: float

@@ -35,7 +35,7 @@ PERIOD = 0.02
 share = st.floats(0.0, 1.0)
 angles = st.tuples(share, share, share, share).map(lambda s: LOW + np.array(s) * (HIGH - LOW))
 # a mistake is found in each draw, or in none
-few = settings(max_examples=40, deadline=None)
+few = settings(max_examples=40)
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -159,7 +159,7 @@ def test_an_elbow_that_bends_backward_is_told() -> None:
     assert not low <= angle <= high
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds, st.sampled_from([1.0, 0.5, 0.1, 0.02]), st.floats(-0.9, 0.9))
 def test_motion_within_the_bounds_is_believed(seed: int, speed_share: float, way: float) -> None:
     """Each point moves by no more than the bound, whatever it is doing, with noise."""
@@ -213,7 +213,7 @@ def judged(points: list[np.ndarray], bounds: PersonBounds = BOUNDS) -> list[Faul
     return faults
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seeds)
 def test_a_tracker_that_freezes_is_told_and_one_without_noise_is_not(seed: int) -> None:
     rng = np.random.default_rng(seed)

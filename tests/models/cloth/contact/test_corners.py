@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.cloth.contact.corners import held_off_corners
@@ -34,7 +34,6 @@ def limbs(angle: float) -> Obstacles:
 
 
 @given(st.floats(0.5, 2.6), st.floats(-0.03, 0.03), st.floats(-0.03, 0.03))
-@settings(deadline=None)
 def test_the_way_out_of_a_hollow_is_the_shortest(angle: float, y: float, z: float) -> None:
     bodies, x = walls(angle), np.array([[0.3, y, z]])
     near = held_off_corners(find_proximity(x, bodies, MARGIN), x, bodies, MARGIN)
@@ -57,7 +56,6 @@ def test_the_way_out_of_a_hollow_is_the_shortest(angle: float, y: float, z: floa
 
 
 @given(st.integers(0, 10_000))
-@settings(deadline=None)
 def test_the_nearest_other_body_is_the_second_of_all(seed: int) -> None:
     rng = np.random.default_rng(seed)
     bodies = Obstacles.resting(*rng.normal(size=(2, 4, 3)), rng.uniform(0.01, 0.5, 4))

@@ -10,7 +10,7 @@ from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 
 
 @given(st.integers(0, 10_000), st.floats(0.0, 0.5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
     rng = np.random.default_rng(seed)
     x = rng.uniform(-0.3, 0.3, (20, 3)) + rng.uniform(-1.5, 1.5, 3)
@@ -27,7 +27,6 @@ def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
 
 
 @given(st.integers(0, 10_000), st.integers(1, 9))
-@settings(deadline=None)
 def test_nearest_capsule_is_the_nearest_of_all(seed, count):
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(2, count, 3))

@@ -29,7 +29,7 @@ def capsules(*ends: tuple[FloatArray, FloatArray], radius: float) -> Obstacles:
     return Obstacles.resting(a, b, np.full(len(ends), radius))
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(st.floats(60.0, 160.0), st.floats(2.0, 15.0), st.integers(0, 1000))
 def test_cloth_pressed_into_the_hollow_of_two_limbs_stays_outside(
     angle: float, pull: float, seed: int

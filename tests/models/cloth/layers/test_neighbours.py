@@ -111,7 +111,7 @@ def test_every_pair_that_may_come_near_is_found_once(rings: int) -> None:
     st.floats(1e-5, 3e-3),
     st.floats(0.0, 0.3),
 )
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_what_was_found_before_makes_no_difference(seed: int, size: float, turn: float) -> None:
     x, e = CRUMPLED
     topology = make_topology(e, 1)

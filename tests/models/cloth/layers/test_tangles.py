@@ -56,7 +56,7 @@ def line_length(x: FloatArray, e: Elements) -> float:
     return float(sum(np.linalg.norm(p - q) for p, q in at.values()))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6))
 def test_edges_go_where_the_line_along_which_layers_meet_becomes_shorter(seed: int) -> None:
     """By as much as it does when one layer is moved as a whole."""
@@ -165,7 +165,7 @@ def test_who_is_astray_is_cut_off_by_what_pierces() -> None:
     assert not tangles.at(x, np.zeros(len(x), dtype=np.bool_)).passing.astray.any()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 10**6))
 def test_what_is_led_back_is_not_thrown(seed: int) -> None:
     """With nodes held anywhere in the tangle; nothing moves at first, and nothing falls."""

@@ -131,7 +131,7 @@ def test_too_many_triangles_are_refused_before_they_are_read():
             reader(data, "coat", 700)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_damaged_bytes_are_refused_or_read(data):
     reader, whole = data.draw(

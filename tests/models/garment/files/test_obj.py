@@ -84,7 +84,7 @@ def dialects(draw):
     return ENCODINGS[encoding] + text.encode(encoding)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(dialects())
 def test_every_dialect_reads_to_the_same_mesh(data):
     mesh = read(data)

@@ -18,7 +18,7 @@ def star(radii, tilt):
     return flat @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]).T
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(0.2, 1.0), min_size=3, max_size=24), st.floats(-1.5, 1.5))
 def test_triangles_cover_a_polygon_once_and_face_its_way(radii, tilt):
     x = star(np.array(radii), tilt)

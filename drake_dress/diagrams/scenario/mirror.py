@@ -1,0 +1,101 @@
+"""Groups of a scenario that are the settings of a model, without a second list of them.
+
+A model's settings are a frozen dataclass; Drake's YAML loader fills plain ones, whose lists are
+lists. A mirror is such a dataclass with the fields and the defaults of the model's, so that each
+default has one home, the model.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING, Any, TypeVar
+
+Model = TypeVar("Model")
+
+
+class Mirror:
+    """Base of the classes that `mirror_of` fills with fields."""
+
+    MODEL: typing.ClassVar[type]
+
+    if TYPE_CHECKING:
+        __dataclass_fields__: typing.ClassVar[dict[str, dataclasses.Field[Any]]]
+
+        def __init__(self, **values: Any) -> None: ...
+        def __getattr__(self, name: str) -> Any: ...
+
+
+def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirror]], type[Any]]:
+    """Returns a decorator that gives a class the fields of a model's settings.
+
+    Fields of the model that are settings themselves, or tuples of them, need a mirror with the
+    model as its `MODEL` beforehand.
+
+    Args:
+        model: frozen dataclass, all of whose fields have defaults.
+        without: its fields that the scenario has elsewhere.
+    """
+
+    def decorate(cls: type[Mirror]) -> type[Any]:
+        hints = typing.get_type_hints(model)
+        entries = []
+        for entry in dataclasses.fields(model):
+            if entry.name in without:
+                continue
+            default = getattr(model(), entry.name)
+            entries.append((entry.name, _plain_type(hints[entry.name]), _field(default)))
+        namespace = {"__doc__": cls.__doc__, "__module__": cls.__module__, "MODEL": model}
+        made = dataclasses.make_dataclass(
+            cls.__name__, entries, bases=(Mirror,), namespace=namespace
+        )
+        _MIRRORS[model] = made
+        return made
+
+    return decorate
+
+
+def model_of(values: Mirror, **elsewhere: Any) -> Any:
+    """Returns the model's settings that a group of a scenario says.
+
+    Args:
+        values: of the group.
+        elsewhere: fields of the model that the group leaves out.
+    """
+    given = {e.name: _frozen(getattr(values, e.name)) for e in dataclasses.fields(values)}
+    return values.MODEL(**given, **elsewhere)
+
+
+# Mirrors by the model's class.
+_MIRRORS: dict[type, type[Any]] = {}
+
+
+def _plain_type(hint: Any) -> Any:
+    if hint in _MIRRORS:
+        return _MIRRORS[hint]
+    if typing.get_origin(hint) is tuple:
+        return list[_plain_type(typing.get_args(hint)[0])]  # type: ignore[misc]
+    return hint
+
+
+def _field(default: Any) -> Any:
+    """Returns a dataclass's field that begins with a plain copy of a model's value."""
+    if isinstance(default, tuple) or type(default) in _MIRRORS:
+        return dataclasses.field(default_factory=lambda: _plain(default))
+    return dataclasses.field(default=default)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    mirror = _MIRRORS.get(type(value))
+    if mirror is None:
+        return value
+    return mirror(**{e.name: _plain(getattr(value, e.name)) for e in dataclasses.fields(mirror)})
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_frozen(item) for item in value)
+    return model_of(value) if isinstance(value, Mirror) else value

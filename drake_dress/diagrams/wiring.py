@@ -1,0 +1,41 @@
+"""A diagram in the making around a station, whose ports have names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydrake.systems.framework import DiagramBuilder
+
+from drake_dress.diagrams.station import Station
+
+
+class Wiring:
+    """What builders of diagrams share: systems by name, ports by name.
+
+    Attributes:
+        builder: of the diagram.
+        of: the station as it was made.
+        station: its system in the diagram.
+    """
+
+    def __init__(self, station: Station) -> None:
+        self.builder = DiagramBuilder()
+        self.of = station
+        self.station = self.builder.AddNamedSystem("station", station.diagram)
+
+    @property
+    def sees_truth(self) -> bool:
+        """Whether the true garment is known, as in simulation."""
+        return bool(self.station.HasOutputPort("cheat_garment_position"))
+
+    def true(self, name: str) -> str:
+        """Returns the port of the true value, or of its estimate where that is all there is."""
+        return f"cheat_{name}" if self.sees_truth else f"estimate.{name}"
+
+    def add(self, name: str, system: Any) -> Any:
+        """Adds a system and returns it."""
+        return self.builder.AddNamedSystem(name, system)
+
+    def connect(self, source: Any, output: str, target: Any, port: str) -> None:
+        """Connects an output of one system to an input of another."""
+        self.builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))

@@ -1,0 +1,141 @@
+"""A scenario that says nothing has the defaults of the models that it is read into."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drake_dress.diagrams import build
+from drake_dress.diagrams.scenario import Scenario, schema
+from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of, model_of
+from drake_dress.models.control.task_parameters import TaskParameters
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+
+# What a default of the library and one of a scenario are for differs in these.
+_MEANT = {
+    # cloth of a scenario is a fabric; of the library, what is given
+    "Material.damping",
+    "Material.stretch_stiffness",
+    # a pose is the scenario's; in the library an arm hangs
+    "ArmPose.abduction",
+    "ArmPose.extension",
+    "ArmPose.elbow_flexion",
+    # what `scenario_of_everything` says
+    "Behaviour.kind",
+    "Behaviour.motions",
+    "Behaviour.tremor",
+    "Turn.start",
+    "Turn.angle",
+    "Withdraw.start",
+    "Wave.start",
+    "StationParameters.placement",
+}
+
+
+def differing(value: Any, seen: set[int]) -> Iterator[tuple[str, Any, Any]]:
+    """Yields fields below `value` that are not their class's default: name, default, value."""
+    if id(value) in seen or isinstance(value, str | bytes | np.ndarray):
+        return
+    seen.add(id(value))
+    if isinstance(value, dict):
+        value = tuple(value.values())
+    if isinstance(value, tuple | list):
+        for item in value:
+            yield from differing(item, seen)
+        return
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return
+    for entry in dataclasses.fields(value):
+        own = getattr(value, entry.name, None)
+        default = entry.default
+        if entry.default_factory is not dataclasses.MISSING:
+            default = entry.default_factory()
+        if default is dataclasses.MISSING:
+            yield from differing(own, seen)
+        elif not same(own, default):
+            if not dataclasses.is_dataclass(default):
+                yield f"{type(value).__name__}.{entry.name}", default, own
+            yield from differing(own, seen)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Returns whether two values are alike, numbers but for what a division rounds."""
+    if isinstance(a, float) and isinstance(b, float):
+        return a == pytest.approx(b, rel=1e-12)
+    return np.array_equal(np.asarray(a, object), np.asarray(b, object))
+
+
+def scenario_of_everything() -> Scenario:
+    """Returns a scenario of defaults that has arms and a person who acts."""
+    scenario = Scenario()
+    scenario.station.arms.model = "panda"
+    scenario.controller.method = "full"
+    scenario.person.behaviour.kind = "active"
+    moves = (schema.Reach(), schema.Turn(), schema.Withdraw(), schema.Wave())
+    scenario.person.behaviour.motions = [
+        schema.Motion(**{type(move).__name__.lower(): move}) for move in moves
+    ]
+    scenario.person.behaviour.tremor = schema.Tremor()
+    return scenario
+
+
+def test_scenario_and_library_have_the_same_defaults() -> None:
+    scenario = scenario_of_everything()
+    mesh = make_coat(CoatParameters(), 0.06)
+    station = build.station_parameters(scenario, mesh)
+    policy = build.controller_policy(scenario, mesh, build.described_person(station))
+    local = build.local_setup(scenario, policy)
+    assert local is not None
+    parts = [
+        station,
+        policy.parameters,
+        local.controller.parameters,
+        build.safety_limits(scenario),
+        build.hardware_parameters(scenario, mesh),
+        build.rates(scenario),
+    ]
+    found = {name: (default, own) for name, default, own in differing(parts, set())}
+    assert {name: pair for name, pair in found.items() if name not in _MEANT} == {}
+    assert set(found) == _MEANT
+
+
+def test_every_setting_of_the_tasks_reaches_the_policy() -> None:
+    """Each number of `controller.tasks` and `controller.stages`, moved, is moved in the policy."""
+    mesh = make_coat(CoatParameters(), 0.06)
+    person = build.described_person(build.station_parameters(Scenario(), mesh))
+    plain = build.controller_policy(Scenario(), mesh, person).parameters.tasks
+    for group in ("tasks", "stages"):
+        for entry in dataclasses.fields(getattr(Scenario().controller, group)):
+            scenario = Scenario()
+            values = getattr(scenario.controller, group)
+            old = getattr(values, entry.name)
+            if not isinstance(old, int | float):
+                continue
+            setattr(values, entry.name, old + 1)
+            moved = build.controller_policy(scenario, mesh, person).parameters.tasks
+            here, there = (plain, moved) if group == "tasks" else (plain.stages, moved.stages)
+            assert getattr(there, entry.name) == getattr(here, entry.name) + 1, entry.name
+            assert dataclasses.replace(here, **{entry.name: old + 1}) == there
+
+
+def test_a_mirror_has_what_its_model_has_and_leads_back_to_it() -> None:
+    @mirror_of(TaskParameters, without=("stages",))
+    class Tasks(Mirror):
+        """All tasks, with their approaches."""
+
+    model = TaskParameters()
+    values = Tasks()
+    assert [a.tilt for a in values.approaches] == [a.tilt for a in model.approaches]
+    assert model_of(values) == model
+    values.approaches[2].tilt = 0.7
+    values.flat = 0.6
+    changed = model_of(values)
+    assert changed.approaches[2].tilt == 0.7 and changed.flat == 0.6
+    # what a mirror begins with is its own
+    assert Tasks().approaches[2].tilt == model.approaches[2].tilt
+    with pytest.raises(TypeError, match="speed"):
+        Tasks(speed=1.0)
