@@ -110,9 +110,9 @@ ARM_STATUS = (
 # Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
 _SETTLING_TIME = 1.6
 _SETTLING_DAMPING = 0.03
-# Beyond this a node's motion is none of a garment's, m/s: a hem that swings does 1.7, a fall from a
-# table 4.
-_BROKEN_SPEED = 20.0
+# Beyond this a node's motion is none of a dressing's, m/s: a hem that swings does 1.7. One that has
+# broken down is at 8 m/s a tenth of a second later, and then takes minutes for each further one.
+_BROKEN_SPEED = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
