@@ -16,7 +16,7 @@ FIDELITIES: dict[str, dict[str, float]] = {
         "body_time_step": 0.004,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
-        "tolerance": 5e-3,
+        "tolerance": 1e-2,
     },
     "standard": {
         "spacing": 0.025,
@@ -24,7 +24,7 @@ FIDELITIES: dict[str, dict[str, float]] = {
         "body_time_step": 0.010,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
-        "tolerance": 5e-2,
+        "tolerance": 0.1,
     },
     "quick": {
         "spacing": 0.03,
@@ -32,7 +32,7 @@ FIDELITIES: dict[str, dict[str, float]] = {
         "body_time_step": 0.010,
         "implicitness": 0.7,
         "buckling_wavelength": 3.0,
-        "tolerance": 5e-2,
+        "tolerance": 0.1,
     },
 }
 

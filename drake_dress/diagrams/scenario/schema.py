@@ -223,7 +223,7 @@ class Plant:
     # ones gives way. 0: never
     buckling_wavelength: float = _STANDARD["buckling_wavelength"]
     iterations: int = 40  # of the implicit integrator's linear solver, at most
-    tolerance: float = _STANDARD["tolerance"]  # relative residual at which it stops
+    tolerance: float = _STANDARD["tolerance"]  # residual by momentum at which it stops
     self_collision: bool = True  # layers of the garment do not pass through each other
     # of a gripper's arm and grasp where a person pushes against what it holds, N/m: an arm under
     # impedance control, by the translational stiffness that libfranka's examples set

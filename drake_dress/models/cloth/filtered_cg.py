@@ -30,6 +30,9 @@ _ACROSS = 0.3
 # Of the residual at the start, what rounding leaves over. Where all but nothing drives the free
 # part by itself, a tolerance of that is beyond it, and what iterations go on with is noise.
 _ROUNDING = 1e-12
+# Nor is more asked for than this share of the tolerance leaves of that residual: where nothing
+# moves and nothing weighs, what is left over has nothing else to be held against.
+_OF_THE_START = 1e-2
 
 
 class SystemMatrix:
@@ -111,10 +114,12 @@ class SystemMatrix:
         resistance: FloatArray | None = None,
         across: tuple[FloatArray, FloatArray] | None = None,
         applied: FloatArray | None = None,
+        against: FloatArray | None = None,
     ) -> tuple[int, float]:
-        """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π rhs‖ in the preconditioner's norm.
+        """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π against‖ in the factor's norm.
 
-        Or until ‖r‖ is what rounding leaves of it; the tolerance counts as met then, too.
+        Or until ‖r‖ is what rounding leaves of it, or a hundredth of the tolerance of where it
+        started; the tolerance counts as met then, too. `against` (n,3) is `rhs` by default.
 
         `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
         stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
@@ -134,6 +139,8 @@ class SystemMatrix:
             across = np.zeros((0, 3)), np.zeros(0)
         if applied is None:
             applied = np.empty((0, 3))
+        if against is None:
+            against = rhs
         return _filtered_cg(
             self._operator(block),
             (f.blocks, f.pattern.permutation),
@@ -142,6 +149,7 @@ class SystemMatrix:
             mode,
             normal,
             rhs,
+            against,
             z,
             tolerance,
             max_iterations,
@@ -276,6 +284,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     mode,
     normal,
     rhs,
+    against,
     z,
     tolerance,
     max_iterations,
@@ -302,7 +311,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
         r = resistance[i] if damped.shape[0] > 0 else 0.0
         give[i] = _ACROSS * light[i] / (1.0 + r * light[i])
 
-    residual = _rows(rhs)
+    residual = _rows(against)
     project(residual, mode, normal)
     _precondition(preconditioner, residual, preconditioned)
     floor = max(dot(residual, preconditioned), 1e-300)
@@ -318,7 +327,8 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     left = dot(residual, preconditioned)
     rho = left + _go_across(facing, give, mode, normal, residual, preconditioned)
     direction[:] = preconditioned
-    goal = max(tolerance * tolerance * floor, _ROUNDING * _ROUNDING * left)
+    least = max(_OF_THE_START * tolerance, _ROUNDING)
+    goal = max(tolerance * tolerance * floor, least * least * left)
     iterations = 0
     while iterations < max_iterations and left > goal:
         _apply(operator, direction, product)

@@ -36,7 +36,7 @@ from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import bending_force, internal_force
 from drake_dress.models.cloth.implicit_contact import ImplicitContact
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
-from drake_dress.models.cloth.layers.bonds import NO_BONDS
+from drake_dress.models.cloth.layers.bonds import NO_BONDS, ActingBonds
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     Csr,
@@ -56,6 +56,8 @@ _FIRM = 0.03
 _COARSER = 6.0
 # Solves added, at most, for nodes that would end inside a body.
 _LANDING_PASSES = 3
+# Solves added, at most, while pairs of layers pull.
+_PARTING_PASSES = 3
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
 
@@ -123,7 +125,8 @@ class ImplicitCloth:
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        tolerance: relative residual at which conjugate gradients stop.
+        tolerance: residual at which conjugate gradients stop, relative to the momentum with what
+            gravity adds to it in a step.
         max_iterations: of conjugate gradients, per pass.
         max_passes: of the active-set iteration, per step; what is left over is mended in the next.
         sample_elements: contact at edge midpoints and face centroids too.
@@ -222,12 +225,10 @@ class ImplicitCloth:
         if influences.force is not None:
             force += influences.force
         driven = h * force
-        bonds = influences.bonds or NO_BONDS
-        self._system.set_bonds(bonds)
-        if len(bonds.node):
-            driven += bonds.drive(len(x))
-        across = normal_response(e, block, self._scale, self._inertia + self._bending)
-        bonds.stiffen(*across)
+        weighed = v + h * self.gravity
+        bonds = ActingBonds(influences.bonds or NO_BONDS, len(x), h)
+        self._system.set_bonds(bonds.now)
+        facing, light = normal_response(e, block, self._scale, self._inertia + self._bending)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
             near = nothing_near(len(x))
@@ -248,13 +249,15 @@ class ImplicitCloth:
         mode = contact.mode
         inertia = self._bound_inertia(mode)
         rhs = inertia[:, None] * v + driven
+        pushed = rhs + bonds.drive
 
-        velocity = self._start(v, held_velocity, mode, near.normal, rhs, block, guess)
+        velocity = self._start(v, held_velocity, mode, near.normal, pushed, block, guess)
         total, residual, passes = 0, 0.0, 0
         left, landing = self._most_cone_passes, _LANDING_PASSES
+        apart = _PARTING_PASSES
         factor, refactored, memory = self._renewed_factor(state.solver[0], mode, contact.resistance)
         impulse = np.empty_like(velocity)
-        max_passes = self._max_passes if contact.is_near else 1
+        max_passes = self._max_passes if contact.is_near or len(bonds) else 1
         while True:
             contact.prescribe(velocity)
             last = passes + 1 >= max_passes
@@ -264,20 +267,28 @@ class ImplicitCloth:
                 block,
                 mode,
                 near.normal,
-                rhs + contact.drive(),
+                pushed + contact.drive(),
                 velocity,
                 tolerance,
                 self._max_iterations,
                 contact.resistance if contact.resistance.any() else None,
                 # alone, P keeps the momentum of what is free, however soon iterations end
-                across if mode.any() else None,
+                (facing, bonds.now.stiffened(facing, light)) if mode.any() else None,
                 impulse,
+                inertia[:, None] * weighed,
             )
             total += iterations
-            impulse -= rhs
+            impulse -= pushed
             passes += 1
             settled = last
+            # Layers push and do not pull.
+            glued = (not last or apart > 0) and bonds.update(velocity)
+            self._system.set_bonds(bonds.now)
+            pushed = rhs + bonds.drive
             if last:
+                if glued:
+                    apart -= 1
+                    continue
                 # Sticking may not hold more than friction can: what does slides after all.
                 if left > 0 and contact.slip_out_of_cone(velocity, impulse):
                     left -= 1
@@ -285,7 +296,7 @@ class ImplicitCloth:
             else:
                 changed = contact.update(velocity, impulse)
                 few = changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
-                settled = bool(few and residual <= self._tolerance)
+                settled = bool(few and not glued and residual <= self._tolerance)
             if settled:
                 # Nothing may end up inside the person because it was not seen to land.
                 if (
@@ -297,10 +308,11 @@ class ImplicitCloth:
                 landing -= 1
             inertia = self._bound_inertia(mode)
             rhs = inertia[:, None] * v + driven
+            pushed = rhs + bonds.drive
         end = x + h * velocity
         if not np.isfinite(end).all():
             explain_not_finite(x, v, held_velocity, self.held)
-        if residual > 0.1:
+        if residual > max(0.1, self._tolerance):
             memory[0] = -1
         # θ where the step was solved as free, 1 where it was bound
         share = (self.mass / inertia)[:, None]

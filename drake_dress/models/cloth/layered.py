@@ -151,19 +151,19 @@ class LayeredCloth:
         return replace(after, x=x, v=v, tangled=tangled.astype(np.int32))
 
     def _bonds(self, state: ClothState, passing: Passing | None) -> Bonds:
-        """Returns the pairs that would come closer than layers keep by themselves."""
+        """Returns the pairs that may come closer than layers keep."""
         h, thickness = self.time_step, self._layers.thickness
         pairs = self._layers.pairs(state.x, h * state.v, thickness).without(passing)
         rate = np.einsum("pm,pmk,pk->p", pairs.weights, state.v[pairs.node], pairs.direction)
-        near = pairs.distance + h * np.minimum(rate, 0.0) < thickness
-        lacking = thickness - pairs.distance[near]
+        lacking = thickness - pairs.distance
         # what is closer parts slowly, what is farther may come as near as layers keep
         share = np.where(lacking > 0.0, _RECOVERY, 1.0)
         return Bonds(
-            np.ascontiguousarray(pairs.node[near]),
-            pairs.weights[near][:, :, None] * pairs.direction[near][:, None, :],
-            np.full(np.count_nonzero(near), self._resistance),
+            pairs.node,
+            pairs.weights[:, :, None] * pairs.direction[:, None, :],
+            np.full(len(rate), self._resistance),
             share * lacking / h,
+            lacking > h * np.minimum(rate, 0.0),
         )
 
 

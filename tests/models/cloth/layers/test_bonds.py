@@ -1,6 +1,9 @@
 """Pairs of layers that resist approach within a step."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
@@ -24,7 +27,8 @@ def some_bonds(rng: np.random.Generator, nodes: int, count: int) -> Bonds:
     direction = rng.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     row = weights[:, :, None] * direction[:, None, :]
-    return Bonds(node, row, rng.uniform(0.1, 1.0, count), rng.normal(size=count))
+    closing = rng.uniform(size=count) < 0.5
+    return Bonds(node, row, rng.uniform(0.1, 1.0, count), rng.normal(size=count), closing)
 
 
 def test_product_and_drive_are_those_of_the_rows() -> None:
@@ -45,34 +49,83 @@ def test_product_and_drive_are_those_of_the_rows() -> None:
     assert not NO_BONDS.drive(30).any()
 
 
-def test_a_bond_takes_approach_and_no_momentum() -> None:
+def flying_sheet(rng: np.random.Generator) -> tuple[ImplicitCloth, ClothState]:
     x, e = sheet_elements(6, 6, 0.02)
-    rng = np.random.default_rng(1)
     cloth = ImplicitCloth(
         e, Material(), 0.01, NO_NODES, np.zeros(3), tolerance=1e-8, max_iterations=300
     )
-    v = 0.1 * rng.normal(size=x.shape)
-    state = ClothState(
-        x,
-        v,
-        np.zeros(36, dtype=np.int32),
-        np.zeros_like(x),
-        np.full(36, -1, dtype=np.int32),
-    )
-    up = np.array([[0.0, 0.0, 1.0]])
+    state = replace(ClothState.at_rest(x), v=0.1 * rng.normal(size=x.shape))
+    return cloth, state
+
+
+def one_bond(rate: float) -> Bonds:
     weights = np.array([[1.0, -1.0, 0.0, 0.0]])
-    row = weights[:, :, None] * up[:, None, :]
+    row = weights[:, :, None] * np.array([[[0.0, 0.0, 1.0]]])
     node = np.array([[3, 32, 10, 20]], dtype=np.int32)
-    ends = []
-    for resistance in (0.0, 1e3):
-        bonds = Bonds(node, row, np.array([resistance]), np.array([0.02]))
-        after, _ = cloth.step(state, Obstacles.none(), NOTHING, Influences(bonds=bonds))
-        ends.append(after.v)
-    free, bound = ends
-    assert abs(bound[3, 2] - bound[32, 2] - 0.02) < 1e-4
-    assert abs(free[3, 2] - free[32, 2] - 0.02) > 1e-2
-    momentum = cloth.mass @ v
-    np.testing.assert_allclose(cloth.mass @ bound, momentum, atol=1e-9)
+    return Bonds(node, row, np.array([1e3]), np.array([rate]), np.array([True]))
+
+
+def test_a_bond_takes_approach_and_no_momentum() -> None:
+    cloth, state = flying_sheet(np.random.default_rng(1))
+    free, _ = cloth.step(state, Obstacles.none(), NOTHING)
+    parting = free.v[3, 2] - free.v[32, 2]
+    bonds = one_bond(parting + 0.02)
+    bound, _ = cloth.step(state, Obstacles.none(), NOTHING, Influences(bonds=bonds))
+    assert abs(bound.v[3, 2] - bound.v[32, 2] - parting - 0.02) < 1e-4
+    np.testing.assert_allclose(cloth.mass @ bound.v, cloth.mass @ state.v, atol=1e-9)
+
+
+def test_what_parts_by_itself_is_not_held_back() -> None:
+    cloth, state = flying_sheet(np.random.default_rng(1))
+    free, _ = cloth.step(state, Obstacles.none(), NOTHING)
+    bonds = one_bond(free.v[3, 2] - free.v[32, 2] - 0.02)
+    after, _ = cloth.step(state, Obstacles.none(), NOTHING, Influences(bonds=bonds))
+    np.testing.assert_allclose(after.v, free.v, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_layers_push_and_do_not_pull(seed: int) -> None:
+    """Signorini's conditions of many pairs at once, whichever of them resisted at first."""
+    rng = np.random.default_rng(seed)
+    cloth, state = flying_sheet(rng)
+    bonds = some_bonds(rng, 36, 12)
+    bonds = replace(bonds, resistance=1e3 * bonds.resistance)
+    for closing in (bonds.closing, np.ones(12, dtype=np.bool_), np.zeros(12, dtype=np.bool_)):
+        given = Influences(bonds=replace(bonds, closing=closing))
+        after, _ = cloth.step(state, Obstacles.none(), NOTHING, given)
+        lacking = bonds.lacking(after.v)
+        assert cloth.time_step * lacking.max() < 1e-3
+        assert np.count_nonzero(np.abs(lacking) < 1e-3) > 1
+        assert np.count_nonzero(lacking < -1e-2) > 1
+        np.testing.assert_allclose(cloth.mass @ after.v, cloth.mass @ state.v, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_wrung_and_pushed_together_comes_to_rest(seed: int) -> None:
+    """Hundreds of pairs in one crumple. While pairs could pull, it flew apart, at 2 km/s."""
+    rng = np.random.default_rng(seed)
+    x, e = sheet_elements(14, 14, 0.02)
+    x = x + np.array([0.0, 0.0, 2e-3]) * rng.normal(size=x.shape)
+    sides = [np.flatnonzero(x[:, 0] < 1e-6), np.flatnonzero(x[:, 0] > 0.26 - 1e-6)]
+    held = np.concatenate(sides).astype(np.int32)
+    inner = ImplicitCloth(
+        e, Material(), 0.01, held, tolerance=0.1, implicitness=0.7, buckling_wavelength=3.0
+    )
+    cloth, state = LayeredCloth(inner), ClothState.at_rest(x)
+    right = slice(len(sides[0]), None)
+    wring = np.array([np.pi, 0.0, 0.0])  # rad/s
+    speeds = []
+    for k in range(200):
+        velocity = np.zeros((len(held), 3))
+        if k < 100:
+            arm = state.x[held[right]] - state.x[held[right]].mean(axis=0)
+            velocity[right] = np.cross(wring, arm) - np.array([0.24, 0.0, 0.0])
+        state, _ = cloth.step(state, Obstacles.none(), velocity)
+        speeds.append(np.linalg.norm(state.v, axis=1).max())
+    assert max(speeds) < 2.5
+    assert max(speeds[180:]) < 0.4
+    assert not state.tangled.any()
+    assert len(piercing_edges(state.x, e, rings=1)) == 0
 
 
 def test_a_resting_sheet_leaves_little_to_correct() -> None:
