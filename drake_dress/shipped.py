@@ -22,8 +22,7 @@ def shipped_scenario(name: str) -> Path:
 
 def shipped_scenarios() -> dict[str, str]:
     """Returns the names of all scenarios, each with the first sentence of its comment."""
-    folder = next((f for f in _FOLDERS if f.is_dir()), _FOLDERS[0])
-    return {file.stem: _summary(file) for file in sorted(folder.glob("*.yaml"))}
+    return {file.stem: _summary(file) for file in _files()}
 
 
 def scenario_file(given: str) -> Path:
@@ -37,12 +36,17 @@ def scenario_file(given: str) -> Path:
     path = Path(given)
     if os.path.exists(path) or path.suffix or path.name != given:
         return path
-    names = list(shipped_scenarios())
+    names = [file.stem for file in _files()]
     if given in names:
         return shipped_scenario(given)
     near = difflib.get_close_matches(given, names, n=1)
     expected = f"did you mean {near[0]}?" if near else f"expected a file or {', '.join(names)}"
     raise UserError(given, "", f"no file and no scenario that ships, {expected}")
+
+
+def _files() -> list[Path]:
+    folder = next((f for f in _FOLDERS if f.is_dir()), _FOLDERS[0])
+    return sorted(folder.glob("*.yaml"))
 
 
 def _summary(file: Path) -> str:

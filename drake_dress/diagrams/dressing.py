@@ -11,7 +11,7 @@ from pydrake.systems.framework import Diagram
 from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.arms import ArmSetup
-from drake_dress.diagrams.station import Station
+from drake_dress.diagrams.station import MOTION, Station
 from drake_dress.diagrams.wiring import Wiring
 from drake_dress.models.control.local_control import LocalController, LocalState
 from drake_dress.models.control.local_problem import LocalProblem
@@ -29,8 +29,6 @@ from drake_dress.systems.local_controller import LocalCompensation
 from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.safety_governor import SafetyGovernor
-
-_MOTION = ("position", "velocity")
 
 
 @dataclass(frozen=True)
@@ -169,7 +167,7 @@ def make_dressing(
         ),
     )
     w.connect(w.station, "estimate.joint_position", predicted, "joint_position")
-    for quantity in _MOTION:
+    for quantity in MOTION:
         w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
     w.connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
     if local is not None:
@@ -246,7 +244,7 @@ def _add_arms(
     for side in SIDES:
         w.connect(w.station, f"{side}_arm.position_measured", arms, f"{side}_arm_position")
         w.connect(w.station, f"{side}_arm.stopped", arms, f"{side}_arm_stopped")
-        for quantity in _MOTION:
+        for quantity in MOTION:
             w.connect(governor, f"{side}_{quantity}_command", arms, f"{side}_{quantity}_command")
             command = f"{side}_arm.{quantity}"
             if w.station.HasInputPort(command):
@@ -266,15 +264,13 @@ def _add_recorder(
     local: LocalCompensation | None,
 ) -> None:
     """Adds what writes the log: the truth where it is known, else what is believed."""
-    person = w.of.person
-    capsules = [(int(person.body_indices[c.body]), c) for c in person.capsules]
     recorder = w.add(
         "run_recorder",
         RunRecorder(
             writer,
             mesh,
             len(policy.mesh.rest_position),
-            capsules if w.sees_truth else policy.person,
+            w.of.person.placed_capsules if w.sees_truth else policy.person,
             rates.log_period,
             rates.command_period,
             local is not None,

@@ -9,14 +9,14 @@ from pathlib import Path
 from pydrake.systems.analysis import Simulator
 from rich.console import Console
 
-from drake_dress import __version__
-from drake_dress.diagrams.arms import ArmReachError, arm_bases
+from drake_dress.diagrams.arms import ArmReachError
 from drake_dress.diagrams.assemble import garments
 from drake_dress.diagrams.build import plant_station, station_parameters
 from drake_dress.diagrams.hardware_station import NoBusError, open_bus
 from drake_dress.diagrams.lab_diagram import Lab, make_lab
 from drake_dress.diagrams.run import NOT_DRESSED, concluded
-from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
+from drake_dress.diagrams.run_log import open_run_log
+from drake_dress.diagrams.scenario import Scenario, apply_variation
 from drake_dress.diagrams.studio import Studio
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed, remove_results
@@ -64,18 +64,7 @@ def run_lab(
     with claimed("--out", out):
         with (
             caught_interrupt() as interrupt,
-            RunLogWriter(
-                out / RUN_FILES[0],
-                garment=meshes.plant,
-                scenario_text=resolved_yaml(scenario),
-                version=__version__,
-                seed=scenario.seed,
-                radius=station.person.radius,
-                capsule_radius=[c.radius for c in station.person.capsules],
-                estimate_garment=meshes.belief,
-                bases=arm_bases(station.robots),
-                results=RUN_FILES[1:],
-            ) as writer,
+            open_run_log(out, scenario, meshes, station) as writer,
         ):
             lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
             heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer, interrupt)

@@ -23,7 +23,7 @@ from drake_dress.diagrams.build import links
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.hardware_station import control_modes
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.diagrams.station import ARM_STATUS, SimulatedStation
+from drake_dress.diagrams.station import ARM_STATUS, MOTION, SimulatedStation
 from drake_dress.diagrams.studio import add_picture_messages
 from drake_dress.diagrams.wiring import Wiring
 from drake_dress.models.arm.panda import LIMITS
@@ -94,7 +94,7 @@ def make_lab(
     for side in SIDES:
         make.receive_commands(side)
         make.send_status(side)
-    garment = [make.station.GetOutputPort(f"estimate.garment_{q}") for q in _MOTION]
+    garment = [make.station.GetOutputPort(f"estimate.garment_{q}") for q in MOTION]
     make.send_points("garment", len(belief.rest_position), garment)
     make.send_points("person", 6, [make.noisy_person()])
     for camera in station_cameras(scenario):
@@ -107,9 +107,6 @@ def make_lab(
     diagram = make.builder.Build()
     diagram.set_name("lab")
     return Lab(diagram, station, make.watch, make.player, lcm)
-
-
-_MOTION = ("position", "velocity")
 
 
 class _LabMaker(Wiring):
@@ -236,14 +233,13 @@ class _LabMaker(Wiring):
 
     def record(self, mesh: GarmentMesh, belief: GarmentMesh, writer: RunLogWriter) -> None:
         """Adds what writes the lab's own log."""
-        person = self.of.person
         recorder = self.add(
             "run_recorder",
             RunRecorder(
                 writer,
                 mesh,
                 len(belief.rest_position),
-                [(int(person.body_indices[c.body]), c) for c in person.capsules],
+                self.of.person.placed_capsules,
                 1.0 / self.scenario.log.rate,
                 1.0 / self.scenario.controller.command_rate,
                 arm_period=self.scenario.plant.body_time_step,

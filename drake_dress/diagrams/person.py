@@ -120,6 +120,11 @@ class Person:
     origin: FloatArray
     turns: bool = False
 
+    @property
+    def placed_capsules(self) -> list[tuple[int, Capsule]]:
+        """All capsules, each with the index of its body."""
+        return [(int(self.body_indices[c.body]), c) for c in self.capsules]
+
     def tone_torque(self, plant: MultibodyPlant) -> FloatArray:
         """Returns the generalized forces (nv,) that balance gravity in the rest pose, N·m.
 

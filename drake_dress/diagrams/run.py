@@ -15,8 +15,7 @@ from pydrake.systems.analysis import Simulator
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from drake_dress import __version__
-from drake_dress.diagrams.arms import ArmReachError, arm_bases
+from drake_dress.diagrams.arms import ArmReachError
 from drake_dress.diagrams.assemble import Garments, Parts, garments, hardware_parts, parts, wired
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.hardware_station import (
@@ -25,14 +24,14 @@ from drake_dress.diagrams.hardware_station import (
     StationSilentError,
 )
 from drake_dress.diagrams.pace import SteadyPace
-from drake_dress.diagrams.scenario import Scenario, apply_variation, resolved_yaml
+from drake_dress.diagrams.run_log import open_run_log
+from drake_dress.diagrams.scenario import Scenario, apply_variation
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.machine import left_out_of_garbage
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog
-from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import summarize, write_summary
@@ -83,19 +82,7 @@ def run_scenario(
         begin = clock.perf_counter()
         with (
             caught_interrupt() as interrupt,
-            RunLogWriter(
-                out / RUN_FILES[0],
-                garment=p.garments.plant,
-                scenario_text=resolved_yaml(scenario),
-                version=__version__,
-                seed=scenario.seed,
-                radius=p.station.person.radius,
-                capsule_radius=[c.radius for c in p.station.person.capsules],
-                estimate_garment=p.garments.belief,
-                bases=arm_bases(p.station.robots),
-                estimated=p.station.in_real_time,
-                results=RUN_FILES[1:],
-            ) as writer,
+            open_run_log(out, scenario, p.garments, p.station) as writer,
         ):
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)

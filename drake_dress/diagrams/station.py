@@ -95,7 +95,8 @@ from drake_dress.systems.tool_load import ToolLoad
 from drake_dress.systems.tool_motion import ToolMotion
 
 FloatArray = np.ndarray
-_MOTION = ("position", "velocity")
+# What a station takes and tells of a garment or a gripper.
+MOTION = ("position", "velocity")
 # What an arm reports, as Drake's PandaStatusSender has it.
 ARM_STATUS = (
     "position_commanded",
@@ -246,7 +247,9 @@ def make_simulated_station(
     cloth = _add_cloth(builder, plant, person, grippers, p)
     forces = cloth.GetOutputPort("person_forces")
     if robots is None or arms is None:
-        motion = measured = _add_floating_grippers(builder, grippers, p)
+        motion = _add_floating_grippers(builder, grippers, p)
+        felt = {(s, "force"): cloth.GetOutputPort(f"{s}_gripper_force") for s in SIDES}
+        measured = motion | felt
     else:
         measured = _wire_drivers(builder, plant, arms, robots, p)
         motion, load = _wire_tools(builder, plant, cloth, arms)
@@ -265,7 +268,7 @@ def make_simulated_station(
         cloth.GetOutputPort("garment_position"),
     )
     _connect_grippers(builder, cloth, motion, grippers, p)
-    _export_measured(builder, cloth, measured)
+    _export_measured(builder, measured)
     if sight is not None:
         export_oracles(
             builder,
@@ -333,7 +336,7 @@ def _add_floating_grippers(
         builder.ExportInput(
             gripper.GetInputPort("position_command"), f"{side}_gripper.position_command"
         )
-        for quantity in _MOTION:
+        for quantity in MOTION:
             motion[side, quantity] = gripper.GetOutputPort(f"{quantity}_measured")
     return motion
 
@@ -349,19 +352,15 @@ def _connect_grippers(
     # a gripper that were earlier than it reports would have to know the future
     late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
     for i, side in enumerate(SIDES):
-        for quantity in _MOTION:
+        for quantity in MOTION:
             first = grippers[i] if quantity == "position" else np.zeros(3)
             port = delayed(builder, motion[side, quantity], first, p.body_time_step, late)
             builder.Connect(port, cloth.GetInputPort(f"{side}_gripper_{quantity}"))
 
 
-def _export_measured(builder: DiagramBuilder, cloth: ClothPlant, measured: _Ports) -> None:
-    for side in SIDES:
-        for quantity in _MOTION:
-            port = measured[side, quantity]
-            builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
-        force = measured.get((side, "force"), cloth.GetOutputPort(f"{side}_gripper_force"))
-        builder.ExportOutput(force, f"{side}_gripper.force_measured")
+def _export_measured(builder: DiagramBuilder, measured: _Ports) -> None:
+    for (side, quantity), port in measured.items():
+        builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
 
 
 def _export_truth(builder: DiagramBuilder, cloth: ClothPlant, plant: MultibodyPlant) -> None:
@@ -393,7 +392,7 @@ def _wire_drivers(
         builder.Connect(
             driver.GetOutputPort("desired_state"), plant.get_desired_state_input_port(model)
         )
-        for quantity in _MOTION:
+        for quantity in MOTION:
             if quantity in p.mode:
                 builder.ExportInput(driver.GetInputPort(quantity), f"{side}_arm.{quantity}")
         builder.ExportInput(driver.GetInputPort("fresh"), f"cheat_{side}_arm_fresh")
@@ -410,7 +409,7 @@ def _wire_drivers(
     return {
         (side, quantity): measure.GetOutputPort(f"{side}_gripper_{quantity}")
         for side in SIDES
-        for quantity in (*_MOTION, "force")
+        for quantity in (*MOTION, "force")
     }
 
 
@@ -431,7 +430,7 @@ def _wire_tools(
         builder.Connect(
             cloth.GetOutputPort(f"{side}_gripper_force"), load.GetInputPort(f"{side}_force")
         )
-    motion = {(s, q): tool.GetOutputPort(f"{s}_{q}") for s in SIDES for q in _MOTION}
+    motion = {(s, q): tool.GetOutputPort(f"{s}_{q}") for s in SIDES for q in MOTION}
     return motion, load.get_output_port()
 
 

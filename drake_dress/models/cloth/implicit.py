@@ -22,7 +22,12 @@ import scipy.sparse as sp
 
 from drake_dress.models.cloth.buckling import Buckling
 from drake_dress.models.cloth.contact.corners import held_off_corners
-from drake_dress.models.cloth.contact.detection import cannot_land, find_proximity, nothing_near
+from drake_dress.models.cloth.contact.detection import (
+    Proximity,
+    cannot_land,
+    find_proximity,
+    nothing_near,
+)
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
@@ -114,6 +119,45 @@ class StepInfo:
     cg_iterations: int
     relative_residual: float
     refactored: bool
+
+
+@dataclass
+class _Problem:
+    """What a step solves, and how far it is.
+
+    Attributes:
+        state: at its start.
+        obstacles: the person then.
+        driven: (n,3) impulse of elastic forces, weight and influences, N s.
+        block: of `prepare_filtered`.
+        facing, light: of `normal_response`.
+        near: what is nearest to the nodes; contact: with it.
+        bonds: pairs of layers.
+        inertia: (n,) M / θ of nodes that the last pass solved as free, M of others, kg.
+        pushed: (n,3) momentum, with `driven` and what layers add, N s.
+        velocity: (n,3) m/s, of the last pass; impulse: (n,3) that it asks of contact, N s.
+        passes, iterations: done so far; residual: of the last pass.
+    """
+
+    state: ClothState
+    obstacles: Obstacles
+    driven: FloatArray
+    block: FloatArray
+    facing: FloatArray
+    light: FloatArray
+    near: Proximity
+    contact: ImplicitContact
+    bonds: ActingBonds
+    inertia: FloatArray = field(init=False)
+    pushed: FloatArray = field(init=False)
+    velocity: FloatArray = field(init=False)
+    impulse: FloatArray = field(init=False)
+    passes: int = 0
+    iterations: int = 0
+    residual: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.impulse = np.empty_like(self.state.v)
 
 
 class ImplicitCloth:
@@ -213,9 +257,44 @@ class ImplicitCloth:
         Raises:
             ValueError: something is not finite; the message names it.
         """
-        m, h = self.material, self.time_step
+        p = self._problem(state, obstacles, held_velocity, influences)
+        mode, memory = p.contact.mode, state.solver[0]
+        p.velocity = self._start(p, held_velocity, guess)
+        factor, refactored, memory = self._renewed_factor(memory, mode, p.contact.resistance)
+        self._solve(p, factor)
+
+        h, v = self.time_step, state.v
+        end = state.x + h * p.velocity
+        if not np.isfinite(end).all():
+            explain_not_finite(state.x, v, held_velocity, self.held)
+        if p.residual > max(0.1, self._tolerance):
+            memory[0] = -1
+        reaction = p.contact.impulse(p.velocity, p.impulse) / h
+        # for this step only
+        mode[mode == RAIL] = SLIP
+        touching = (mode == STICK) | (mode == SLIP)
+        # θ where the step was solved as free, 1 where it was bound
+        share = (self.mass / p.inertia)[:, None]
+        after = ClothState(
+            end,
+            p.velocity if self._implicitness == 1.0 else v + (p.velocity - v) / share,
+            mode,
+            reaction,
+            np.where(touching, p.near.owner, -1).astype(np.int32),
+            np.stack([memory, state.solver[1]]),
+        )
+        return after, StepInfo(p.passes, p.iterations, p.residual, refactored)
+
+    def _problem(
+        self,
+        state: ClothState,
+        obstacles: Obstacles,
+        held_velocity: FloatArray,
+        influences: Influences,
+    ) -> _Problem:
+        """Returns what a step has to solve, and readies the system's matrix for it."""
+        m, h, x, v = self.material, self.time_step, state.x, state.v
         e = influences.stiffened(self.elements)
-        x, v = state.x, state.v
         mu, adhesion = influences.contact_law(m.friction, len(x))
         force, block = self._elastic(e, x)
         force += self.mass[:, None] * self.gravity
@@ -224,8 +303,6 @@ class ImplicitCloth:
             self._system.prepare_fibres(x)
         if influences.force is not None:
             force += influences.force
-        driven = h * force
-        weighed = v + h * self.gravity
         bonds = ActingBonds(influences.bonds or NO_BONDS, len(x), h)
         self._system.set_bonds(bonds.now)
         facing, light = normal_response(e, block, self._scale, self._inertia + self._bending)
@@ -236,99 +313,72 @@ class ImplicitCloth:
             near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)
             near = held_off_corners(near, x, obstacles, m.margin)
         contact = ImplicitContact(
-            near,
-            v,
-            state.mode,
-            state.reaction,
-            self.held,
-            h,
-            self.gravity,
-            mu,
-            adhesion,
+            near, v, state.mode, state.reaction, self.held, h, self.gravity, mu, adhesion
         )
-        mode = contact.mode
-        inertia = self._bound_inertia(mode)
-        rhs = inertia[:, None] * v + driven
-        pushed = rhs + bonds.drive
+        p = _Problem(state, obstacles, h * force, block, facing, light, near, contact, bonds)
+        self._push(p)
+        return p
 
-        velocity = self._start(v, held_velocity, mode, near.normal, pushed, block, guess)
-        total, residual, passes = 0, 0.0, 0
-        left, landing = self._most_cone_passes, _LANDING_PASSES
-        apart = _PARTING_PASSES
-        factor, refactored, memory = self._renewed_factor(state.solver[0], mode, contact.resistance)
-        impulse = np.empty_like(velocity)
-        max_passes = self._max_passes if contact.is_near or len(bonds) else 1
+    def _push(self, p: _Problem) -> None:
+        """Finds the momentum that modes and pairs of layers, as they are now, leave to a step."""
+        p.inertia = self._bound_inertia(p.contact.mode)
+        p.pushed = p.inertia[:, None] * p.state.v + p.driven + p.bonds.drive
+
+    def _solve(self, p: _Problem, factor: Factor) -> None:
+        """Finds velocities and impulses, with modes and pairs of layers to which they belong."""
+        cones, landings, partings = self._most_cone_passes, _LANDING_PASSES, _PARTING_PASSES
+        contact = p.contact
+        several = contact.is_near or len(p.bonds) > 0
         while True:
-            contact.prescribe(velocity)
-            last = passes + 1 >= max_passes
-            tolerance = self._tolerance if last else _COARSER * self._tolerance
-            iterations, residual = self._system.solve(
-                factor,
-                block,
-                mode,
-                near.normal,
-                pushed + contact.drive(),
-                velocity,
-                tolerance,
-                self._max_iterations,
-                contact.resistance if contact.resistance.any() else None,
-                # alone, P keeps the momentum of what is free, however soon iterations end
-                (facing, bonds.now.stiffened(facing, light)) if mode.any() else None,
-                impulse,
-                inertia[:, None] * weighed,
-            )
-            total += iterations
-            impulse -= pushed
-            passes += 1
-            settled = last
+            last = p.passes + 1 >= (self._max_passes if several else 1)
+            self._pass(p, factor, self._tolerance if last else _COARSER * self._tolerance)
             # Layers push and do not pull.
-            glued = (not last or apart > 0) and bonds.update(velocity)
-            self._system.set_bonds(bonds.now)
-            pushed = rhs + bonds.drive
-            if last:
-                if glued:
-                    apart -= 1
+            glued = (not last or partings > 0) and p.bonds.update(p.velocity)
+            self._system.set_bonds(p.bonds.now)
+            if not last:
+                changed = contact.update(p.velocity, p.impulse)
+                few = changed <= _TOLERATED_CHANGES * np.count_nonzero(contact.mode)
+                if glued or not few or p.residual > self._tolerance:
                     continue
-                # Sticking may not hold more than friction can: what does slides after all.
-                if left > 0 and contact.slip_out_of_cone(velocity, impulse):
-                    left -= 1
-                    continue
-            else:
-                changed = contact.update(velocity, impulse)
-                few = changed <= _TOLERATED_CHANGES * np.count_nonzero(mode)
-                settled = bool(few and not glued and residual <= self._tolerance)
-            if settled:
-                # Nothing may end up inside the person because it was not seen to land.
-                if (
-                    landing == 0
-                    or not contact.is_near
-                    or not contact.stop_entering(x, velocity, impulse, obstacles, m.margin)
-                ):
-                    break
-                landing -= 1
-            inertia = self._bound_inertia(mode)
-            rhs = inertia[:, None] * v + driven
-            pushed = rhs + bonds.drive
-        end = x + h * velocity
-        if not np.isfinite(end).all():
-            explain_not_finite(x, v, held_velocity, self.held)
-        if residual > max(0.1, self._tolerance):
-            memory[0] = -1
-        # θ where the step was solved as free, 1 where it was bound
-        share = (self.mass / inertia)[:, None]
-        reaction = contact.impulse(velocity, impulse) / h
-        # for this step only
-        mode[mode == RAIL] = SLIP
-        touching = (mode == STICK) | (mode == SLIP)
-        after = ClothState(
-            end,
-            velocity if self._implicitness == 1.0 else v + (velocity - v) / share,
-            mode,
-            reaction,
-            np.where(touching, near.owner, -1).astype(np.int32),
-            np.stack([memory, state.solver[1]]),
+            elif glued:
+                partings -= 1
+                continue
+            # Sticking may not hold more than friction can: what does slides after all.
+            elif cones > 0 and contact.slip_out_of_cone(p.velocity, p.impulse):
+                cones -= 1
+                continue
+            # Nothing may end up inside the person because it was not seen to land.
+            if landings == 0 or not contact.is_near or not self._stop_entering(p):
+                return
+            landings -= 1
+
+    def _pass(self, p: _Problem, factor: Factor, tolerance: float) -> None:
+        """Solves for modes and pairs of layers as they are now."""
+        self._push(p)
+        contact = p.contact
+        contact.prescribe(p.velocity)
+        iterations, p.residual = self._system.solve(
+            factor,
+            p.block,
+            contact.mode,
+            p.near.normal,
+            p.pushed + contact.drive(),
+            p.velocity,
+            tolerance,
+            self._max_iterations,
+            contact.resistance if contact.resistance.any() else None,
+            # alone, P keeps the momentum of what is free, however soon iterations end
+            (p.facing, p.bonds.now.stiffened(p.facing, p.light)) if contact.mode.any() else None,
+            p.impulse,
+            p.inertia[:, None] * (p.state.v + self.time_step * self.gravity),
         )
-        return after, StepInfo(passes, total, residual, refactored)
+        p.impulse -= p.pushed
+        p.iterations += iterations
+        p.passes += 1
+
+    def _stop_entering(self, p: _Problem) -> bool:
+        margin = self.material.margin
+        return p.contact.stop_entering(p.state.x, p.velocity, p.impulse, p.obstacles, margin)
 
     def _elastic(self, elements: Elements, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns the internal force (n,3), N, and what products with K₊ need."""
@@ -350,26 +400,20 @@ class ImplicitCloth:
         return inertia
 
     def _start(
-        self,
-        v: FloatArray,
-        held_velocity: FloatArray,
-        mode: IntArray,
-        normal: FloatArray,
-        rhs: FloatArray,
-        block: FloatArray,
-        guess: FloatArray | None,
+        self, p: _Problem, held_velocity: FloatArray, guess: FloatArray | None
     ) -> FloatArray:
         """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
 
         A hanging garment keeps its velocity, a falling one gains θ h g; whichever leaves the
         smaller residual. Starting a hanging coat from free fall doubled the iterations.
         """
+        v, mode, normal = p.state.v, p.contact.mode, p.near.normal
         fall = self._implicitness * self.time_step * self.gravity
         other = v + fall if guess is None else guess.copy()
         best, least = v, np.inf
         for start in (v.copy(), other):
             start[self.held] = held_velocity
-            size = self._system.residual2(start, block, rhs, mode, normal)
+            size = self._system.residual2(start, p.block, p.pushed, mode, normal)
             # what is no number is taken, too: it is told at the end of the step
             if not size >= least:
                 best, least = start, size

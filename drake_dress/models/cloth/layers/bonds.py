@@ -10,11 +10,11 @@ which it grows, one that would come closer than the thickness T gets the impulse
 
     J = κ max(0, r − u),   r = (T − s) / h, a share of it where s < T.
 
-Of the pairs that act it is linear in w: κ (c ⊗ n)(c ⊗ n)ᵀ is added to the matrix, κ r (c ⊗ n) to the
-right-hand side. Which pairs act is found as in a semismooth Newton iteration: after a solve those
-with u < r do. Layers can only be pushed: where all pairs acted that were about to come too close,
-those that would have parted by themselves were glued together, folds of a few hundred such pairs
-shook themselves up within a tenth of a second, and a coat flew apart in one of 200 dressings.
+Of the pairs that act it is linear in w: κ (c ⊗ n)(c ⊗ n)ᵀ is added to the matrix, κ r (c ⊗ n) to
+the right-hand side. Which pairs act is found by a semismooth Newton iteration: after a solve, those
+with u < r do. Layers push and do not pull: while all pairs acted that were about to come too close,
+those that would have parted by themselves were glued together. Folds of some hundred such pairs
+shook themselves up within a tenth of a second, and in one of 200 dressings the coat flew apart.
 """
 
 from __future__ import annotations
