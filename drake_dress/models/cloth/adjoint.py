@@ -28,6 +28,7 @@ from drake_dress.models.cloth.forces import (
     stiffness_product,
     stiffness_products,
 )
+from drake_dress.models.cloth.inner.interface import StepSystem, Unknown
 from drake_dress.models.cloth.layered import pushed_nodes
 
 if TYPE_CHECKING:
@@ -69,74 +70,28 @@ def run_adjoint(
     frozen_contact: bool = False,
 ) -> Gradient:
     """Returns the derivative by the inputs; see `ExplicitBiasCloth.vector_jacobian_product`."""
-    h, held, mass = cloth.time_step, cloth.held, cloth.mass[:, None]
-    t, contacts, friction, system = tape, tape.contacts, tape.friction, tape.system
-    nodes, normal, mode = contacts.nodes, contacts.normal, friction.mode
-    slip = mode == SLIP
-    touching = len(nodes) > 0
-    follows = touching and not frozen_contact
-
-    # layers kept apart after the solves
-    motion_in = x_bar
-    if t.separation is not None and cloth.layers is not None:
-        pushed = pushed_nodes(t.separation.rate_change)[:, None]
-        motion_in = cloth.layers.correct_vjp(t.separation, x_bar)
-        motion_in += cloth.layers.rate_vjp(t.separation, np.where(pushed, v_bar / h, 0.0))
-        v_bar = np.where(pushed, 0.0, v_bar)
+    h, held = cloth.time_step, cloth.held
+    t, nodes, system = tape, tape.contacts.nodes, tape.system
+    follows = len(nodes) > 0 and not frozen_contact
+    motion_in, v_bar = _through_layers(cloth, t, x_bar, v_bar)
 
     # reaction of the held nodes: (2/h²) (A Δx − g) seeds what is prescribed there, or k (Δp − 2 Δx)
     # of springs
-    spring = cloth.spring
     nothing = seed = np.zeros((0, 3))
-    if spring is None:
+    if cloth.spring is None:
         nothing, seed = np.zeros((len(held), 3)), (-2.0 / h**2) * held_reaction_bar
     else:
         motion_in = motion_in.copy()
-        motion_in[held] -= 2.0 * spring * held_reaction_bar
-    back_motion, back_change = system.start((motion_in, seed), (v_bar, nothing))
-    back_stick = system.blank()
+        motion_in[held] -= 2.0 * cloth.spring * held_reaction_bar
+    back = _Backward(*system.start((motion_in, seed), (v_bar, nothing)), system.blank())
+    bound = _through_binding(cloth, t, back, follows) if len(nodes) else _NOTHING_BOUND
 
-    prescribed_in = normal_in = np.zeros((0, 3))
-    target_in = np.zeros((0, 3))
-    friction_in = 0.0
-    if touching:
-        zero = np.zeros((len(nodes), 3))
-        everything = np.full(len(nodes), STICK, dtype=np.int32)
-        late = friction.velocity_mode == SLIP
-        # velocities
-        pull, _ = system.hold(
-            back_change, friction.velocity_mode, normal, zero, friction.push, backward=True
-        )
-        target_in = -pull
-        # the motion
-        pull, _ = system.hold(back_motion, mode, normal, zero, friction.push, backward=True)
-        prescribed_in = -pull
-        normal_in = np.zeros_like(prescribed_in)
-        if slip.any() and follows:
-            by_row, by_binding = system.by_directions(
-                t.motion_unknown, back_motion, t.prescribed, slip
-            )
-            if late.any():
-                more = system.by_directions(t.change_unknown, back_change, t.target_change, late)
-                by_row, by_binding = by_row + more[0], by_binding + more[1]
-            # friction follows the direction of the force of sticking
-            stick_in, by_friction, friction_in = _through_friction(cloth, t, by_binding, slip)
-            normal_in = by_row + by_binding + by_friction
-            push, _ = system.hold(back_stick, everything, normal, (2.0 / h**2) * stick_in)
-            prescribed_in = prescribed_in + push
-
-    g_in, rate_in = system.finish(back_motion, back_change, less=back_stick)
-    v_in = v_bar + (h * mass) * g_in
-    if spring is None:
-        held_change = v_bar[held] - system.held_rows(rate_in)
-        held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
-        v_in[held] -= held_change
-    else:
-        held_in = spring * (held_reaction_bar + 0.5 * h * h * g_in[held] + h * rate_in[held])
-        v_in[held] -= (0.5 * h * h * spring) * rate_in[held]
+    g_in, rate_in = system.finish(back.motion, back.change, less=back.stick)
+    v_in, held_in = _through_grippers(
+        cloth, system, v_bar, motion_in, held_reaction_bar, g_in, rate_in
+    )
     force_in = (0.5 * h * h) * g_in + h * rate_in
-    if touching:
-        v_in[nodes] -= target_in
+    v_in[nodes] -= bound.target
 
     by_force, by_rate, along_v = _stiffness_terms(cloth, t.x, t.v, force_in, rate_in)
     x_in = x_bar - by_force - (0.5 * h * h) * along_v
@@ -144,11 +99,12 @@ def run_adjoint(
 
     bodies = np.zeros((4, t.obstacles.count, 3))
     if follows:
-        x_in[nodes] += _contact_derivative(cloth, t, prescribed_in, target_in, normal_in, bodies)
-
-    solves = [(1.0, t.motion_unknown, back_motion), (1.0, t.change_unknown, back_change)]
-    if t.stick_unknown is not None and slip.any() and follows:
-        solves.append((-1.0, t.stick_unknown, back_stick))
+        x_in[nodes] += _contact_derivative(
+            cloth, t, bound.prescribed, bound.target, bound.normal, bodies
+        )
+    solves = [(1.0, t.motion_unknown, back.motion), (1.0, t.change_unknown, back.change)]
+    if t.stick_unknown is not None and np.any(t.friction.mode == SLIP) and follows:
+        solves.append((-1.0, t.stick_unknown, back.stick))
     if cloth.inner.depends_on_position:
         for sign, forward, backward in solves:
             for w, z in system.pairs(forward, backward):
@@ -159,10 +115,116 @@ def run_adjoint(
         for name in material:
             for sign, forward, backward in solves:
                 material[name] += sign * system.by_parameter(name, forward, backward)
-        material["friction"] = friction_in
-        material["margin"] = float(np.sum(prescribed_in * normal)) if touching else 0.0
+        material["friction"] = bound.friction
+        material["margin"] = float(np.sum(bound.prescribed * t.contacts.normal))
     origin, rotation, velocity, angular_velocity = bodies
     return Gradient(x_in, v_in, held_in, origin, rotation, velocity, angular_velocity, material)
+
+
+@dataclass(frozen=True)
+class _Backward:
+    """The unknowns of the adjoint solves: of Δx, of Δv, and of Δx with all nodes sticking."""
+
+    motion: Unknown
+    change: Unknown
+    stick: Unknown
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """Derivatives (c,3) by what is prescribed to nodes in contact, by Δv there, and by normals.
+
+    `friction` is that by the coefficient.
+    """
+
+    prescribed: FloatArray
+    target: FloatArray
+    normal: FloatArray
+    friction: float = 0.0
+
+
+_NOTHING_BOUND = _Bound(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def _through_layers(
+    cloth: ExplicitBiasCloth, tape: Tape, x_bar: FloatArray, v_bar: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Returns the derivatives (n,3) by Δx and v as they were before layers were kept apart."""
+    if tape.separation is None or cloth.layers is None:
+        return x_bar, v_bar
+    pushed = pushed_nodes(tape.separation.rate_change)[:, None]
+    motion_in = cloth.layers.correct_vjp(tape.separation, x_bar)
+    rate_bar = np.where(pushed, v_bar / cloth.time_step, 0.0)
+    motion_in += cloth.layers.rate_vjp(tape.separation, rate_bar)
+    return motion_in, np.where(pushed, 0.0, v_bar)
+
+
+def _through_binding(
+    cloth: ExplicitBiasCloth, tape: Tape, back: _Backward, follows: bool
+) -> _Bound:
+    """Binds the adjoint's unknowns in place, and returns the derivatives by what bound them.
+
+    Args:
+        cloth: the garment.
+        tape: of a step with nodes in contact.
+        back: the unknowns, free so far.
+        follows: whether surfaces and the direction of friction follow nodes.
+    """
+    t, contacts, friction, system = tape, tape.contacts, tape.friction, tape.system
+    normal, mode = contacts.normal, friction.mode
+    slip, late = mode == SLIP, friction.velocity_mode == SLIP
+    zero = np.zeros((len(mode), 3))
+    pull, _ = system.hold(
+        back.change, friction.velocity_mode, normal, zero, friction.push, backward=True
+    )
+    target_in = -pull
+    pull, _ = system.hold(back.motion, mode, normal, zero, friction.push, backward=True)
+    prescribed_in = -pull
+    if not (slip.any() and follows):
+        return _Bound(prescribed_in, target_in, np.zeros_like(prescribed_in))
+    by_row, by_binding = system.by_directions(t.motion_unknown, back.motion, t.prescribed, slip)
+    if late.any():
+        more = system.by_directions(t.change_unknown, back.change, t.target_change, late)
+        by_row, by_binding = by_row + more[0], by_binding + more[1]
+    # friction follows the direction of the force of sticking
+    stick_in, by_friction, friction_in = _through_friction(cloth, t, by_binding, slip)
+    everything = np.full(len(mode), STICK, dtype=np.int32)
+    push, _ = system.hold(back.stick, everything, normal, (2.0 / cloth.time_step**2) * stick_in)
+    normal_in = by_row + by_binding + by_friction
+    return _Bound(prescribed_in + push, target_in, normal_in, friction_in)
+
+
+def _through_grippers(
+    cloth: ExplicitBiasCloth,
+    system: StepSystem,
+    v_bar: FloatArray,
+    motion_in: FloatArray,
+    held_reaction_bar: FloatArray,
+    g_in: FloatArray,
+    rate_in: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Returns the derivatives by v (n,3), forces aside, and by the motion of held nodes (k,3).
+
+    Args:
+        cloth: the garment.
+        system: of the step.
+        v_bar: (n,3) derivative by the velocity after the solves.
+        motion_in: (n,3) by Δx after them.
+        held_reaction_bar: (k,3) by the grippers' forces.
+        g_in: (n,3) by the right-hand side of Δx.
+        rate_in: (n,3) by that of Δv.
+    """
+    h, held, mass = cloth.time_step, cloth.held, cloth.mass[:, None]
+    v_in = v_bar + (h * mass) * g_in
+    if cloth.spring is None:
+        held_change = v_bar[held] - system.held_rows(rate_in)
+        held_in = motion_in[held] - system.held_rows(g_in) + held_change / h
+        v_in[held] -= held_change
+    else:
+        k = cloth.spring
+        held_in = k * (held_reaction_bar + 0.5 * h * h * g_in[held] + h * rate_in[held])
+        v_in[held] -= (0.5 * h * h * k) * rate_in[held]
+    return v_in, held_in
 
 
 def _through_friction(

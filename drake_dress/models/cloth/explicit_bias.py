@@ -152,6 +152,16 @@ class _Bound:
     binding: FloatArray
 
 
+@dataclass(frozen=True)
+class _Free:
+    """A step without contact: its system, the unknowns Δx and Δv, and g (n,3), kg m."""
+
+    system: StepSystem
+    motion: Unknown
+    change: Unknown
+    g: FloatArray
+
+
 _NO_VECTORS = np.zeros((0, 3))
 _NOTHING_BOUND = _Bound(_NO_VECTORS, _NO_VECTORS, NO_CONTACT, _NO_VECTORS, _NO_VECTORS)
 
@@ -239,13 +249,53 @@ class ExplicitBiasCloth:
         Raises:
             ValueError: an input has the wrong shape, or something in it is not finite.
         """
-        h, m = self.time_step, self.material
-        # The tape keeps them: a caller may write to his arrays before the adjoint runs.
-        x, v, held_motion = x.copy(), v.copy(), held_motion.copy()
         if held_motion.shape != (len(self.held), 3):
             raise ValueError(
                 f"held_motion has shape {held_motion.shape}, expected ({len(self.held)}, 3)"
             )
+        # The tape keeps them: a caller may write to his arrays before the adjoint runs.
+        x, v, held_motion = x.copy(), v.copy(), held_motion.copy()
+        free = self._without_contact(x, v, held_motion)
+        h, margin = self.time_step, self.material.margin
+        if types is None:
+            near = find_contacts(x, free.motion.free, obstacles, margin, h, self.held_mask)
+        else:
+            near = known_contacts(x, types.nodes, types.owner, obstacles, margin)
+        stick_unknown = free.system.again(free.motion) if len(near.nodes) else None
+        contacts, bound, motion, change = self._with_contact(free, stick_unknown, near, v, types)
+        separation = None
+        if self.layers is not None:
+            separation = self._layers_apart(x, motion, contacts, bound.friction.mode)
+        tape = Tape(
+            x=x,
+            v=v,
+            obstacles=obstacles,
+            system=free.system,
+            motion_unknown=free.motion,
+            change_unknown=free.change,
+            stick_unknown=stick_unknown,
+            contacts=contacts,
+            prescribed=bound.prescribed,
+            target_change=bound.target_change,
+            friction=bound.friction,
+            stick_reaction=bound.stick_reaction,
+            motion=motion,
+            change=change,
+            separation=None if separation is None else separation[1],
+            held=self.held,
+        )
+        reaction = self._reaction(free, motion, held_motion)
+        reaction[contacts.nodes] = (2.0 / h**2) * bound.binding
+        if separation is None:
+            return x + motion, v + change, reaction, tape
+        moved, record = separation
+        pushed = pushed_nodes(record.rate_change)
+        velocity = np.where(pushed[:, None], (motion + record.rate_change) / h, v + change)
+        return x + moved, velocity, reaction, tape
+
+    def _without_contact(self, x: FloatArray, v: FloatArray, held_motion: FloatArray) -> _Free:
+        """Returns a step that meets nothing; for its arguments see `step`."""
+        h, m = self.time_step, self.material
         force, rate = force_and_product(
             self.elements, m.stretch_stiffness, m.bending_stiffness, x, v
         )
@@ -256,83 +306,69 @@ class ExplicitBiasCloth:
             g[self.held] += (0.5 * h * h * self.spring) * held_motion
             impulse[self.held] += self.spring * (h * held_motion - 0.5 * h * h * v[self.held])
         fixed = slice(None) if self.spring is None else slice(0)
-        motion_unknown, change_unknown = system.start(
+        motion, change = system.start(
             (g, held_motion[fixed]), (impulse, (held_motion / h - v[self.held])[fixed]), h * v
         )
-        free = motion_unknown.free
-        if not np.isfinite(free).all():
+        if not np.isfinite(motion.free).all():
             explain_not_finite(x, v, held_motion, self.held)
+        return _Free(system, motion, change, g)
 
-        if types is None:
-            near = find_contacts(x, free, obstacles, m.margin, h, self.held_mask)
-        else:
-            near = known_contacts(x, types.nodes, types.owner, obstacles, m.margin)
-        stick_unknown = system.again(motion_unknown) if len(near.nodes) else None
+    def _with_contact(
+        self,
+        free: _Free,
+        stick_unknown: Unknown | None,
+        near: Contacts,
+        v: FloatArray,
+        types: ContactTypes | None,
+    ) -> tuple[Contacts, _Bound, FloatArray, FloatArray]:
+        """Returns what touches, how it is bound, and Δx and Δv, (n,3) m and m/s.
+
+        Args:
+            free: the step without contact.
+            stick_unknown: Δx with all nodes sticking that are near a surface; None if none is.
+            near: those nodes.
+            v: (n,3) velocities at the start, m/s.
+            types: contact to hold instead of finding it.
+        """
         kept, guess = np.ones(len(near.nodes), dtype=np.bool_), None
         if types is None and stick_unknown is not None:
-            kept, guess = self._who_touches(system, stick_unknown, near)
+            kept, guess = self._who_touches(free.system, stick_unknown, near)
         for attempt in range(ATTEMPTS):
-            contacts = near.chosen(kept)
-            bound = _NOTHING_BOUND
+            contacts, bound = near.chosen(kept), _NOTHING_BOUND
             if stick_unknown is not None:
-                bound = self._bind(
-                    system,
-                    (stick_unknown, motion_unknown, change_unknown),
-                    contacts,
-                    v,
-                    guess,
-                    types,
-                )
-            motion, change = system.finish(motion_unknown, change_unknown)
+                unknowns = stick_unknown, free.motion, free.change
+                bound = self._bind(free.system, unknowns, contacts, v, guess, types)
+            motion, change = free.system.finish(free.motion, free.change)
             if kept.all():
                 break
-            entered = ~kept & (_ahead(near, motion[near.nodes], h) < -ENTERED)
+            entered = ~kept & (_ahead(near, motion[near.nodes], self.time_step) < -ENTERED)
             if not entered.any():
                 break
             kept = kept | entered if attempt + 2 < ATTEMPTS else np.ones_like(kept)
             guess = None
-        friction = bound.friction
-        proposed, separation = motion, None
-        if self.layers is not None:
-            mode = np.zeros(len(x), dtype=np.int32)
-            mode[contacts.nodes] = friction.mode
-            mode[self._fixed] = HELD
-            barred = np.zeros_like(x)
-            barred[contacts.nodes] = contacts.normal
-            motion, separation = self.layers.correct(
-                x, motion, inverse_mass(self.mass, mode), barred
-            )
+        return contacts, bound, motion, change
 
-        reaction = np.zeros_like(x)
+    def _layers_apart(
+        self, x: FloatArray, motion: FloatArray, contacts: Contacts, contact_mode: IntArray
+    ) -> tuple[FloatArray, SeparationRecord]:
+        """Returns Δx with layers kept apart, and how; see `LayerSeparation.correct`."""
+        assert self.layers is not None
+        mode = np.zeros(len(x), dtype=np.int32)
+        mode[contacts.nodes] = contact_mode
+        mode[self._fixed] = HELD
+        barred = np.zeros_like(x)
+        barred[contacts.nodes] = contacts.normal
+        return self.layers.correct(x, motion, inverse_mass(self.mass, mode), barred)
+
+    def _reaction(self, free: _Free, motion: FloatArray, held_motion: FloatArray) -> FloatArray:
+        """Returns (n,3) the force of the grippers on the nodes, N."""
+        h, reaction = self.time_step, np.zeros_like(motion)
         if self.spring is None:
-            reaction[self.held] = (2.0 / h**2) * (system.held_rows(proposed) - g[self.held])
+            reaction[self.held] = (2.0 / h**2) * (free.system.held_rows(motion) - free.g[self.held])
         else:
             # Within P the spring yields by Δx twice: without that, k v h would be felt in motion.
-            reaction[self.held] = self.spring * (held_motion - 2.0 * proposed[self.held])
-        reaction[contacts.nodes] = (2.0 / h**2) * bound.binding
-        tape = Tape(
-            x=x,
-            v=v,
-            obstacles=obstacles,
-            system=system,
-            motion_unknown=motion_unknown,
-            change_unknown=change_unknown,
-            stick_unknown=stick_unknown,
-            contacts=contacts,
-            prescribed=bound.prescribed,
-            target_change=bound.target_change,
-            friction=friction,
-            stick_reaction=bound.stick_reaction,
-            motion=proposed,
-            change=change,
-            separation=separation,
-            held=self.held,
-        )
-        if separation is None:
-            return x + motion, v + change, reaction, tape
-        pushed = pushed_nodes(separation.rate_change)
-        velocity = np.where(pushed[:, None], (proposed + separation.rate_change) / h, v + change)
-        return x + motion, velocity, reaction, tape
+            reaction[self.held] = self.spring * (held_motion - 2.0 * motion[self.held])
+        return reaction
 
     def vector_jacobian_product(
         self,

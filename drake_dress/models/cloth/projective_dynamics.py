@@ -175,13 +175,12 @@ class ProjectiveDynamicsCloth:
         Raises:
             ValueError: something in the input is not finite.
         """
-        h, n = self.time_step, len(state.x)
+        h = self.time_step
         if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):
             explain_not_finite(state.x, state.v, held_velocity, self.held)
         if cannot_land(state.x, state.v, held_velocity, obstacles, h):
             obstacles = Obstacles.none()
-        material = self.material
-        mu, adhesion = influences.contact_law(material.friction, n)
+        mu, adhesion = influences.contact_law(self.material.friction, len(state.x))
         contact = IteratedContact(
             state.x,
             state.mode,
@@ -202,23 +201,57 @@ class ProjectiveDynamicsCloth:
         if influences.force is not None:
             inertial += h * h * influences.force / self.mass[:, None]
         equations = _Equations(self, inertial, state.x, influences)
-        fall, steady = inertial.copy(), state.x + h * state.v
-        fall[self.held] = steady[self.held] = state.x[self.held] + h * held_velocity
-        # a falling garment falls on, a hanging one goes on as before
-        falls = equations.energy(fall) < equations.energy(steady)
-        start = fall if falls else steady
         of_predictor = state.solver[0]
         if self._predictor is not None:
             ahead, _ = self._predictor.step(state, obstacles, held_velocity, influences, guess)
             start = steady = ahead.x
             of_predictor = ahead.solver[0]
-        x = contact.place(start, steady)
+        else:
+            start, steady = self._start(state, inertial, held_velocity, equations)
+        x, gradient, info = self._iterate(contact.place(start, steady), contact, equations)
+        touching = (contact.mode == STICK) | (contact.mode == SLIP)
+        after = ClothState(
+            x,
+            (x - state.x) / h,
+            contact.mode,
+            contact.reaction(gradient) / h**2,
+            np.where(touching, contact.owner, -1).astype(np.int32),
+            np.stack([of_predictor, self._system.memory()]),
+        )
+        return after, info
+
+    def _start(
+        self,
+        state: ClothState,
+        inertial: FloatArray,
+        held_velocity: FloatArray,
+        equations: _Equations,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Returns where iterations start, and where steady motion leads, (n,3) m.
+
+        A falling garment falls on, a hanging one goes on as before.
+        """
+        h = self.time_step
+        fall, steady = inertial.copy(), state.x + h * state.v
+        fall[self.held] = steady[self.held] = state.x[self.held] + h * held_velocity
+        falls = equations.energy(fall) < equations.energy(steady)
+        return (fall if falls else steady), steady
+
+    def _iterate(
+        self, x: FloatArray, contact: IteratedContact, equations: _Equations
+    ) -> tuple[FloatArray, FloatArray, ProjectiveInfo]:
+        """Returns the positions (n,3) of least energy, m, its gradient there, and how it was found.
+
+        Args:
+            x: (n,3) where iterations start, m; changed in place.
+            contact: of the step.
+            equations: of the step.
+        """
         history = self._history
         if history is not None:
             history.clear()
         stop = StoppingRule(self._tolerance)
-        before = x.copy()
-        old_gradient = np.zeros((0, 3))
+        before, old_gradient = x.copy(), np.zeros((0, 3))
         iterations = 0
         while True:
             changes = contact.bind(x)
@@ -235,11 +268,7 @@ class ProjectiveDynamicsCloth:
                 if changes:
                     history.clear()
                 elif iterations > 0:
-                    s, y = x - before, gradient - old_gradient
-                    y += contact.resistance[:, None] * s
-                    project(s, contact.mode, contact.normal)
-                    project(y, contact.mode, contact.normal)
-                    history.add(s, y)
+                    _remember(history, x - before, gradient - old_gradient, contact)
             before[:] = x
             old_gradient = gradient
             motion = self._motion(gradient - contact.friction, contact, history)
@@ -248,18 +277,7 @@ class ProjectiveDynamicsCloth:
             contact.shorten(x, motion)
             x += motion
             iterations += 1
-
-        reaction = contact.reaction(gradient) / h**2
-        touching = (contact.mode == STICK) | (contact.mode == SLIP)
-        after = ClothState(
-            x,
-            (x - state.x) / h,
-            contact.mode,
-            reaction,
-            np.where(touching, contact.owner, -1).astype(np.int32),
-            np.stack([of_predictor, self._system.memory()]),
-        )
-        return after, ProjectiveInfo(
+        info = ProjectiveInfo(
             iterations,
             stop.remaining,
             stop.reached(),
@@ -268,6 +286,7 @@ class ProjectiveDynamicsCloth:
             self._system.solves,
             changes,
         )
+        return x, gradient, info
 
     def _margins(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
         """Returns (n,) the distance that nodes keep, so that elements between them keep theirs."""
@@ -316,6 +335,16 @@ class ProjectiveDynamicsCloth:
             slope *= 0.5
         history.clear()
         motion[:] = self._system.solve(-force, contact)
+
+
+def _remember(
+    history: CurvatureHistory, s: FloatArray, y: FloatArray, contact: IteratedContact
+) -> None:
+    """Adds a motion and the change of the gradient over it, (n,3) each, as far as they are free."""
+    y += contact.resistance[:, None] * s
+    project(s, contact.mode, contact.normal)
+    project(y, contact.mode, contact.normal)
+    history.add(s, y)
 
 
 class _Equations:
