@@ -23,7 +23,7 @@ from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_policy, opened
 from benchmarks.prediction import SEEN, Moment, read_run
 from drake_dress.errors import UserError
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.person_model import person_obstacles
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.dressing.sight import distance_to_opening

@@ -27,7 +27,7 @@ from benchmarks.logged import opened
 from benchmarks.parser import output_file
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.preparing import distance_aside
 from drake_dress.models.dressing.sight import distance_to_opening
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state

@@ -22,9 +22,9 @@ import numpy as np
 from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_policy
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray
-from drake_dress.models.control.global_mpc import GlobalController, SleeveTarget
+from drake_dress.models.control.global_mpc import GlobalController, Situation, SleeveTarget
 from drake_dress.models.control.person_model import person_obstacles
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.dressing.stages import Stage, StageState
@@ -151,23 +151,25 @@ def _save(path: Path, policy: DressingPolicy, m: Moment) -> None:
 
 
 def _held_against(controller: GlobalController, m: Moment) -> Found:
+    situation = Situation(m.x, m.v, m.targets, m.person, m.leftward)
+
     def cost(velocity: FloatArray) -> float:
-        return controller._rollout(m.x, m.v, velocity, m.targets, m.person, m.leftward).cost
+        return controller._rollout(situation, velocity).cost
 
     slope = np.empty_like(m.start)
     for index in np.ndindex(slope.shape):
         step = np.zeros_like(slope)
         step[index] = _REACH
         slope[index] = (cost(m.start + step) - cost(m.start - step)) / (2.0 * _REACH)
-    rollout = controller._rollout(m.x, m.v, m.start, m.targets, m.person, m.leftward)
+    rollout = controller._rollout(situation, m.start)
     cosine, ratio, descent = {}, {}, {}
     for name, frozen in _KINDS.items():
         controller.frozen_contact = frozen
-        gradient = controller._gradient(rollout, m.start, m.targets, m.person, m.leftward)
+        gradient = controller._gradient(rollout, m.start, situation)
         size, wanted = (np.linalg.norm(g, axis=(1, 2)) for g in (gradient, slope))
         cosine[name] = np.sum(gradient * slope, axis=(1, 2)) / np.maximum(size * wanted, 1e-300)
         ratio[name] = size / np.maximum(wanted, 1e-300)
-        plan = controller.solve(m.x, m.v, m.targets, m.person, m.start, 1, m.leftward)
+        plan = controller.solve(situation, m.start, 1)
         descent[name] = 1.0 - plan.cost / plan.initial_cost
     touching = max(len(tape.contacts.nodes) for tape in rollout.tapes)
     return Found(touching, cosine, ratio, descent)

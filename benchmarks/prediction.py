@@ -30,7 +30,8 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
-from drake_dress.models.cloth.elements import FloatArray, make_elements
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
 import drake_dress
 from drake_dress import __version__
@@ -69,7 +69,7 @@ exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input""
 
 _OF_SCENARIO = "a YAML file, or the name of a scenario that ships; see drake-dress scenarios"
 # What `add_subparsers` returns.
-_Verbs = argparse._SubParsersAction
+_Verbs: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
 class _Parser(argparse.ArgumentParser):

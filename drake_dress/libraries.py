@@ -18,6 +18,8 @@ SYSTEM_LIBRARIES = {
 }
 # Modules that every command needs.
 _NEEDED = ("numpy", "scipy", "yaml", "rich", "h5py", "trimesh", "rtree", "pydrake.common")
+# Modules that come with an extra.
+EXTRAS = {"torch": "torch", "cv2": "vision", "ray": "ray", "pyarrow": "ray"}
 _SHARED_OBJECT = re.compile(r"(lib[\w.+-]+\.so[\d.]*)")
 _INSTALL = "expected all packages of drake_dress: pip install them again"
 
@@ -57,7 +59,9 @@ def import_problem(error: Exception, module: str = "") -> UserError:
         asked = module.partition(".")[0]
         other = asked and asked != error.name.partition(".")[0]
         needs = f", which {asked} uses" if other else ""
-        return UserError(error.name, "", f"is not installed{needs}, {_INSTALL}")
+        extra = EXTRAS.get(error.name.partition(".")[0])
+        install = f"expected pip install 'drake_dress[{extra}]'" if extra else _INSTALL
+        return UserError(error.name, "", f"is not installed{needs}, {install}")
     name = module or getattr(error, "name", None) or "library"
     return UserError(name, "", f"cannot be imported: {text}, {_INSTALL}")
 

@@ -25,7 +25,7 @@ def forgiving_streams() -> Iterator[None]:
     before = sys.stdout, sys.stderr
     shown = [None if stream is None else _Forgiving(stream) for stream in before]
     # Python has None where a stream is closed, which `print` passes over.
-    sys.stdout, sys.stderr = shown  # type: ignore[assignment]
+    sys.stdout, sys.stderr = shown
     try:
         yield
     finally:

@@ -250,7 +250,7 @@ def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 _Dumper.add_representer(str, _represent_text)
 
 
-def plain_value(word: str) -> None | bool | int | float | str:
+def plain_value(word: str) -> bool | int | float | str | None:
     """Returns the value of a word without quotes.
 
     Raises:

@@ -327,7 +327,7 @@ def test_bad_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.parametrize(
-    "words, expected",
+    ("words", "expected"),
     [
         (["explain", "none.h5", "--scenario", "SCENARIO"], ["none.h5", "no such file"]),
         (["explain", "SCENARIO", "--scenario", "SCENARIO"], ["unknown kind", ".h5"]),
@@ -351,7 +351,8 @@ def test_measured_data_that_cannot_be_used(tmp_path, capsys, words, expected):
         words += ["--out", str(out)]
     assert main(words) == 2
     line = capsys.readouterr().err
-    assert line.count("\n") == 1 and line.startswith("drake-dress: ")
+    assert line.count("\n") == 1
+    assert line.startswith("drake-dress: ")
     for word in expected:
         assert word in line
     assert not out.exists()

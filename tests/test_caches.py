@@ -46,7 +46,8 @@ def test_where_they_are_not_all_caches_go_below_the_temporary_folder(place: Path
     folder = place / "tmp" / f"drake-dress-{os.getuid()}"
     assert environment["XDG_CACHE_HOME"] == str(folder)
     assert Path(environment["MPLCONFIGDIR"]).is_relative_to(folder)
-    assert "NUMBA_CACHE_DIR" not in environment and "WARP_CACHE_PATH" not in environment
+    assert "NUMBA_CACHE_DIR" not in environment
+    assert "WARP_CACHE_PATH" not in environment
     assert folder.stat().st_mode & 0o077 == 0
 
 
@@ -88,7 +89,7 @@ def test_the_working_directory_is_no_cache(place: Path, monkeypatch: pytest.Monk
 def test_a_full_disk_is_of_no_use(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert usable(place / "a")
     if os.path.exists("/dev/full"):
-        monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: open("/dev/full", "wb"))
+        monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: open("/dev/full", "wb"))  # noqa: SIM115
     assert not usable(place / "a")
 
 
@@ -118,7 +119,7 @@ def kernel_run(place: Path, **environment: str) -> str:
         text=True,
         check=False,
     )
-    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 
 

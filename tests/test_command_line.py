@@ -58,8 +58,10 @@ def test_an_output_that_cannot_be_is_told_before_any_work(
     except SystemExit as error:
         status = int(error.code or 0)
     captured = capsys.readouterr()
-    assert status == 2 and captured.out == ""
-    assert words[-1] in captured.err and captured.err.count("\n") == 1, captured.err
+    assert status == 2
+    assert captured.out == ""
+    assert words[-1] in captured.err
+    assert captured.err.count("\n") == 1, captured.err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
@@ -132,6 +134,8 @@ def test_an_option_that_cannot_be_is_told_before_any_work(
     except SystemExit as error:
         status = int(error.code or 0)
     captured = capsys.readouterr()
-    assert status == 2 and captured.out == ""
-    assert words[-2] in captured.err and captured.err.count("\n") == 1, captured.err
+    assert status == 2
+    assert captured.out == ""
+    assert words[-2] in captured.err
+    assert captured.err.count("\n") == 1, captured.err
     assert not list((tmp_path / "out").glob("*"))

@@ -41,7 +41,7 @@ def draw(settings: dict[str, str], cwd: Path = ROOT) -> str:
         [sys.executable, "-c", DRAW], env=environment, cwd=cwd, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
-    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     return done.stdout.split()[0]
 
 

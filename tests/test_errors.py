@@ -23,4 +23,5 @@ def test_short_texts_are_told_as_they_are() -> None:
 
 def test_both_ends_of_a_long_text_are_told() -> None:
     line = str(UserError("a.yaml", "", "is " + "x" * 10_000 + ", expected a number"))
-    assert line.startswith("a.yaml: is xxx") and line.endswith("x, expected a number")
+    assert line.startswith("a.yaml: is xxx")
+    assert line.endswith("x, expected a number")

@@ -130,7 +130,8 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "target")
     write_text(tmp_path / "target", "before")
     write_text(tmp_path / "link", "after")
-    assert (tmp_path / "link").is_symlink() and (tmp_path / "target").read_text() == "after"
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_text() == "after"
 
 
 def test_one_command_at_a_time_writes_to_a_directory(tmp_path: Path) -> None:
@@ -162,7 +163,8 @@ def test_a_directory_to_which_nothing_was_written_is_gone(tmp_path: Path) -> Non
         assert (tmp_path / "new").is_dir()
     with claimed("--out", tmp_path):
         pass
-    assert tmp_path.is_dir() and not tree(tmp_path)
+    assert tmp_path.is_dir()
+    assert not tree(tmp_path)
 
 
 def test_only_results_are_removed(tmp_path: Path) -> None:

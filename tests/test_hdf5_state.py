@@ -33,7 +33,8 @@ def test_a_file_is_whole_until_a_byte_is_missing(
     path = tmp_path / "a.h5"
     data = write(path, libver, userblock)
     found = look_at(path)
-    assert found.state is Hdf5State.SOUND and found.expected == found.size == len(data)
+    assert found.state is Hdf5State.SOUND
+    assert found.expected == found.size == len(data)
     for length in (len(data) - 1, len(data) // 2, userblock + 100):
         path.write_bytes(data[:length])
         found = look_at(path)

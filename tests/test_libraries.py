@@ -25,6 +25,10 @@ ERRORS = {
         "pydrake.geometry: cannot be loaded: libfoo.so.3 is missing, "
         "expected the system package that has it",
     ),
+    "module of an extra": (
+        ModuleNotFoundError("No module named 'cv2'", name="cv2"),
+        "cv2: is not installed, which pydrake uses, expected pip install 'drake_dress[vision]'",
+    ),
     "module": (
         ModuleNotFoundError("No module named 'rtree'", name="rtree"),
         "rtree: is not installed, which pydrake uses",
@@ -67,7 +71,8 @@ def test_a_module_that_is_missing_when_a_command_begins(
     monkeypatch.setattr(importlib, "import_module", missing)
     assert main(["run", "scenario.yaml"]) == 2
     line = capsys.readouterr().err
-    assert line.startswith(f"drake-dress: {module}: is not installed") and line.count("\n") == 1
+    assert line.startswith(f"drake-dress: {module}: is not installed")
+    assert line.count("\n") == 1
 
 
 def test_a_module_that_is_missing_later(
@@ -83,7 +88,8 @@ def test_a_module_that_is_missing_later(
     monkeypatch.setattr(builtins, "__import__", missing)
     assert main(["calibrate", "folder"]) == 2
     line = capsys.readouterr().err
-    assert "libGL.so.1" in line and line.count("\n") == 1
+    assert "libGL.so.1" in line
+    assert line.count("\n") == 1
 
 
 def test_check_readme_and_installation_name_the_same_libraries() -> None:

@@ -47,7 +47,8 @@ def test_threads_obey_a_quota_unless_the_user_has_chosen(monkeypatch: pytest.Mon
     assert environment == {"OMP_NUM_THREADS": "5"}
     monkeypatch.setattr(machine, "worker_count", lambda: 2)
     limit_threads(environment)
-    assert environment["OMP_NUM_THREADS"] == "5" and environment["OPENBLAS_NUM_THREADS"] == "2"
+    assert environment["OMP_NUM_THREADS"] == "5"
+    assert environment["OPENBLAS_NUM_THREADS"] == "2"
 
 
 def test_a_quota_of_the_older_kind_is_obeyed(tmp_path: Path) -> None:

@@ -25,7 +25,8 @@ def test_a_name_leads_to_its_scenario_from_any_folder(
 def test_all_are_listed_each_with_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scenarios"]) == 0
     rows = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
-    assert [name for name, _ in rows] == NAMES and "dummy_standing" in NAMES
+    assert [name for name, _ in rows] == NAMES
+    assert "dummy_standing" in NAMES
     assert all(sentence.endswith(".") and len(sentence) > 20 for _, sentence in rows)
 
 
@@ -54,4 +55,5 @@ def test_a_name_that_is_none_is_told_with_those_there_are(given: str, told: str)
 def test_a_run_of_an_unknown_name_ends_as_unusable(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "dumy_standing", "--no-meshcat"]) == 2
     error = capsys.readouterr().err
-    assert error.count("\n") == 1 and "did you mean dummy_standing?" in error
+    assert error.count("\n") == 1
+    assert "did you mean dummy_standing?" in error

@@ -69,7 +69,8 @@ def test_what_an_earlier_run_left_is_removed_and_what_is_not_ours_stays(
     assert set(os.listdir(tmp_path)) == {"run.h5", "summary.json", "notes.txt"}
     assert json.loads((tmp_path / "summary.json").read_text())["seed"] == 0
     with RunLog.open(tmp_path / "run.h5") as log:
-        assert len(log) and not log.killed
+        assert len(log)
+        assert not log.killed
 
 
 @pytest.mark.parametrize("broken", ["report", "summary", "replay"])
@@ -104,7 +105,8 @@ def test_a_second_run_into_the_same_directory_is_refused(
         assert run(scenario, tmp_path) == 2
     lines = capsys.readouterr().err.splitlines()
     told = [line for line in lines if not line.startswith("compiling kernels")]
-    assert len(told) == 1 and told[0].startswith("drake-dress: --out: ")
+    assert len(told) == 1
+    assert told[0].startswith("drake-dress: --out: ")
     assert (tmp_path / "summary.json").read_text() == "of the first"
 
 
@@ -128,7 +130,8 @@ def test_a_signal_ends_a_run_as_ctrl_c_does(
     assert "what had run is in the log" in capsys.readouterr().out
     assert set(os.listdir(out)) == {"run.h5", "summary.json"}
     with h5py.File(out / "run.h5") as log:
-        assert log.attrs["complete"] and len(log["garment/position"]) == len(log["time"])
+        assert log.attrs["complete"]
+        assert len(log["garment/position"]) == len(log["time"])
 
 
 def test_a_signal_before_the_first_step_ends_a_run_as_one_after_it_does(
@@ -150,7 +153,8 @@ def test_a_signal_before_the_first_step_ends_a_run_as_one_after_it_does(
     assert "what had run is in the log" in capsys.readouterr().out
     assert set(os.listdir(out)) == {"run.h5", "summary.json"}
     with RunLog.open(out / "run.h5") as log:
-        assert not log.killed and len(log) == 1
+        assert not log.killed
+        assert len(log) == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -159,7 +163,8 @@ def test_the_first_signal_is_a_flag_and_the_second_an_exception(number: signal.S
     with pytest.raises(KeyboardInterrupt) as raised, signals_raised():
         with caught_interrupt() as interrupt:
             os.kill(os.getpid(), number)
-            assert interrupt.wait(1.0) and interrupt.status == 128 + number
+            assert interrupt.wait(1.0)
+            assert interrupt.status == 128 + number
             assert isinstance(interrupt.error(), Terminated) == (number != signal.SIGINT)
             os.kill(os.getpid(), number)
             time.sleep(1.0)
@@ -209,7 +214,8 @@ def test_a_signal_whose_exception_is_swallowed_comes_again(
         Ends(number)
         time.sleep(5.0)
     assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
-    assert sys.unraisablehook is before and "Traceback" not in capfd.readouterr().err
+    assert sys.unraisablehook is before
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("threads", [0, 4])
@@ -232,7 +238,8 @@ def _defer_and_take() -> None:
         with signals_deferred():
             os.kill(os.getpid(), signal.SIGTERM)
             assert not interrupt.wait(0.05)
-        assert interrupt.wait(1.0) and interrupt.number == signal.SIGTERM
+        assert interrupt.wait(1.0)
+        assert interrupt.number == signal.SIGTERM
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:

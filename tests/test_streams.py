@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import signal
@@ -25,7 +26,8 @@ def test_what_an_encoding_lacks_is_escaped(encoding: str, monkeypatch: pytest.Mo
         print("5 µm … ± Ω \ud800")
         print("next")
     text = raw.getvalue().decode(encoding)
-    assert "\\u03a9" in text and text.endswith("next\n")
+    assert "\\u03a9" in text
+    assert text.endswith("next\n")
 
 
 class Broken(io.RawIOBase):
@@ -59,10 +61,8 @@ def test_streams_and_signals_are_as_before_after_a_command(
     signals = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
     before = (sys.stdout, sys.stderr, *(signal.getsignal(n) for n in signals))
     for words in (["run", "no.yaml"], ["bench", "--help"], ["run", "a\0b"], ["--version"], []):
-        try:
+        with contextlib.suppress(SystemExit):
             main(words)
-        except SystemExit:
-            pass
         assert (sys.stdout, sys.stderr, *(signal.getsignal(n) for n in signals)) == before
     assert "Traceback" not in capsys.readouterr().err
 

@@ -18,7 +18,8 @@ def refused(text: str) -> str:
     with pytest.raises(UserError) as caught:
         read_yaml("a.yaml", text)
     line = str(caught.value)
-    assert line.startswith("a.yaml: ") and "\n" not in line
+    assert line.startswith("a.yaml: ")
+    assert "\n" not in line
     return line
 
 
@@ -103,7 +104,8 @@ def test_a_word_with_two_readings_is_told_with_line_and_remedy(word: str) -> Non
 @pytest.mark.parametrize("word", ONE_READING)
 def test_a_word_with_one_reading_has_it(word: str) -> None:
     value = read_yaml("a.yaml", f"a: {word}")["a"]
-    assert value == ONE_READING[word] and type(value) is type(ONE_READING[word])
+    assert value == ONE_READING[word]
+    assert type(value) is type(ONE_READING[word])
 
 
 @pytest.mark.parametrize("name", UNUSABLE)

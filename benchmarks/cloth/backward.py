@@ -11,8 +11,9 @@ import numpy as np
 from benchmarks.cloth.comparison import Result
 from benchmarks.cloth.garments import CONTROLLER_SPACING, QUICK_SPACING, grasp, jacket
 from benchmarks.cloth.measure import Session
-from benchmarks.cloth.scene import SOFT, TIME_STEPS, FloatArray
+from benchmarks.cloth.scene import SOFT, TIME_STEPS
 from benchmarks.cloth.table import Table, milliseconds
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth

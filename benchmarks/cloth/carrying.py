@@ -15,8 +15,9 @@ from benchmarks.cloth.engines import StateEngine
 from benchmarks.cloth.garments import CONTROLLER_SPACING, QUICK_SPACING, grasp, jacket
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.motions import at_rest, carried
-from benchmarks.cloth.scene import QUICK_STEPS, SOFT, TIME_STEPS, FloatArray, Scene
+from benchmarks.cloth.scene import QUICK_STEPS, SOFT, TIME_STEPS, Scene
 from benchmarks.cloth.table import Table
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import lumped_mass

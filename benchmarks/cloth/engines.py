@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from benchmarks.cloth.scene import FloatArray, Scene
+from benchmarks.cloth.scene import Scene
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth

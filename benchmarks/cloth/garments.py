@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.cloth.scene import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment import COATS, GarmentMesh, make_coat
 
 # Spacings at which the jacket has nearly the paper's 6,121 and 1,800 nodes: 6,168 and 1,793.

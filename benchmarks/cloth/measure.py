@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.engines import Engine, Recipe
-from benchmarks.cloth.scene import FloatArray, Scene
+from benchmarks.cloth.scene import Scene
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import Elements
 
 # Interval of the kept positions and of the turns, s.

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cloth.scene import FloatArray, Motion
+from benchmarks.cloth.scene import Motion
+from drake_dress.models.arrays import FloatArray
 
 
 def at_rest(held: FloatArray) -> Motion:

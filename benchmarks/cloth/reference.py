@@ -9,7 +9,8 @@ import numpy as np
 
 from benchmarks.cloth.engines import Recipe, implicit, projective_dynamics
 from benchmarks.cloth.measure import SAMPLE_INTERVAL, Run, Session
-from benchmarks.cloth.scene import FloatArray, Scene
+from benchmarks.cloth.scene import Scene
+from drake_dress.models.arrays import FloatArray
 
 # The paper takes 0.1 ms for Projective Dynamics, at 6,121 nodes hours on one core for all scenes.
 _PD_STEP = 5e-4

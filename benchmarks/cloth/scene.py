@@ -8,13 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.material import Material
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
 
 Motion = Callable[[float], FloatArray]
 

@@ -20,8 +20,9 @@ from benchmarks.cloth.comparison import Result
 from benchmarks.cloth.figures import Line, Panel, write_figure
 from benchmarks.cloth.garments import CONTROLLER_SPACING, QUICK_SPACING, grasp, jacket
 from benchmarks.cloth.measure import Session
-from benchmarks.cloth.scene import SOFT, FloatArray
+from benchmarks.cloth.scene import SOFT
 from benchmarks.cloth.table import Table, milliseconds
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements

@@ -170,10 +170,10 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
             begun = now
         if begun is not None and plan.kill_at is not None and now - begun >= plan.kill_at:
             process["run"].kill()
-        if begun is not None and plan.fill_at is not None and not filled:
-            if now - begun >= plan.fill_at:
-                filled = True
-                fill(run_out / "filler")
+        fills = begun is not None and plan.fill_at is not None and now - begun >= plan.fill_at
+        if fills and not filled:
+            filled = True
+            fill(run_out / "filler")
         if plan.sampled and begun is not None and now - begun >= len(memory["lab"]):
             for name, p in process.items():
                 memory[name].append(memory_of(p.pid))

@@ -12,12 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.inputs.trials import Expect, Trial, place
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.load import load_garment
 
 Rng = np.random.Generator
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 _SPACING = 0.05  # of the mutated jacket, m: quick to load
 # What an accepted garment may differ from the jacket: its area by this share, and its longest edge
 # by this factor.
@@ -29,7 +28,7 @@ class _Sheet:
     """A mesh: positions (n,3), faces (F,3), and whether it is still the jacket."""
 
     x: FloatArray
-    faces: IntArray
+    faces: IndexArray
     same: bool = False
 
 
@@ -281,7 +280,7 @@ def _dialect(rng: Rng, s: _Sheet) -> tuple[str, bytes, Expect]:
             "blank",
             "w",
             "library",
-        )  # fmt: skip
+        )
         if rng.random() < 0.3
     }
     n = len(s.x)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from drake import lcmt_panda_status, lcmt_point_cloud
 
 from benchmarks.inputs.trials import Expect, Trial
@@ -19,6 +18,7 @@ from drake_dress.diagrams.hardware_station import Beliefs
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.errors import UserError
 from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import arm_points
 from drake_dress.models.sides import SIDES
@@ -28,7 +28,6 @@ from drake_dress.systems.point_messages import encode_points
 from drake_dress.systems.status_messages import StatusCheck
 
 Rng = np.random.Generator
-FloatArray = npt.NDArray[np.float64]
 _SCENARIO = Path(__file__).parents[2] / "scenarios" / "lab.yaml"
 # Between two messages, s.
 _PERIOD = 0.02

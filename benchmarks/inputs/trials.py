@@ -88,7 +88,7 @@ def carry_out(index: int, kind: str, trial: Trial) -> Result:
             outcome, told = Outcome.ACCEPTED, ""
         except UserError as error:
             outcome, told = Outcome.REFUSED, f"drake-dress: {error}"
-        except Exception as error:  # noqa: BLE001 - anything else is what is looked for
+        except Exception as error:
             lines = traceback.format_exception(error)
             outcome, told = Outcome.TRACEBACK, "".join(lines[-3:])
     seconds = time.perf_counter() - begin

@@ -106,7 +106,7 @@ def _kept_seed(options: argparse.Namespace) -> int:
 @cache
 def _whole(folder: Path, overrides: tuple[str, ...]) -> float:
     """Makes the earlier run, and returns how long one takes that nobody ends, s."""
-    status, problem = run_scenario(_SCENARIO, folder / "earlier", [*_SETTINGS, *overrides], seed=1)
+    _, problem = run_scenario(_SCENARIO, folder / "earlier", [*_SETTINGS, *overrides], seed=1)
     if problem:
         raise RuntimeError(problem)
     plan = Plan(

@@ -53,7 +53,8 @@ def problems(
         wrong.append(f"ended {end.wall - end.acted:.0f} s after SIGTERM")
     if how in _ANSWERED and end.acted is not None and end.status not in _AFTER_TERMINATION:
         # before the run could take a signal, and when all is written, the system ends it
-        if end.status != -15 or (end.told[0] > 0.0 and _WRITTEN not in end.words):
+        by_the_system = end.status == -15 and (end.told[0] <= 0.0 or _WRITTEN in end.words)
+        if not by_the_system:
             wrong.append(f"exit status {end.status} after SIGTERM")
     now = fingerprints(folder)
     old = [name for name, digest in now.items() if earlier.get(name) == digest]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.local_problem import LocalProblem, NormBounds
 
 HORIZON, TIME_STEP = 20, 0.05

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.plant.motion import DressingMotion
 from benchmarks.plant.replaying import Replayed, replay
@@ -23,12 +22,11 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.station import plant_integrator
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog
-
-FloatArray = npt.NDArray[np.float64]
 
 # In which the reference forgets the mesh that it comes from, and of each part, s.
 _FORGETTING, _PART = 0.3, 1.0

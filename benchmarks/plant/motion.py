@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

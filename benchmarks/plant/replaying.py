@@ -6,16 +6,14 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.plant.motion import DressingMotion
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

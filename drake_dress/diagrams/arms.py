@@ -27,10 +27,29 @@ _DAMPING = 2.0 * np.sqrt(_STIFFNESS) * np.array([1.2, 1.2, 0.8, 0.8, 0.3, 0.3, 0
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 # Of the limits of speed, acceleration used; how far from those of position joints stay, rad.
 _SPEED_SHARE, _ROOM = 0.85, 0.02
-# Of the search for the joints at the start: step, s, steps, and what is near enough, m.
-_SEARCH_STEP, _SEARCH_STEPS, _NEAR = 0.01, 1500, 1e-3
-# Of the way of a dressing: steps to each place, what is there, and what a garment makes up for, m.
-_WAY_STEPS, _REACHED, _SHORT = 800, 0.01, 0.05
+# Between the steps of a search for joints, s.
+_SEARCH_STEP = 0.01
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How long joints are searched for, and how near to its place a gripper has to come.
+
+    Attributes:
+        steps: at most.
+        reached: distance at which the search ends, m.
+        allowed: distance by which a gripper may end short of its place, m.
+    """
+
+    steps: int
+    reached: float
+    allowed: float
+
+
+# For the start of a run, and for each place that a dressing leads to, where a garment makes up for
+# more.
+_TO_START = _Search(steps=1500, reached=0.0, allowed=1e-3)
+_ON_THE_WAY = _Search(steps=800, reached=0.01, allowed=0.05)
 
 
 class ArmReachError(ValueError):
@@ -106,52 +125,52 @@ def set_up_arms(
         (left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, parameters or RateParameters()
     )
     still = np.zeros_like(pair.home)
-    q, _ = _sent(
-        pair, pair.home, still, grippers, "its gripper's place at the start", placement, person
-    )
+    goals = _goals(grippers, placement)
+    what = "its gripper's place at the start"
+    q, _ = _sent(pair, pair.home, still, goals, what, person, _TO_START)
     return ArmSetup(pair, q)
+
+
+def _goals(grippers: np.ndarray, placement: ArmPlacement) -> tuple[GripperGoal, GripperGoal]:
+    """Returns goals of both arms with grippers at rest at (2,3), m, hands as they are placed."""
+    left, right = (GripperGoal(p, np.zeros(3), placement.hand) for p in grippers)
+    return left, right
 
 
 def _sent(
     pair: ArmPair,
     q: np.ndarray,
     rate: np.ndarray,
-    grippers: np.ndarray,
+    goals: tuple[GripperGoal, GripperGoal],
     what: str,
-    placement: ArmPlacement,
     person: Capsules,
-    steps: int = _SEARCH_STEPS,
-    reached: float = 0.0,
-    allowed: float = _NEAR,
+    search: _Search,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns joints and their rates (2,7) of arms that were sent to `grippers` (2,3), m.
+    """Returns joints and their rates (2,7) of arms that were sent to their goals.
 
     Args:
         pair: of arms.
         q: (2,7) joints from where on, rad.
         rate: (2,7) of them then, rad/s.
-        grippers: left, then right.
-        what: they are at, for messages.
-        placement: of the arms.
+        goals: of left and right gripper.
+        what: the goals are at, for messages.
         person: to keep away from.
-        steps: at most.
-        reached: so near, m, they need go no further.
-        allowed: by which they may end short, m.
+        search: how long, and how near.
 
     Raises:
-        ArmReachError: one ends further away.
+        ArmReachError: one ends further away than the search allows.
     """
-    goals = [GripperGoal(p, np.zeros(3), placement.hand) for p in grippers]
+    grippers = np.stack([goal.position for goal in goals])
     short = np.full(2, np.inf)
-    for _ in range(steps):
-        rate = pair.rates(q, rate, (goals[0], goals[1]), _SEARCH_STEP, person).rate
+    for _ in range(search.steps):
+        rate = pair.rates(q, rate, goals, _SEARCH_STEP, person).rate
         q = q + _SEARCH_STEP * rate
         at = [arm.tool_position(row) for arm, row in zip(pair.arms, q, strict=True)]
         short = np.linalg.norm(np.stack(at) - grippers, axis=1)
-        if short.max() < reached:
+        if short.max() < search.reached:
             break
     for i, side in enumerate(SIDES):
-        if short[i] > allowed:
+        if short[i] > search.allowed:
             raise ArmReachError(
                 f"the {side} arm does not reach {what}, {np.round(grippers[i], 3).tolist()} m: "
                 f"it ends {100.0 * short[i]:.1f} cm short"
@@ -176,18 +195,8 @@ def check_reach(
     """
     q, rate = setup.start, np.zeros_like(setup.start)
     for what, grippers in places.items():
-        q, rate = _sent(
-            setup.pair,
-            q,
-            rate,
-            grippers,
-            what,
-            placement,
-            person,
-            steps=_WAY_STEPS,
-            reached=_REACHED,
-            allowed=_SHORT,
-        )
+        goals = _goals(grippers, placement)
+        q, rate = _sent(setup.pair, q, rate, goals, what, person, _ON_THE_WAY)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from drake_dress.diagrams.build import (
     safety_limits,
     station_parameters,
 )
-from drake_dress.diagrams.dressing import Dressing, make_dressing
+from drake_dress.diagrams.dressing import ControlSetup, Dressing, make_dressing
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.hardware_station import (
     at_start,
@@ -151,15 +151,7 @@ def wired(
     local = local_setup(p.scenario, p.policy)
     if local is not None and record is not None:
         local = replace(local, record=record)
-    return make_dressing(
-        p.station,
-        p.garments.plant,
-        p.policy,
-        rates(p.scenario),
-        p.limits,
-        writer,
-        p.page,
-        predictor(p.scenario),
-        local,
-        p.beside,
+    control = ControlSetup(
+        p.policy, rates(p.scenario), p.limits, predictor(p.scenario), local, p.beside
     )
+    return make_dressing(p.station, p.garments.plant, control, writer, p.page)

@@ -27,7 +27,6 @@ from drake_dress.systems.arm_muscles import ArmMuscles
 from drake_dress.systems.hand_tremor import HandTremor
 from drake_dress.systems.passive_person import PassivePerson
 
-FloatArray = np.ndarray
 Kind = Literal["dummy", "passive", "active"]
 # Steps of the plant from one decision of an active person to the next: no will is faster.
 _WILL_STEPS = 3

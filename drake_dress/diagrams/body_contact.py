@@ -8,7 +8,6 @@ arm's capsule is thinner by that much, so that the rest pose stays one.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
 from pydrake.geometry import Capsule as CapsuleShape
 from pydrake.math import RigidTransform, RotationMatrix
@@ -16,17 +15,16 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from drake_dress.models.arm.clearance import Capsules, clearance
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
     ArmPose,
     BodyMeasures,
     Capsule,
     Posture,
-    Side,
     arm_rotations,
     shoulder_joint,
 )
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.sides import Side
 
 # Of each surface, N/m; two in series have half of it. An arm that the garment draws against the
 # chest with 20 N goes 4 mm into it, as flesh does.

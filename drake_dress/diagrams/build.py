@@ -35,7 +35,8 @@ from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
-from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, unique_edges
+from drake_dress.models.garment.edges import unique_edges
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -119,76 +119,121 @@ class Dressing:
         )
 
 
+@dataclass(frozen=True)
+class ControlSetup:
+    """The controllers: what they are made of, and how they are timed and limited.
+
+    Attributes:
+        policy: of the global controller, with the controller's garment.
+        rates: of controllers and log.
+        limits: that the governor keeps between controllers and grippers.
+        predictor: of the person's arms; by default they are believed to stay.
+        local: the local controller between plan and governor; the plan is followed when None.
+        beside: whether controllers solve in the background, the global one in a worker process.
+    """
+
+    policy: DressingPolicy
+    rates: Rates
+    limits: SafetyLimits
+    predictor: MotionPredictor = field(default_factory=StillPredictor)
+    local: LocalSetup | None = None
+    beside: bool = False
+
+
+@dataclass(frozen=True)
+class _Controllers:
+    """The systems that control the grippers, from the plan down to the arms' joints.
+
+    Attributes:
+        mpc: the global controller.
+        asking: what turns plans into requested velocities.
+        governor: of safety.
+        arms: of the joints; None where grippers float.
+    """
+
+    mpc: GlobalMpc
+    asking: PlanFollower | LocalCompensation
+    governor: SafetyGovernor
+    arms: ArmController | None
+
+
 def make_dressing(
     station: Station,
     mesh: GarmentMesh,
-    policy: DressingPolicy,
-    rates: Rates,
-    limits: SafetyLimits,
+    control: ControlSetup,
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
-    predictor: MotionPredictor | None = None,
-    local: LocalSetup | None = None,
-    beside: bool = False,
 ) -> Dressing:
     """Returns station and controllers wired together.
 
     Args:
         station: simulated or hardware; only its exported ports are used.
         mesh: the true garment; where it is not known, the controller's.
-        policy: of the global controller, with the controller's garment.
-        rates: of controllers and log.
-        limits: that stand between controllers and grippers.
+        control: the controllers.
         writer: open log, if one is kept.
         meshcat: where the run is shown, if it is.
-        predictor: what is believed of how the arms move on; that they stay, when None.
-        local: the local controller between plan and governor; the plan is followed when None.
-        beside: whether controllers solve beside the rest, the global one in a process of its own.
     """
     w = Wiring(station)
-    believed = predictor or StillPredictor()
-    p = policy.parameters
-    predicted = w.add("human_predictor", HumanPredictor(believed, p.time_step, p.horizon))
+    controllers = _add_controllers(w, control)
+    if writer is not None:
+        _add_recorder(w, writer, mesh, control, controllers)
+    if meshcat is not None:
+        _add_visualizer(w, meshcat, mesh, controllers.mpc)
+    diagram = w.builder.Build()
+    diagram.set_name("dressing")
+    return Dressing(diagram, station, controllers.mpc, control.local)
+
+
+def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
+    """Adds the controllers, wired to each other and to the station."""
+    policy, rates, p = control.policy, control.rates, control.policy.parameters
+    predicted = w.add("human_predictor", HumanPredictor(control.predictor, p.time_step, p.horizon))
     mpc = w.add(
         "global_mpc",
         GlobalMpc(
             policy,
             rates.global_period,
             rates.global_delay,
-            waits=not station.in_real_time,
-            beside=beside,
+            waits=not w.of.in_real_time,
+            beside=control.beside,
         ),
     )
-    asking = w.add(*_plan_to_request(local, beside))
+    asking = w.add(*_plan_to_request(control.local, control.beside))
     governor = w.add(
         "safety_governor",
         SafetyGovernor(
-            station.start_grippers, rates.command_period, limits, policy.person, policy.held_offsets
+            w.of.start_grippers,
+            rates.command_period,
+            control.limits,
+            policy.person,
+            policy.held_offsets,
         ),
     )
     w.connect(w.station, "estimate.joint_position", predicted, "joint_position")
     for quantity in MOTION:
         w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
     w.connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
-    if local is not None:
-        _add_local_inputs(w, local, believed, asking)
+    if control.local is not None:
+        _add_local_inputs(w, control.local, control.predictor, asking)
     w.connect(mpc, "plan", asking, "plan")
     _wire_governor(w, asking, governor)
-    arms = None
-    if station.robots is None:
-        for side in SIDES:
-            command = f"{side}_gripper.position_command"
-            w.connect(governor, f"{side}_position_command", w.station, command)
-    else:
-        arms = _add_arms(w, station.robots, policy, rates, governor)
-    if writer is not None:
-        solves = None if local is None else asking
-        _add_recorder(w, writer, mesh, policy, rates, mpc, governor, arms, solves)
-    if meshcat is not None:
-        _add_visualizer(w, meshcat, mesh, mpc)
-    diagram = w.builder.Build()
-    diagram.set_name("dressing")
-    return Dressing(diagram, station, mpc, local)
+    return _Controllers(mpc, asking, governor, _command_grippers(w, control, governor))
+
+
+def _command_grippers(
+    w: Wiring, control: ControlSetup, governor: SafetyGovernor
+) -> ArmController | None:
+    """Has grippers go where the governor commands.
+
+    Returns:
+        What moves the arms; None where grippers float.
+    """
+    if w.of.robots is not None:
+        return _add_arms(w, w.of.robots, control, governor)
+    for side in SIDES:
+        command = f"{side}_gripper.position_command"
+        w.connect(governor, f"{side}_position_command", w.station, command)
+    return None
 
 
 def _plan_to_request(
@@ -231,14 +276,19 @@ def _wire_governor(
 def _add_arms(
     w: Wiring,
     robots: ArmSetup,
-    policy: DressingPolicy,
-    rates: Rates,
+    control: ControlSetup,
     governor: SafetyGovernor,
 ) -> ArmController:
     """Adds what moves both arms' joints so that grippers go where the governor commands."""
     arms = w.add(
         "arm_controller",
-        ArmController(robots.pair, robots.start, rates.arm_period, policy.person, rates.arm_offset),
+        ArmController(
+            robots.pair,
+            robots.start,
+            control.rates.arm_period,
+            control.policy.person,
+            control.rates.arm_offset,
+        ),
     )
     w.connect(w.station, "estimate.joint_position", arms, "joint_position")
     for side in SIDES:
@@ -256,14 +306,11 @@ def _add_recorder(
     w: Wiring,
     writer: RunLogWriter,
     mesh: GarmentMesh,
-    policy: DressingPolicy,
-    rates: Rates,
-    mpc: GlobalMpc,
-    governor: SafetyGovernor,
-    arms: ArmController | None,
-    local: LocalCompensation | None,
+    control: ControlSetup,
+    controllers: _Controllers,
 ) -> None:
     """Adds what writes the log: the truth where it is known, else what is believed."""
+    policy, rates, arms = control.policy, control.rates, controllers.arms
     recorder = w.add(
         "run_recorder",
         RunRecorder(
@@ -273,7 +320,7 @@ def _add_recorder(
             w.of.person.placed_capsules if w.sees_truth else policy.person,
             rates.log_period,
             rates.command_period,
-            local is not None,
+            control.local is not None,
             None if arms is None else rates.plant_period,
         ),
     )
@@ -284,8 +331,8 @@ def _add_recorder(
             for quantity in ("position", "velocity", "torque"):
                 measured = f"{side}_arm.{quantity}_measured"
                 w.connect(w.station, measured, recorder, f"{side}_arm_{quantity}")
-    if local is not None:
-        w.connect(local, "solve_time", recorder, "local_solve_time")
+    if control.local is not None:
+        w.connect(controllers.asking, "solve_time", recorder, "local_solve_time")
     if w.sees_truth:
         for name in ("contact", "contact_force", "body_poses"):
             w.connect(w.station, f"cheat_{name}", recorder, name)
@@ -293,9 +340,9 @@ def _add_recorder(
         w.connect(w.station, w.true(name), recorder, name)
     w.connect(w.station, "estimate.joint_position", recorder, "estimated_joint_position")
     w.connect(w.station, "estimate.garment_position", recorder, "estimated_position")
-    w.connect(mpc, "stage", recorder, "stage")
-    w.connect(mpc, "solve_time", recorder, "solve_time")
-    w.connect(governor, "verdict", recorder, "verdict")
+    w.connect(controllers.mpc, "stage", recorder, "stage")
+    w.connect(controllers.mpc, "solve_time", recorder, "solve_time")
+    w.connect(controllers.governor, "verdict", recorder, "verdict")
     for side in SIDES:
         for quantity in ("position", "force"):
             measured = f"{side}_gripper.{quantity}_measured"

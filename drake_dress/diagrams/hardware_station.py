@@ -32,6 +32,7 @@ from drake_dress.diagrams.person import Person
 from drake_dress.diagrams.station import ARM_STATUS, Station
 from drake_dress.models.arm.chain import SerialArm
 from drake_dress.models.arm.status_check import JointBounds
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.garment_belief import GarmentBounds
@@ -53,8 +54,6 @@ from drake_dress.systems.lcm_inbox import (
 from drake_dress.systems.point_messages import PointReceiver, decode_points
 from drake_dress.systems.station_watch import StationWatch
 from drake_dress.systems.status_messages import StatusCheck
-
-FloatArray = np.ndarray
 
 # Of looking at what has come, s.
 _WATCH_PERIOD = 0.005
@@ -306,49 +305,78 @@ def listen(
         StationSilentError: not all were heard in time; the message tells which, and what came
             instead.
     """
-    sources = _sources(p)
-    first: dict[str, Any] = {}
-    wrong: dict[str, Finding] = {}
+    first = _First(_sources(p), told)
+    for name, source in first.sources.items():
+        lcm.Subscribe(source.channel, partial(first.take, name))
+    end = clock.monotonic() + p.wait
+    while first.missing and clock.monotonic() < end and not stopped():
+        lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
+    if first.missing:
+        raise StationSilentError(f"{', '.join(first.unheard())} for {p.wait:g} s")
+    messages = first.messages
+    points = {n: decode_points(messages[n]) for n in ("garment", "person")}
+    return Heard(
+        np.array([messages[f"{side}_arm"].joint_position for side in SIDES]),
+        points["garment"][:, :3],  # type: ignore[index]
+        points["person"][:, :3],  # type: ignore[index]
+    )
 
-    # a garment is held against the grippers, so it waits for both arms
-    waiting: set[str] = set()
-    arms = {f"{side}_arm" for side in SIDES}
 
-    def take(name: str, raw: bytes) -> None:
-        if name in first:
+class _First:
+    """The first sound message of each source.
+
+    Args:
+        sources: to listen to.
+        told: is called with the name of a source when it is heard.
+
+    Attributes:
+        sources: likewise.
+        messages: by the names of the sources that were heard.
+    """
+
+    def __init__(self, sources: dict[str, _Source], told: Callable[[str], None]) -> None:
+        self.sources = sources
+        self.messages: dict[str, Any] = {}
+        self._told = told
+        # what was wrong with the last message of a source
+        self._wrong: dict[str, Finding] = {}
+        # a garment is held against the grippers, so it waits for both arms
+        self._waiting: set[str] = set()
+        self._arms = {f"{side}_arm" for side in SIDES}
+
+    @property
+    def missing(self) -> list[str]:
+        """Returns the sources that were not heard yet."""
+        return [name for name in self.sources if name not in self.messages]
+
+    def take(self, name: str, raw: bytes) -> None:
+        """Takes a message of a source."""
+        if name in self.messages:
             return
-        if name == "garment" and not arms <= set(first):
-            waiting.add(name)
+        if name == "garment" and not self._arms <= set(self.messages):
+            self._waiting.add(name)
             return
-        waiting.discard(name)
-        taken = sources[name].decoder(raw)
+        self._waiting.discard(name)
+        taken = self.sources[name].decoder(raw)
         if taken.finding is None:
             return
         # before the first command, an arm is idle
         if taken.finding.fault & ~Fault.IDLE:
-            wrong[name] = taken.finding
+            self._wrong[name] = taken.finding
         elif stamp(taken.message) == 0.0:
             # it may be the first message of a clock that begins
-            wrong[name] = Finding(Fault.UNSTAMPED, "utime is never filled in: it is 0")
+            self._wrong[name] = Finding(Fault.UNSTAMPED, "utime is never filled in: it is 0")
         else:
-            first[name] = taken.message
-            told(name)
+            self.messages[name] = taken.message
+            self._told(name)
 
-    for name, source in sources.items():
-        lcm.Subscribe(source.channel, partial(take, name))
-    end = clock.monotonic() + p.wait
-    while len(first) < len(sources) and clock.monotonic() < end and not stopped():
-        lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
-    missing = [n for n in sources if n not in first]
-    if missing:
-        parts = [_unheard(sources[n].channel, wrong.get(n)) for n in missing if n not in waiting]
-        raise StationSilentError(f"{', '.join(parts)} for {p.wait:g} s")
-    points = {n: decode_points(first[n]) for n in ("garment", "person")}
-    return Heard(
-        np.array([first[f"{side}_arm"].joint_position for side in SIDES]),
-        points["garment"][:, :3],  # type: ignore[index]
-        points["person"][:, :3],  # type: ignore[index]
-    )
+    def unheard(self) -> list[str]:
+        """Returns for each missing source what came in place of something sound.
+
+        A garment that only waits for the arms is left out.
+        """
+        named = [name for name in self.missing if name not in self._waiting]
+        return [_unheard(self.sources[name].channel, self._wrong.get(name)) for name in named]
 
 
 def _unheard(channel: str, wrong: Finding | None) -> str:
@@ -405,7 +433,35 @@ def make_hardware_station(
     builder = DiagramBuilder()
     bus = builder.AddNamedSystem("lcm", LcmInterfaceSystem(lcm))
     sources = _sources(p)
-    watch = builder.AddNamedSystem(
+    watch = _add_watch(builder, p, sources)
+    inboxes = _add_inboxes(builder, bus, sources, watch)
+    builder.ExportOutput(watch.GetOutputPort("permission"), "permission")
+
+    measure = builder.AddNamedSystem("arm_measurement", ArmMeasurement(robots.pair.arms))
+    for side in SIDES:
+        _wire_arm(builder, p, bus, side, sources[f"{side}_arm"])
+        _wire_gripper(builder, side, watch, measure)
+    meter = _add_meter(builder, p.links, inboxes)
+    _export_estimates(builder, inboxes, heard)
+    for name in p.cameras:
+        _wire_camera(builder, bus, name, sources[f"camera_{name}"])
+    diagram = builder.Build()
+    diagram.set_name("station")
+    grippers = np.stack(
+        [arm.tool_position(q) for arm, q in zip(robots.pair.arms, robots.start, strict=True)]
+    )
+    return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm, heard)
+
+
+# Subscribers to the sources' messages, by the name of the source.
+_Inboxes = dict[str, LcmSubscriberSystem]
+
+
+def _add_watch(
+    builder: DiagramBuilder, p: HardwareParameters, sources: dict[str, _Source]
+) -> StationWatch:
+    """Adds what watches the sources and permits motion."""
+    watch: StationWatch = builder.AddNamedSystem(
         "station_watch",
         StationWatch(
             {n: WatchSettings(s.max_age, late=s.max_age) for n, s in sources.items()},
@@ -414,6 +470,16 @@ def make_hardware_station(
             p.wall,
         ),
     )
+    return watch
+
+
+def _add_inboxes(
+    builder: DiagramBuilder,
+    bus: LcmInterfaceSystem,
+    sources: dict[str, _Source],
+    watch: StationWatch,
+) -> _Inboxes:
+    """Adds what takes the messages of each source, for the watch and for whoever reads them."""
     inboxes = {}
     for name, source in sources.items():
         inboxes[name] = builder.AddNamedSystem(
@@ -425,32 +491,41 @@ def make_hardware_station(
             ),
         )
         builder.Connect(inboxes[name].get_output_port(), watch.GetInputPort(name))
-    builder.ExportOutput(watch.GetOutputPort("permission"), "permission")
+    return inboxes
 
-    measure = builder.AddNamedSystem("arm_measurement", ArmMeasurement(robots.pair.arms))
-    for side in SIDES:
-        _wire_arm(builder, p, bus, side, sources[f"{side}_arm"])
-        status = builder.GetSubsystemByName(f"{side}_arm_status")
-        for name, port in (
-            ("position", "position_measured"),
-            ("velocity", "velocity_measured"),
-            ("torque_external", "torque_external"),
-        ):
-            builder.Connect(status.GetOutputPort(port), measure.GetInputPort(f"{side}_{name}"))
-        builder.Connect(
-            watch.GetOutputPort(f"{side}_arm_valid"), measure.GetInputPort(f"{side}_valid")
+
+def _wire_gripper(
+    builder: DiagramBuilder, side: str, watch: StationWatch, measure: ArmMeasurement
+) -> None:
+    """Has a gripper measured by its arm's joints, and exports that and whether the arm stopped."""
+    status = builder.GetSubsystemByName(f"{side}_arm_status")
+    for name, port in (
+        ("position", "position_measured"),
+        ("velocity", "velocity_measured"),
+        ("torque_external", "torque_external"),
+    ):
+        builder.Connect(status.GetOutputPort(port), measure.GetInputPort(f"{side}_{name}"))
+    builder.Connect(watch.GetOutputPort(f"{side}_arm_valid"), measure.GetInputPort(f"{side}_valid"))
+    builder.ExportOutput(watch.GetOutputPort(f"{side}_arm_stopped"), f"{side}_arm.stopped")
+    for quantity in ("position", "velocity", "force"):
+        builder.ExportOutput(
+            measure.GetOutputPort(f"{side}_gripper_{quantity}"),
+            f"{side}_gripper.{quantity}_measured",
         )
-        builder.ExportOutput(watch.GetOutputPort(f"{side}_arm_stopped"), f"{side}_arm.stopped")
-        for quantity in ("position", "velocity", "force"):
-            builder.ExportOutput(
-                measure.GetOutputPort(f"{side}_gripper_{quantity}"),
-                f"{side}_gripper.{quantity}_measured",
-            )
-    meter = builder.AddNamedSystem(
-        "command_meter", CommandMeter(p.links.command_period, p.links.command_offset)
+
+
+def _add_meter(builder: DiagramBuilder, links: Links, inboxes: _Inboxes) -> CommandMeter:
+    """Adds what measures how old an arm's status is when a command is sent."""
+    meter: CommandMeter = builder.AddNamedSystem(
+        "command_meter", CommandMeter(links.command_period, links.command_offset)
     )
     for side in SIDES:
         builder.Connect(inboxes[f"{side}_arm"].get_output_port(), meter.GetInputPort(side))
+    return meter
+
+
+def _export_estimates(builder: DiagramBuilder, inboxes: _Inboxes, heard: Heard) -> None:
+    """Exports where garment and person are believed to be; until there is news, what was heard."""
     starts: Mapping[str, FloatArray] = {"garment": heard.garment, "person": heard.person}
     for name, exported in (
         ("garment", {"position": "garment_position", "velocity": "garment_velocity"}),
@@ -460,14 +535,6 @@ def make_hardware_station(
         builder.Connect(inboxes[name].get_output_port(), points.get_input_port())
         for port, out in exported.items():
             builder.ExportOutput(points.GetOutputPort(port), f"estimate.{out}")
-    for name in p.cameras:
-        _wire_camera(builder, bus, name, sources[f"camera_{name}"])
-    diagram = builder.Build()
-    diagram.set_name("station")
-    grippers = np.stack(
-        [arm.tool_position(q) for arm, q in zip(robots.pair.arms, robots.start, strict=True)]
-    )
-    return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm, heard)
 
 
 def _guarded(

@@ -21,6 +21,7 @@ from drake_dress.diagrams.studio import Studio
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed, remove_results
 from drake_dress.interrupt import Interrupt, caught_interrupt
+from drake_dress.machine import left_out_of_garbage
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_writer import RunLogWriter
@@ -67,7 +68,10 @@ def run_lab(
             open_run_log(out, scenario, meshes, station) as writer,
         ):
             lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
-            heard, ended, wall_time = _play(lab, scenario, realtime_rate, writer, interrupt)
+            simulator = _rehearsed(lab, realtime_rate)
+            # a look at all garbage takes 0.1 s, for which no status would be sent
+            with left_out_of_garbage():
+                heard, ended, wall_time = _play(lab, simulator, scenario, writer, interrupt)
         signal = interrupt if ended is None else None
         if not heard:
             remove_results(out, RUN_FILES[:1])
@@ -76,15 +80,23 @@ def run_lab(
         return concluded(out, wall_time, report, signal)
 
 
+def _rehearsed(lab: Lab, realtime_rate: float) -> Simulator:
+    """Returns the lab's simulator; what steps first anywhere is compiled, which takes a minute."""
+    simulator = Simulator(lab.diagram)
+    simulator.set_target_realtime_rate(realtime_rate)
+    cloth = lab.station.cloth
+    cloth.rehearse(cloth.GetMyContextFromRoot(simulator.get_context()))
+    simulator.Initialize()
+    return simulator
+
+
 def _play(
-    lab: Lab, scenario: Scenario, realtime_rate: float, writer: RunLogWriter, interrupt: Interrupt
+    lab: Lab, simulator: Simulator, scenario: Scenario, writer: RunLogWriter, interrupt: Interrupt
 ) -> tuple[bool, str | None, float]:
     """Runs until commands have ended.
 
     Returns whether there were any, why it ended unless by a signal, and how long the run took, s.
     """
-    simulator = Simulator(lab.diagram)
-    simulator.set_target_realtime_rate(realtime_rate)
     root = simulator.get_context()
     at = lab.player.GetMyContextFromRoot(root)
     station = lab.station.diagram
@@ -94,9 +106,6 @@ def _play(
     now, told, stops = 0.0, 0.0, dict.fromkeys(SIDES, Stop.NONE)
     events: list[tuple[float, str]] = []
     ended: str | None = None
-    # before statuses are sent: what steps first anywhere may take a minute, to be compiled
-    lab.station.cloth.rehearse(lab.station.cloth.GetMyContextFromRoot(root))
-    simulator.Initialize()
     while not interrupt.is_set() and ended is None:
         now += _CHUNK
         simulator.AdvanceTo(now)

@@ -221,7 +221,7 @@ class _LabMaker(Wiring):
                 camera.name,
                 self.links.of_camera(camera.name),
                 take,
-                sizes,  # type: ignore[arg-type]
+                sizes,
                 self.lcm,
                 1.0 / camera.rate,
                 self.faults,

@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.geometry import Capsule as CapsuleShape
 from pydrake.geometry import Sphere
 from pydrake.math import RigidTransform, RotationMatrix
@@ -36,20 +35,18 @@ from pydrake.systems.framework import Context
 
 from drake_dress.diagrams.body_contact import add_body_contact
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.human.arm import JOINT_NAMES, Arm, Arms
 from drake_dress.models.human.body import (
-    SIDES,
     ArmPose,
     BodyMeasures,
     Capsule,
     Posture,
-    Side,
     body_capsules,
     shoulder_joint,
 )
+from drake_dress.models.sides import SIDES, Side
 
-FloatArray = npt.NDArray[np.float64]
-IndexArray = npt.NDArray[np.intp]
 Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
 # A coat that pulls at one side of the chest with 20 N turns a person who stands firm by less than
@@ -188,19 +185,10 @@ def add_person(
     missing = [side for side in SIDES if side not in arms]
     if missing:
         raise UserError("person", "arms", f"lacks {', '.join(missing)}, expected left and right")
-    place = np.zeros(2) if position is None else np.asarray(position, dtype=np.float64)
-    if place.shape != (2,) or not np.all(np.isfinite(place)):
-        raise UserError(
-            "person", "position", f"has shape {place.shape}, expected (2,) finite numbers of m"
-        )
+    origin = _origin(position)
     model = plant.AddModelInstance("person")
     capsules = body_capsules(measures, posture)
-    origin = np.array([place[0], place[1], 0.0])
-    torso = plant.AddRigidBody("torso", model, SpatialInertia.SolidBoxWithMass(60.0, 0.2, 0.4, 0.6))
-    if turns:
-        _add_stance(plant, torso, RigidTransform(origin))
-    else:
-        plant.WeldFrames(plant.world_frame(), torso.body_frame(), RigidTransform(origin))
+    torso = _add_torso(plant, model, origin, turns)
     bodies: dict[str, RigidBody] = {"torso": torso}
     points: list[tuple[int, FloatArray]] = []
     for side in SIDES:
@@ -228,6 +216,20 @@ def add_person(
     )
 
 
+def _origin(position: FloatArray | None) -> FloatArray:
+    """Returns the origin (3,) of the torso's frame, m, world.
+
+    Raises:
+        UserError: the position is not two finite numbers.
+    """
+    place = np.zeros(2) if position is None else np.asarray(position, dtype=np.float64)
+    if place.shape != (2,) or not np.all(np.isfinite(place)):
+        raise UserError(
+            "person", "position", f"has shape {place.shape}, expected (2,) finite numbers of m"
+        )
+    return np.array([place[0], place[1], 0.0])
+
+
 def person_arms(
     measures: BodyMeasures, posture: Posture, arms: dict[Side, ArmPose], joints: JointParameters
 ) -> Arms:
@@ -248,7 +250,20 @@ def _angles(pose: ArmPose) -> list[float]:
     return [pose.abduction, pose.extension, pose.rotation, pose.elbow_flexion]
 
 
-def _add_stance(plant: MultibodyPlant, torso: RigidBody, X_WTorso: RigidTransform) -> None:  # noqa: N803
+def _add_torso(
+    plant: MultibodyPlant, model: ModelInstanceIndex, origin: FloatArray, turns: bool
+) -> RigidBody:
+    """Adds the torso, welded to the world, or on a joint about the vertical if it turns."""
+    torso = plant.AddRigidBody("torso", model, SpatialInertia.SolidBoxWithMass(60.0, 0.2, 0.4, 0.6))
+    X_WTorso = RigidTransform(origin)
+    if turns:
+        _add_stance(plant, torso, X_WTorso)
+    else:
+        plant.WeldFrames(plant.world_frame(), torso.body_frame(), X_WTorso)
+    return torso
+
+
+def _add_stance(plant: MultibodyPlant, torso: RigidBody, X_WTorso: RigidTransform) -> None:
     """Adds the joint by which a person turns; its actuator holds it at the yaw it is given."""
     foot = plant.AddFrame(FixedOffsetFrame("stance_frame", plant.world_frame(), X_WTorso))
     joint = plant.AddJoint(
@@ -290,7 +305,7 @@ def _add_arm(
         ("rotation", second, None, upper, sign * z, pose.rotation, k, d),
         ("elbow", upper, at_elbow, fore, -y, pose.elbow_flexion, ke, de),
     )
-    for name, parent, X_PJ, child, axis, angle, stiffness, damping in chain:  # noqa: N806
+    for name, parent, X_PJ, child, axis, angle, stiffness, damping in chain:
         low, high = getattr(joints, f"{name}_limits")
         joint = plant.AddJoint(
             RevoluteJoint(
@@ -308,7 +323,7 @@ def _add_arm(
     return upper, fore
 
 
-def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None) -> FixedOffsetFrame:  # noqa: N803
+def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None) -> FixedOffsetFrame:
     return FixedOffsetFrame(f"{name}_frame", parent.body_frame(), X_PJ or RigidTransform())
 
 

@@ -10,6 +10,7 @@ from drake_dress.diagrams.assemble import Garments
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
 from drake_dress.diagrams.station import Station
 from drake_dress.file_output import RUN_FILES
+from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 
 
@@ -27,14 +28,16 @@ def open_run_log(
     person = station.person
     return RunLogWriter(
         out / RUN_FILES[0],
-        garment=garments.plant,
-        scenario_text=resolved_yaml(scenario),
-        version=__version__,
-        seed=scenario.seed,
-        radius=person.radius,
-        capsule_radius=[c.radius for c in person.capsules],
-        estimate_garment=garments.belief,
-        bases=arm_bases(station.robots),
-        estimated=station.in_real_time,
+        LogContent(
+            garment=garments.plant,
+            scenario_text=resolved_yaml(scenario),
+            version=__version__,
+            seed=scenario.seed,
+            radius=person.radius,
+            capsule_radius=[c.radius for c in person.capsules],
+            estimate_garment=garments.belief,
+            bases=arm_bases(station.robots),
+            estimated=station.in_real_time,
+        ),
         results=RUN_FILES[1:],
     )

@@ -61,6 +61,7 @@ from drake_dress.diagrams.panda_driver import SimPandaDriver
 from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.panda import LIMITS
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
@@ -91,10 +92,10 @@ from drake_dress.systems.arm_measurement import ArmMeasurement
 from drake_dress.systems.cloth_plant import ClothPlant
 from drake_dress.systems.delay import delayed
 from drake_dress.systems.floating_gripper import FloatingGripper
+from drake_dress.systems.person_bodies import PersonBodies
 from drake_dress.systems.tool_load import ToolLoad
 from drake_dress.systems.tool_motion import ToolMotion
 
-FloatArray = np.ndarray
 # What a station takes and tells of a garment or a gripper.
 MOTION = ("position", "velocity")
 # What an arm reports, as Drake's PandaStatusSender has it.
@@ -253,10 +254,7 @@ def make_simulated_station(
     else:
         measured = _wire_drivers(builder, plant, arms, robots, p)
         motion, load = _wire_tools(builder, plant, cloth, arms)
-        both = builder.AddSystem(ExternallyAppliedSpatialForceMultiplexer(2))
-        builder.Connect(forces, both.get_input_port(0))
-        builder.Connect(load, both.get_input_port(1))
-        forces = both.get_output_port()
+        forces = _joined(builder, forces, load)
     builder.Connect(forces, plant.get_applied_spatial_force_input_port())
     add_behaviour(
         builder,
@@ -270,15 +268,8 @@ def make_simulated_station(
     _connect_grippers(builder, cloth, motion, grippers, p)
     _export_measured(builder, measured)
     if sight is not None:
-        export_oracles(
-            builder,
-            cloth,
-            plant,
-            person.joint_points,
-            sight.transfer,
-            p.effects,
-            sight.period,
-        )
+        points = person.joint_points
+        export_oracles(builder, cloth, plant, points, sight.transfer, p.effects, sight.period)
         permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
         builder.ExportOutput(permission.get_output_port(), "permission")
     _export_truth(builder, cloth, plant)
@@ -309,8 +300,7 @@ def _add_cloth(
             (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
             settled(p, hung_garment(p)),
             grippers,
-            person.capsules,
-            person.body_indices,
+            PersonBodies(person.capsules, person.body_indices),
             p.grasp_stiffness,
             Mounts(p.effects),
             p.beside,
@@ -432,6 +422,14 @@ def _wire_tools(
         )
     motion = {(s, q): tool.GetOutputPort(f"{s}_{q}") for s in SIDES for q in MOTION}
     return motion, load.get_output_port()
+
+
+def _joined(builder: DiagramBuilder, first: OutputPort, second: OutputPort) -> OutputPort:
+    """Returns the port of two lists of spatial forces as one."""
+    both = builder.AddSystem(ExternallyAppliedSpatialForceMultiplexer(2))
+    builder.Connect(first, both.get_input_port(0))
+    builder.Connect(second, both.get_input_port(1))
+    return both.get_output_port()
 
 
 def person_at_rest(p: StationParameters, body: BodyMeasures, person: Person) -> Capsules:

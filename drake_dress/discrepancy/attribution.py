@@ -13,16 +13,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.candidates import Candidate, candidates
 from drake_dress.discrepancy.experiment import Experiment, Level, Told, level_of
 from drake_dress.discrepancy.regression import Extrapolation, solve_bounded, solve_pooled
 from drake_dress.discrepancy.whitening import Whitening, whiten
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.effects.effect import Effect
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # Fits that are tried after screening, and the least share of the best one's gain they must promise.
 _SHORTLIST, _PROMISING = 4, 0.3

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mass import LocalMass
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.sampling import spread_out
-
-FloatArray = npt.NDArray[np.float64]
 
 # Effects that show only where the garment touches the person.
 NEED_CONTACT = frozenset(

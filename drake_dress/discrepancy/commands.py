@@ -34,6 +34,7 @@ from drake_dress.file_output import (
     remove_results,
     write_text,
 )
+from drake_dress.models.effects.effect import Effect
 
 DURATION = 4.0
 
@@ -123,12 +124,7 @@ def write_dataset(
     """
     if seed < 0:
         raise UserError("--seed", "", f"is {seed}, expected 0 or more")
-    for name in motions:
-        if name not in MOTIONS:
-            named = name or "an empty name"
-            raise UserError("--motions", named, f"is no motion, expected {', '.join(MOTIONS)}")
-        if motions.count(name) > 1:
-            raise UserError("--motions", name, "stands twice, expected it once")
+    _check_motions(motions)
     scenario = load_scenario(scenario_file, overrides)
     seeds = [seed, *hide.encode()]
     rng = np.random.default_rng(seeds)
@@ -147,6 +143,29 @@ def write_dataset(
             motions=motions,
         )
     recordings = [measured(r, sensors, rng) for r in clean]
+    measured_file, answer_file = (out / name for name in DATASET_FILES)
+    with claimed("--out", out, wait=True):
+        remove_results(out, DATASET_FILES)
+        write_recordings(measured_file, recordings, resolved_yaml(scenario))
+        write_json(answer_file, _answer(hidden))
+    print(f"measured.h5 and answer.json: {out}" + (" (random)" if hide == RANDOM else ""))
+
+
+def _check_motions(motions: Sequence[str]) -> None:
+    """Raises UserError where a motion is unknown or named twice."""
+    for name in motions:
+        if name not in MOTIONS:
+            named = name or "an empty name"
+            raise UserError("--motions", named, f"is no motion, expected {', '.join(MOTIONS)}")
+        if motions.count(name) > 1:
+            raise UserError("--motions", name, "stands twice, expected it once")
+
+
+def _answer(hidden: Sequence[Effect]) -> dict[str, Any]:
+    """Returns the content of answer.json: the hidden effects and their parameters.
+
+    Parameters are grouped by effect where there are several.
+    """
     names = [e.NAME for e in hidden]
     answer = {
         "effect": "+".join(names) if names else NOTHING,
@@ -154,12 +173,7 @@ def write_dataset(
     }
     if len(hidden) == 1:
         answer["parameters"] = hidden[0].values()
-    measured_file, answer_file = (out / name for name in DATASET_FILES)
-    with claimed("--out", out, wait=True):
-        remove_results(out, DATASET_FILES)
-        write_recordings(measured_file, recordings, resolved_yaml(scenario))
-        write_json(answer_file, answer)
-    print(f"measured.h5 and answer.json: {out}" + (" (random)" if hide == RANDOM else ""))
+    return answer
 
 
 def _page(out: Path, *told: Any) -> str | None:

@@ -26,10 +26,10 @@ from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.discrepancy.workers import Workers
 from drake_dress.machine import worker_count
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.transfer import barycentric_transfer
 
-FloatArray = npt.NDArray[np.float64]
 Level = Literal["screening", "scenario", "doubled", "refined"]
 LEVELS: tuple[Level, ...] = ("screening", "scenario", "doubled", "refined")
 _Key = tuple[Level, int, tuple[Effect, ...]]

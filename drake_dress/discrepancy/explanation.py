@@ -21,10 +21,9 @@ from drake_dress.discrepancy.attribution import (
 )
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.search import Found, Model, Named, Search
-from drake_dress.discrepancy.whitening import whiten
+from drake_dress.discrepancy.whitening import Whitening, whiten
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect
-
-FloatArray = npt.NDArray[np.float64]
 
 DISCRETISATION = "discretisation"
 # A cause below this confidence is told as likely, not as found.
@@ -209,6 +208,15 @@ def _concluded(
     beyond: float,
     rng: np.random.Generator,
 ) -> Explanation:
+    """Returns the explanation that the search's result amounts to.
+
+    Args:
+        found: where the search ended.
+        coarse: discretisation as a cause, where it is one.
+        numerics: RMS difference of scenario and refined simulation, m.
+        beyond: mean squared residual over noise and numerics, without effects.
+        rng: of the resampling.
+    """
     comparison, w = found.comparison, found.comparison.whitening
     physical = _causes(found)
     predicted = found.model.predicted
@@ -232,37 +240,47 @@ def _concluded(
         gain, left = gain_of(predicted), mean_of(predicted)
     trust = 1.0 if left < _AT_NOISE else float(np.clip(gain[0] / _WHOLE, 0.0, 1.0))
     causes = coarse + [replace(c, confidence=trust * c.confidence) for c in physical]
-    if not causes:
-        verdict = "unexplained" if left > LEFT and not is_covered else "nothing"
-    elif found.rival is not None:
-        verdict = "ambiguous"
-    elif physical and is_open:
-        verdict = "unexplained"
-    else:
-        verdict = "named"
     mean = {
         "scenario": mean_of(scenario),
         "refined": mean_of(refined),
         "extended": left,
         "beyond_numerics": beyond,
     }
-
-    def sizes(residual: FloatArray) -> tuple[float, float]:
-        return _rms(residual, ~w.is_force), _rms(residual, w.is_force, 1)
-
     return Explanation(
-        verdict,
+        _verdict(causes, found.rival is not None, is_open, left > LEFT and not is_covered),
         causes,
         _scores(found),
         mean,
         gain,
-        sizes(w.size(w.data - start)),
-        sizes(w.size(w.data - predicted)),
-        sizes(w.sensor),
+        _sizes(w, w.size(w.data - start)),
+        _sizes(w, w.size(w.data - predicted)),
+        _sizes(w, w.sensor),
         numerics,
         comparison,
         predicted,
     )
+
+
+def _verdict(causes: list[Cause], has_rival: bool, is_open: bool, is_left: bool) -> str:
+    """Returns the verdict, as in `Explanation`.
+
+    Args:
+        causes: that were found.
+        has_rival: whether another effect explains nearly as much.
+        is_open: whether the physical causes leave much of the residual unexplained.
+        is_left: whether more is left than noise and numerics account for.
+    """
+    if not causes:
+        return "unexplained" if is_left else "nothing"
+    if has_rival:
+        return "ambiguous"
+    has_effect = any(c.effect is not None for c in causes)
+    return "unexplained" if has_effect and is_open else "named"
+
+
+def _sizes(w: Whitening, residual: FloatArray) -> tuple[float, float]:
+    """Returns the RMS of the markers' residual, m, and of the forces', N."""
+    return _rms(residual, ~w.is_force), _rms(residual, w.is_force, 1)
 
 
 def _interval(

@@ -17,10 +17,9 @@ from drake_dress.discrepancy.regression import (
     solve_pooled,
 )
 from drake_dress.discrepancy.whitening import NUMERICS_SHARE, Whitening
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.effects.effect import Effect, Parameter
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 # Levels of the recordings, effects.
 _Job = tuple[tuple[Level, ...], Sequence[Effect]]
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.lab import Lab, Numerics
@@ -19,14 +18,12 @@ from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.machine import worker_count
-from drake_dress.models.cloth.elements import IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.effects.composition import seen_points
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.sampling import spread_out
 from drake_dress.models.human.body import ArmPose
 from drake_dress.worker_pool import WorkerPool
-
-FloatArray = npt.NDArray[np.float64]
 
 # How much finer the truth is simulated than the scenario.
 _FINER, _SHORTER = 0.84, 0.5

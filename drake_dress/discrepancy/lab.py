@@ -11,8 +11,8 @@ import numpy as np
 from drake_dress.diagrams.build import arm, effects, material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.composition import GarmentWithEffects, body_with_effects

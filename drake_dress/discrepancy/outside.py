@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect, ForceEffect, Sheet, norms, parameter
 
 # Where the magnet sits in the rest shape: nodes this near to the lowest of the left sleeve, m.

@@ -16,8 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, lsq_linear
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from drake_dress.models.arrays import BoolArray, FloatArray
 
 # Standard deviation of the factor of what halving the step has changed; exact time would be 1.
 _FACTOR = 1.0

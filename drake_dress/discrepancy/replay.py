@@ -23,6 +23,7 @@ import scipy.sparse.linalg as sparse_linalg
 
 from drake_dress.discrepancy.lab import Lab
 from drake_dress.discrepancy.recording import Recording, smoothed
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import Influences
@@ -38,8 +39,6 @@ from drake_dress.models.effects.composition import (
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mounts import Mounts, MountState
 from drake_dress.models.garment.transfer import attach
-
-FloatArray = npt.NDArray[np.float64]
 
 # Length over which a marker's innovation speaks for its surroundings, m.
 _REACH = 0.07
@@ -153,68 +152,38 @@ class Replayer:
             end: of it, s.
             keep: (K,) times at which the whole garment is kept, s.
         """
-        lab, r = self.lab, self.recording
-        effects = lab.with_effects(effects)
-        cloth, person = lab.cloth(effects), lab.person(effects)
+        effects = self.lab.with_effects(effects)
+        cloth, person = self.lab.cloth(effects), self.lab.person(effects)
         h = cloth.time_step
-        begin = float(r.time[0]) if begin is None else begin
-        end = float(r.time[-1]) if end is None else end
-        steps = max(1, int(np.ceil((end - begin) / h - 1e-9)))
-        clock: FloatArray = begin + h * np.arange(steps + 1, dtype=np.float64)
-        held = self._held_at(clock, effects)
-        seen, rate, known = self._targets(clock, effects)
-        joints, joint_rate = self._joints(clock, effects, person.posed)
-        if start is None:
-            x = self._settle(effects, self.settled(), _AGAIN)
-            v = np.zeros_like(x)
-        else:
-            x, v = start
-        state = replace(ClothState.at_rest(x), v=v)
+        clock = self._clock(h, begin, end)
+        inputs = self._inputs(clock, effects, person.posed)
+        state = self._state_at_begin(effects, start)
         mounts = Mounts(effects)
-        away = x[self._held] - held[0]
-        given = np.stack([away[self._side == i].mean(axis=0) for i in (0, 1)])
-        mount = mounts.loaded(given, person.LIMBS)
+        mount = mounts.loaded(self._off_grippers(state.x, inputs.held[0]), person.LIMBS)
         moved = mounts.moved_mass(cloth, self._side)
+        trace = _Trace.empty(inputs.seen.shape, state.x.shape, _steps_at(keep, clock[0], h))
+        trace.note(0, state, self._map @ state.x, self._forces(state))
 
-        markers = np.empty((steps + 1, *seen.shape[1:]))
-        force, touching = np.zeros((steps + 1, 2, 3)), np.zeros(steps + 1)
-        markers[0] = self._map @ x
-        kept = np.array([] if keep is None else np.rint((np.asarray(keep) - begin) / h), dtype=int)
-        positions, velocities = np.empty((len(kept), *x.shape)), np.empty((len(kept), *x.shape))
-        positions[kept == 0], velocities[kept == 0] = x, v
         before = state.v
-        static = not joint_rate.any() and mounts.rigid
-        bodies = person.obstacles(joints[0], joint_rate[0])
-        for k in range(steps):
+        static = not inputs.joint_rate.any() and mounts.rigid
+        bodies = person.obstacles(inputs.joints[0], inputs.joint_rate[0])
+        for k in range(len(clock) - 1):
             if not static:
-                bodies = person.obstacles(joints[k], joint_rate[k])
+                bodies = person.obstacles(inputs.joints[k], inputs.joint_rate[k])
             if not mounts.rigid:
                 limbs = person.limb_forces(state.owner, state.reaction)
                 mount = mounts.step(mount, self._forces(state), limbs, h, moved)
                 bodies = person.displaced(bodies, mount.limb, mount.limb_rate)
-            target = held[k + 1] + mount.held[self._side]
+            target = inputs.held[k + 1] + mount.held[self._side]
             pull = Influences()
             if gain > 0.0:
-                pull = Influences(force=self._pull(cloth, state, seen[k], rate[k], known[k], gain))
+                pull = Influences(force=self._pull(cloth, state, *inputs.targets(k), gain))
             velocity = (target - state.x[self._held]) / h
             # the garment goes on as it has accelerated
             ahead, before = 2.0 * state.v - before, state.v
             state, _ = cloth.step(state, bodies, velocity, pull, ahead)
-            markers[k + 1] = self._map @ state.x
-            force[k + 1] = self._forces(state)
-            touching[k + 1] = np.count_nonzero(state.owner >= 0) / len(x)
-            now = kept == k + 1
-            positions[now], velocities[now] = state.x, state.v
-        force[0] = force[1]
-        when = true_times(r.time, effects, "time_offset")
-        return Prediction(
-            seen_points(_at(when, clock, markers), effects),
-            # a step's force is that of its middle
-            _at(r.time, clock - 0.5 * h, force),
-            _at(r.time, clock, touching),
-            positions,
-            velocities,
-        )
+            trace.note(k + 1, state, self._map @ state.x, self._forces(state))
+        return self._prediction(trace, clock, h, effects)
 
     def error(self, rng: np.random.Generator) -> FloatArray:
         """Returns (n,3) how far off a state is that is as good as the markers' noise, m."""
@@ -222,6 +191,50 @@ class Replayer:
         noise = r.marker_noise * rng.standard_normal(r.marker_rest_position.shape)
         off: FloatArray = self._interpolation @ noise
         return off
+
+    def _clock(self, time_step: float, begin: float | None, end: float | None) -> FloatArray:
+        """Returns (N+1,) the times of N steps from `begin` to `end` or just beyond it, s."""
+        r = self.recording
+        begin = float(r.time[0]) if begin is None else begin
+        end = float(r.time[-1]) if end is None else end
+        steps = max(1, int(np.ceil((end - begin) / time_step - 1e-9)))
+        clock: FloatArray = begin + time_step * np.arange(steps + 1, dtype=np.float64)
+        return clock
+
+    def _inputs(self, clock: FloatArray, effects: Sequence[Effect], posed: FloatArray) -> _Inputs:
+        """Returns the recording's inputs at times (N,); joints are `posed` where not measured."""
+        held = self._held_at(clock, effects)
+        return _Inputs(held, *self._targets(clock, effects), *self._joints(clock, effects, posed))
+
+    def _state_at_begin(
+        self, effects: Sequence[Effect], start: tuple[FloatArray, FloatArray] | None
+    ) -> ClothState:
+        """Returns the garment at `start`, positions and velocities; settled by default."""
+        if start is not None:
+            return replace(ClothState.at_rest(start[0]), v=start[1])
+        return ClothState.at_rest(self._settle(effects, self.settled(), _AGAIN))
+
+    def _off_grippers(self, x: FloatArray, held: FloatArray) -> FloatArray:
+        """Returns (2,3) how far held nodes of (n,3) are from `held` (k,3), by gripper, m."""
+        away = x[self._held] - held
+        return np.stack([away[self._side == i].mean(axis=0) for i in (0, 1)])
+
+    def _prediction(
+        self, trace: _Trace, clock: FloatArray, time_step: float, effects: Sequence[Effect]
+    ) -> Prediction:
+        """Returns what was simulated at times `clock`, as the recording would hold it."""
+        r = self.recording
+        # before the first step no force is known
+        trace.force[0] = trace.force[1]
+        when = true_times(r.time, effects, "time_offset")
+        return Prediction(
+            seen_points(_at(when, clock, trace.marker), effects),
+            # a step's force is that of its middle
+            _at(r.time, clock - 0.5 * time_step, trace.force),
+            _at(r.time, clock, trace.touching),
+            trace.position,
+            trace.velocity,
+        )
 
     def _forces(self, state: ClothState) -> FloatArray:
         """Returns (2,3) of the garment on the grippers, N."""
@@ -321,6 +334,74 @@ class Replayer:
             velocity = (target - state.x[self._held]) / h
             state, _ = cloth.step(state, around, velocity, Influences(force=pull))
         return state.x
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What a replay is given at its N times.
+
+    Attributes:
+        held: (N,k,3) where the held nodes are, m.
+        seen, seen_rate: (N,m,3) of the markers, m, m/s.
+        known: (N,m) whether they were seen, 1 or 0.
+        joints, joint_rate: (N,6,3) of the person, m, m/s.
+    """
+
+    held: FloatArray
+    seen: FloatArray
+    seen_rate: FloatArray
+    known: FloatArray
+    joints: FloatArray
+    joint_rate: FloatArray
+
+    def targets(self, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Returns the markers at time k, their velocities, and whether they were seen."""
+        return self.seen[k], self.seen_rate[k], self.known[k]
+
+
+@dataclass(frozen=True)
+class _Trace:
+    """What a replay keeps of its N states.
+
+    Attributes:
+        marker: (N,m,3), m.
+        force: (N,2,3) of the garment on the grippers, N.
+        touching: (N,) share of the nodes that touch the person.
+        kept: (K,) states of which the whole garment is kept.
+        position, velocity: (K,n,3) of these, m, m/s.
+    """
+
+    marker: FloatArray
+    force: FloatArray
+    touching: FloatArray
+    kept: npt.NDArray[np.int_]
+    position: FloatArray
+    velocity: FloatArray
+
+    @staticmethod
+    def empty(
+        markers: tuple[int, ...], garment: tuple[int, ...], kept: npt.NDArray[np.int_]
+    ) -> _Trace:
+        """Returns a trace for markers of shape (N,m,3) and a garment of shape (n,3)."""
+        count = markers[0]
+        position, velocity = np.empty((len(kept), *garment)), np.empty((len(kept), *garment))
+        return _Trace(
+            np.empty(markers), np.zeros((count, 2, 3)), np.zeros(count), kept, position, velocity
+        )
+
+    def note(self, k: int, state: ClothState, marker: FloatArray, force: FloatArray) -> None:
+        """Keeps state k with its markers (m,3), m, and forces (2,3), N."""
+        self.marker[k], self.force[k] = marker, force
+        self.touching[k] = np.count_nonzero(state.owner >= 0) / len(state.x)
+        now = self.kept == k
+        self.position[now], self.velocity[now] = state.x, state.v
+
+
+def _steps_at(time: FloatArray | None, begin: float, time_step: float) -> npt.NDArray[np.int_]:
+    """Returns (K,) the steps from `begin` that are nearest to times (K,), s; none by default."""
+    if time is None:
+        return np.array([], dtype=int)
+    return np.array(np.rint((np.asarray(time) - begin) / time_step), dtype=int)
 
 
 def _interpolation(lab: Lab, markers: sp.csr_array) -> FloatArray:

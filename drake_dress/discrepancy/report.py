@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress import __version__
 from drake_dress.discrepancy.experiment import Experiment
@@ -21,7 +20,6 @@ from drake_dress.report.page import chart, embedded, html_page
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 
 _BEFORE, _AFTER, _NOISE = "#b8453b", "#0b7a5e", "#66727f"
 
@@ -48,57 +46,34 @@ def report_page(
         notes: what of the data was not used, or not taken as it stands.
     """
     x = explanation
-    good = x.verdict in ("nothing", "named") and x.doubted is None
-    residuals = _Residuals(x, experiment)
     parts = [
-        f'<header class="{"good" if good else "bad"}"><h1>{html.escape(headline(x))}</h1>'
-        f"<p>{html.escape(_gain(x))}</p></header>",
+        _verdict(x),
         "<h2>Causes</h2>" + _causes(x) if x.causes else "",
         f"<h2>What to record next</h2><p>{html.escape(suggestion)}</p>" if suggestion else "",
         _notes(notes),
         "<h2>Residuals on held-out data</h2>",
         _sizes(x),
-        _chart("Over time", "RMS over the markers.", len(experiment.recordings), residuals.course),
-        _chart(
-            "On the garment",
-            "Rest shape from behind and in front; RMS of each marker, mm.",
-            1,
-            residuals.on_garment,
-            4,
-        ),
-        _chart(
-            "Spectrum and whiteness",
-            "Whitened residuals of the markers: noise alone has a flat spectrum at 1 and no "
-            "autocorrelation.",
-            1,
-            residuals.spectrum,
-            2,
-        ),
+        *_residual_charts(x, experiment),
         "<h2>On its own</h2>",
         _alone(alone, experiment),
-        _chart(
-            "Since a restart",
-            "The simulation is started from the state that the replay in step with the markers has "
-            "at every second, and runs on its own; RMS over the markers. Past the horizon (dotted) "
-            "an error of the markers' size has grown threefold, and a residual says little.",
-            len(experiment.recordings),
-            lambda axes: _since(alone, experiment, axes),
-        ),
+        _since_restart(alone, experiment),
         "<h2>Where the simulation was off most</h2>",
         _spots(spots),
         "<h2>Every effect tried</h2>",
-        _chart(
-            "Share of the held-out loss that each takes away",
-            "Linear screening, and a fit where it was worth one.",
-            1,
-            lambda axes: _scores(x, axes),
-            height=0.24 * len(x.scores) + 0.8,
-        ),
+        _effects_tried(x),
         "<h2>Scenario</h2>",
         f"<p>drake_dress {__version__}</p><details><summary>resolved YAML</summary>"
         f"<pre>{html.escape(scenario_text)}</pre></details>",
     ]
     return html_page("What the simulation gets wrong", [p for p in parts if p])
+
+
+def _verdict(x: Explanation) -> str:
+    good = x.verdict in ("nothing", "named") and x.doubted is None
+    return (
+        f'<header class="{"good" if good else "bad"}"><h1>{html.escape(headline(x))}</h1>'
+        f"<p>{html.escape(_gain(x))}</p></header>"
+    )
 
 
 def _notes(notes: Sequence[str]) -> str:
@@ -151,6 +126,29 @@ def _sizes(x: Explanation) -> str:
     )
 
 
+def _residual_charts(x: Explanation, experiment: Experiment) -> list[str]:
+    """Returns the residuals over time, on the garment and by frequency."""
+    residuals = _Residuals(x, experiment)
+    return [
+        _chart("Over time", "RMS over the markers.", len(experiment.recordings), residuals.course),
+        _chart(
+            "On the garment",
+            "Rest shape from behind and in front; RMS of each marker, mm.",
+            1,
+            residuals.on_garment,
+            4,
+        ),
+        _chart(
+            "Spectrum and whiteness",
+            "Whitened residuals of the markers: noise alone has a flat spectrum at 1 and no "
+            "autocorrelation.",
+            1,
+            residuals.spectrum,
+            2,
+        ),
+    ]
+
+
 def _spots(spots: Sequence[Spot]) -> str:
     body = "".join(
         f"<tr><td>{html.escape(s.kind)}</td><td>{html.escape(s.name)}</td>"
@@ -185,6 +183,17 @@ def _alone(alone: Windows, experiment: Experiment) -> str:
         "<table><thead><tr><th>markers, RMS, mm</th><th>before</th><th>after</th></tr></thead>"
         f"<tbody>{body}</tbody></table><p class='note'>Horizon: {html.escape(horizons)}; noise "
         f"{1e3 * alone.noise:.2f} mm.</p>"
+    )
+
+
+def _since_restart(alone: Windows, experiment: Experiment) -> str:
+    return _chart(
+        "Since a restart",
+        "The simulation is started from the state that the replay in step with the markers has "
+        "at every second, and runs on its own; RMS over the markers. Past the horizon (dotted) "
+        "an error of the markers' size has grown threefold, and a residual says little.",
+        len(experiment.recordings),
+        lambda axes: _since(alone, experiment, axes),
     )
 
 
@@ -316,6 +325,16 @@ class _Residuals:
         axes[1].axhline(0.0, color=_NOISE, ls=":")
         axes[1].set_xlabel("lag, s")
         axes[1].set_ylabel("autocorrelation")
+
+
+def _effects_tried(x: Explanation) -> str:
+    return _chart(
+        "Share of the held-out loss that each takes away",
+        "Linear screening, and a fit where it was worth one.",
+        1,
+        lambda axes: _scores(x, axes),
+        height=0.24 * len(x.scores) + 0.8,
+    )
 
 
 def _scores(x: Explanation, axes: list[Axes]) -> None:

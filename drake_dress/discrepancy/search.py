@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.attribution import (
     Comparison,
@@ -24,9 +23,8 @@ from drake_dress.discrepancy.attribution import (
 from drake_dress.discrepancy.candidates import Candidate
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.fitting import Evidence, Fit, bettered, fit_again, fit_all, with_slopes
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect
-
-FloatArray = npt.NDArray[np.float64]
 
 # Least share of the held-out loss that a cause takes away, and a further one of what is left then:
 # what numerics feign stays below; and the share of resamples of blocks in which it is a gain.

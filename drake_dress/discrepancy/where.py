@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,10 @@ import numpy.typing as npt
 from drake_dress.discrepancy.lab import PersonShape
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.whitening import Whitening
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 
-FloatArray = npt.NDArray[np.float64]
 # Phases by the grippers' speed, m/s, and by contact.
 _STILL, _FAST = 0.01, 0.15
 # A marker no farther than this from a limb's skin is of the cloth that lies on it, m.
@@ -64,57 +65,21 @@ def spots(
     w = whitening
     squared = (w.data - predicted) ** 2
     size = w.size(w.data - predicted)
-    noise = w.sensor
     found: list[Spot] = []
-
-    def add(kind: str, name: str, rows: npt.NDArray[np.bool_]) -> None:
+    for part in _parts(w, recordings, mesh, contact, samples, person):
+        rows = part.rows
         if not rows.any():
-            return
+            continue
         dimensions = 1 if w.is_force[rows].all() else 3
         found.append(
             Spot(
-                kind,
-                name,
+                part.kind,
+                part.name,
                 float(np.sqrt(dimensions * np.mean(size[rows] ** 2))),
-                float(np.sqrt(dimensions * np.mean(noise[rows] ** 2))),
+                float(np.sqrt(dimensions * np.mean(w.sensor[rows] ** 2))),
                 float(np.mean(squared[rows])),
             )
         )
-
-    markers = ~w.is_force
-    add("signal", "markers", markers)
-    for k, side in enumerate(("left", "right")):
-        add("signal", f"force of the {side} gripper", w.is_force & (w.marker == k))
-    for i, r in enumerate(recordings):
-        mine = w.recording == i
-        add("recording", r.name, mine & markers)
-        region = _regions(mesh, r.marker_rest_position)
-        for number, name in enumerate(REGION_NAMES):
-            rows = mine & markers & np.isin(w.marker, np.flatnonzero(region == number))
-            add("region", f"{name.replace('_', ' ')} in {r.name}", rows)
-        for k in range(r.marker_position.shape[1]):
-            where = REGION_NAMES[region[k]].replace("_", " ")
-            add("marker", f"{k} ({where}) in {r.name}", mine & markers & (w.marker == k))
-        speed = _speed(r)[samples[i]]
-        phase = np.where(speed < _STILL, 0, np.where(speed < _FAST, 1, 2))
-        touching = contact[i] > 0.0
-        at = np.searchsorted(r.time[samples[i]] - r.time[0], w.time[mine] - 1e-9)
-        at = np.minimum(at, len(phase) - 1)
-        limb = limbs_touched(r, samples[i], person)
-        of_marker = np.full(len(mine), -1)
-        on_cloth = mine & markers
-        of_marker[on_cloth] = limb[at[markers[mine]], w.marker[on_cloth]]
-        for number, name in enumerate(person.LIMB_NAMES):
-            add("limb", f"{name.replace('_', ' ')} in {r.name}", of_marker == number)
-        for number, name in enumerate(("at rest", "slow", "fast")):
-            for touch in (False, True):
-                rows = np.zeros(len(mine), dtype=np.bool_)
-                rows[mine] = (phase[at] == number) & (touching[at] == touch)
-                text = f"{name}, {'in contact' if touch else 'free'}, in {r.name}"
-                add("phase", text, rows & markers)
-        for second in range(int(np.ceil(r.duration))):
-            rows = mine & markers & (w.time >= second) & (w.time < second + 1)
-            add("time", f"{second} to {second + 1} s of {r.name}", rows)
     return sorted(found, key=lambda s: -s.whitened)
 
 
@@ -152,6 +117,115 @@ def limbs_touched(
         on = np.isfinite(seen).all(axis=1) & (distance < _ON_LIMB)
         row[on] = person.limb[owner[on]]
     return found
+
+
+class _Part(NamedTuple):
+    """A part of the data: its kind, its name, and which of the N values belong to it."""
+
+    kind: str
+    name: str
+    rows: BoolArray
+
+
+def _parts(
+    w: Whitening,
+    recordings: Sequence[Recording],
+    mesh: GarmentMesh,
+    contact: Sequence[FloatArray],
+    samples: Sequence[npt.NDArray[np.int64]],
+    person: PersonShape,
+) -> Iterator[_Part]:
+    """Yields all parts, one at a time since there are many; arguments as in `spots`."""
+    markers = ~w.is_force
+    yield _Part("signal", "markers", markers)
+    for k, side in enumerate(("left", "right")):
+        yield _Part("signal", f"force of the {side} gripper", w.is_force & (w.marker == k))
+    for i, r in enumerate(recordings):
+        rows = (w.recording == i) & markers
+        yield _Part("recording", r.name, rows)
+        yield from _places(w, rows, r, mesh)
+        # of each marker value, its row in `samples`
+        at = np.searchsorted(r.time[samples[i]] - r.time[0], w.time[rows] - 1e-9)
+        at = np.minimum(at, len(samples[i]) - 1)
+        limb = limbs_touched(r, samples[i], person)
+        yield from _limbs(r, rows, limb[at, w.marker[rows]], person)
+        yield from _phases(r, rows, _phase(r, samples[i])[at], (contact[i] > 0.0)[at])
+        yield from _seconds(w, rows, r)
+
+
+def _places(
+    w: Whitening, markers: BoolArray, recording: Recording, mesh: GarmentMesh
+) -> Iterator[_Part]:
+    """Yields the regions of the garment and the single markers.
+
+    Args:
+        w: of the data.
+        markers: (N,) the values of the recording's markers.
+        recording: whose markers these are.
+        mesh: that they sit on.
+    """
+    r = recording
+    region = _regions(mesh, r.marker_rest_position)
+    for number, name in enumerate(REGION_NAMES):
+        rows = markers & np.isin(w.marker, np.flatnonzero(region == number))
+        yield _Part("region", f"{name.replace('_', ' ')} in {r.name}", rows)
+    for k in range(r.marker_position.shape[1]):
+        where = REGION_NAMES[region[k]].replace("_", " ")
+        yield _Part("marker", f"{k} ({where}) in {r.name}", markers & (w.marker == k))
+
+
+def _limbs(
+    recording: Recording, markers: BoolArray, limb: npt.NDArray[np.int64], person: PersonShape
+) -> Iterator[_Part]:
+    """Yields the person's limbs.
+
+    Args:
+        recording: whose name the parts carry.
+        markers: (N,) the values of its markers.
+        limb: of each of these values, −1 for none.
+        person: whose limbs they are.
+    """
+    for number, name in enumerate(person.LIMB_NAMES):
+        rows = _among(markers, limb == number)
+        yield _Part("limb", f"{name.replace('_', ' ')} in {recording.name}", rows)
+
+
+def _phases(
+    recording: Recording, markers: BoolArray, phase: npt.NDArray[np.int64], touching: BoolArray
+) -> Iterator[_Part]:
+    """Yields the phases of the motion, with contact and without.
+
+    Args:
+        recording: whose name the parts carry.
+        markers: (N,) the values of its markers.
+        phase: of each of these values, 0 to 2.
+        touching: for each of these values, whether the garment touches the person.
+    """
+    for number, name in enumerate(("at rest", "slow", "fast")):
+        for touch in (False, True):
+            rows = _among(markers, (phase == number) & (touching == touch))
+            text = f"{name}, {'in contact' if touch else 'free'}, in {recording.name}"
+            yield _Part("phase", text, rows)
+
+
+def _seconds(w: Whitening, markers: BoolArray, recording: Recording) -> Iterator[_Part]:
+    """Yields each second of a recording, whose markers have the values `markers` (N,)."""
+    for second in range(int(np.ceil(recording.duration))):
+        rows = markers & (w.time >= second) & (w.time < second + 1)
+        yield _Part("time", f"{second} to {second + 1} s of {recording.name}", rows)
+
+
+def _among(rows: BoolArray, chosen: BoolArray) -> BoolArray:
+    """Returns (N,) those of `rows` (N,) that are chosen; `chosen` has an entry for each of them."""
+    narrowed = np.zeros(len(rows), dtype=np.bool_)
+    narrowed[rows] = chosen
+    return narrowed
+
+
+def _phase(recording: Recording, samples: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Returns (S,) at rest (0), slow (1) or fast (2), by the grippers' speed at these samples."""
+    speed = _speed(recording)[samples]
+    return np.where(speed < _STILL, 0, np.where(speed < _FAST, 1, 2))
 
 
 def _speed(recording: Recording) -> FloatArray:

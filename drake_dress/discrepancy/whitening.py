@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numba as nb
 import numpy as np
@@ -22,9 +23,7 @@ from scipy.ndimage import uniform_filter1d
 
 from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.recording import Recording
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from drake_dress.models.arrays import BoolArray, FloatArray
 
 # Share of the difference between scenario and refined replay that the refined one may still be off.
 NUMERICS_SHARE = 0.45
@@ -152,7 +151,7 @@ def whiten(
     """
     numerics = _numerics(recordings, samples, scenario, refined, share)
     filters, data = [], []
-    rows: dict[str, list[npt.NDArray]] = {
+    rows: dict[str, list[npt.NDArray[Any]]] = {
         k: [] for k in ("recording", "time", "force", "marker", "sensor")
     }
     for i, (r, s, off) in enumerate(zip(recordings, samples, numerics, strict=True)):

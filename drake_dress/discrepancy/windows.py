@@ -17,9 +17,8 @@ import numpy.typing as npt
 from drake_dress.discrepancy.experiment import Experiment, FreeRun, Level
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect
-
-FloatArray = npt.NDArray[np.float64]
 
 # An error that has grown to so many times its size at the start is past the horizon.
 _GROWN = 3.0

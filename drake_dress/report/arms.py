@@ -9,10 +9,9 @@ import numpy.typing as npt
 
 from drake_dress.models.arm.clearance import Capsules, clearance
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log import RunLog
-
-FloatArray = npt.NDArray[np.float64]
 
 # Links that may be near to the person: the last one and the hand, which hold the garment on it.
 _NEAR_LINKS = 2

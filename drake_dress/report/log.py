@@ -16,10 +16,9 @@ import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.hdf5_state import Hdf5State, look_at
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

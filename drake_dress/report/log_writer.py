@@ -31,26 +31,16 @@ import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import remove_results
-from drake_dress.models.control.safety import Verdict
-from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.disk import give_back, keep_room, locked, reserved
-from drake_dress.report.log_schema import (
-    ARM_SERIES,
-    CLEARANCES,
-    COMPLETE,
-    JOINT_NAMES,
-    LOOPS,
-    SCHEMA,
-    STAGE_NAMES,
-)
+from drake_dress.report.log_layout import LogContent, begin_log, label
+from drake_dress.report.log_schema import COMPLETE
 
 _FLUSH_PERIOD = 1.0  # s of wall time
 # Kept back on the disk for the end, and what HDF5 writes beside samples, at most, bytes.
 _RESERVE, _BESIDE = 16 << 20, 4 << 20
 _MOST_WAITING = 64  # samples that are kept in memory between flushes
 _MOST_BEHIND = 512  # samples that are kept while those before them are still being written
-_SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
 _MOST_OPEN = 2000  # samples that are written before the file is opened anew
 
 
@@ -137,18 +127,8 @@ class RunLogWriter:
 
     Args:
         path: of the HDF5 file; what was there is replaced.
-        garment: the plant's.
-        scenario_text: the resolved scenario, YAML.
-        version: of drake_dress.
-        seed: of the run.
-        radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
-        joint_names: names of these six.
-        capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
-        estimate_garment: the controller's garment; None: its positions are not logged.
+        content: what the log says about the run as a whole.
         flush_period: wall time between flushes, s.
-        bases: X_WB (4,4) of each arm, where samples have arms.
-        estimated: whether garment and person are as they were estimated, since truth is not known;
-            there is no contact then.
         results: names of files beside the log that an earlier run may have left; they are removed
             before its log is replaced, so that nothing of one run ever stands beside the other's.
 
@@ -160,18 +140,8 @@ class RunLogWriter:
     def __init__(
         self,
         path: str | Path,
-        *,
-        garment: GarmentMesh,
-        scenario_text: str,
-        version: str,
-        seed: int,
-        radius: npt.ArrayLike,
-        joint_names: Sequence[str] = JOINT_NAMES,
-        capsule_radius: npt.ArrayLike | None = None,
-        estimate_garment: GarmentMesh | None = None,
+        content: LogContent,
         flush_period: float = _FLUSH_PERIOD,
-        bases: Mapping[Side, npt.ArrayLike] | None = None,
-        estimated: bool = False,
         results: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
@@ -179,90 +149,20 @@ class RunLogWriter:
         self._reserve = reserved(self.path.parent, _RESERVE + _BESIDE)
         if self._reserve is None and os.access(self.path.parent, os.W_OK):
             raise self._no_room()
-        try:
-            self._lock: int | None = locked(self.path)
-            remove_results(self.path.parent, results)
-            self._file = _open(self.path, "w")
-        except BlockingIOError as error:
-            self._release()
-            message = "cannot be written: another run writes it, or something reads it"
-            raise UserError(str(path), "", message) from error
-        except OSError as error:
-            self._release()
-            raise UserError(str(path), "", f"cannot be written as HDF5: {error}") from error
-        try:
-            if self._reserve is None:
-                raise OSError
-            os.ftruncate(self._reserve, _RESERVE)
-            keep_room(self._lock, 0, _BESIDE)
-        except OSError as error:
-            self._release()
-            self._file.close()
-            os.close(self._lock)
-            self.path.unlink()
-            raise self._no_room() from error
+        self._file, lock = self._replace_log(str(path), results)
+        self._lock: int | None = lock
+        self._secure_room(lock)
         self._unflushed = 0  # bytes
         self._flush_period = flush_period
         self._count = self._count_opened = 0
         self._last_time = -np.inf
-        self._series: dict[str, h5py.Dataset] = {}
-        self._shapes: dict[str, tuple[int, ...]] = {}
         self._waiting: list[dict[str, npt.NDArray[Any]]] = []
         self._worker = ThreadPoolExecutor(1, "log")
         self._writing: Future[None] | None = None
-
-        attributes = self._file.attrs
-        attributes["schema"] = SCHEMA
-        attributes["scenario"] = scenario_text
-        attributes["version"] = version
-        attributes["seed"] = seed
-        attributes[COMPLETE] = False
-
-        self._write_garment("/garment", garment)
-        self._fixed("/human/radius", np.asarray(radius, dtype=np.float64).reshape(6), "m")
-        n = len(garment.rest_position)
-        self._add("/time", (), "s", dtype="f8")
-        self._add("/garment/position", (n, 3), "m", "world")
-        if estimated:
-            attributes["source"] = "estimate"
-        else:
-            self._add("/garment/contact", (n,), "1", dtype="i1")
-            self._add("/garment/contact_force", (n, 3), "N", "world")
-        self._add("/human/joint_position", (6, 3), "m", "world", dtype="f8")
-        self._series["/human/joint_position"].attrs["names"] = list(joint_names)
-        for side in SIDES:
-            self._add(f"/gripper/{side}/position", (3,), "m", "world", dtype="f8")
-            self._add(f"/gripper/{side}/force", (3,), "N", "world", dtype="f8")
-            for name, unit in (("s", "1"), ("l", "m"), ("theta", "rad")):
-                self._add(f"/dressing/{side}/{name}", (), unit, dtype="f8")
-        self._add("/control/stage", (2,), "1", dtype="i1")
-        self._series["/control/stage"].attrs["names"] = list(SIDES)
-        self._series["/control/stage"].attrs["values"] = list(STAGE_NAMES)
-        self._add("/control/safety", (2,), "1", dtype="i2")
-        self._series["/control/safety"].attrs["names"] = list(SIDES)
-        self._series["/control/safety"].attrs["flags"] = [f"{v.value} {v.name}" for v in Verdict]
-        for name in ("global", "local"):
-            self._add(f"/control/{name}/solve_time", (), "s", dtype="f8")
-            self._add(f"/control/{name}/solves", (), "1", dtype="i2")
-        self._add("/estimate/human/joint_position", (6, 3), "m", "world", dtype="f8")
-        self._series["/estimate/human/joint_position"].attrs["names"] = list(joint_names)
-        if bases is not None:
-            for side in SIDES:
-                self._fixed(f"/arm/{side}/base", np.asarray(bases[side], dtype=np.float64), "m")
-                for name, unit in ARM_SERIES:
-                    self._add(f"/arm/{side}/{name}", (7,), unit, dtype="f8")
-            self._add("/arm/clearance", (3,), "m", dtype="f8")
-            self._series["/arm/clearance"].attrs["names"] = list(CLEARANCES)
-        if estimate_garment is not None:
-            self._write_garment("/estimate/garment", estimate_garment)
-            m = len(estimate_garment.rest_position)
-            self._add("/estimate/garment/position", (m, 3), "m", "world")
-        if capsule_radius is not None:
-            capsules = np.asarray(capsule_radius, dtype=np.float64).ravel()
-            self._fixed("/human/capsule_radius", capsules, "m")
-            for end in "ab":
-                shape = (len(capsules), 3)
-                self._add(f"/human/capsule_{end}", shape, "m", "world", dtype="f8")
+        self._series = begin_log(self._file, content)
+        self._shapes: dict[str, tuple[int, ...]] = {
+            name: dataset.shape[1:] for name, dataset in self._series.items()
+        }
         self._file.flush()
         self._flushed_at = clock.monotonic()
 
@@ -304,7 +204,7 @@ class RunLogWriter:
         """
         data = np.asarray(rows, dtype=np.float64)
         with self._opened(data.nbytes) as file:
-            _label(file.create_dataset(name, data=data), unit, None)
+            label(file.create_dataset(name, data=data), unit, None)
 
     @contextmanager
     def _opened(self, size: int) -> Iterator[h5py.File]:
@@ -356,6 +256,46 @@ class RunLogWriter:
     ) -> None:
         self.close()
 
+    def _replace_log(self, path: str, results: Sequence[str]) -> tuple[h5py.File, int]:
+        """Removes what an earlier run left; returns the new file and its lock.
+
+        Args:
+            path: as the caller wrote it, for messages.
+            results: names of files to remove.
+
+        Raises:
+            UserError: the file cannot be written.
+        """
+        try:
+            lock = locked(self.path)
+            remove_results(self.path.parent, results)
+            return _open(self.path, "w"), lock
+        except BlockingIOError as error:
+            self._release()
+            message = "cannot be written: another run writes it, or something reads it"
+            raise UserError(path, "", message) from error
+        except OSError as error:
+            self._release()
+            raise UserError(path, "", f"cannot be written as HDF5: {error}") from error
+
+    def _secure_room(self, lock: int) -> None:
+        """Keeps room on the disk for the beginning and the end of the log.
+
+        Raises:
+            UserError: there is none; the file is removed.
+        """
+        try:
+            if self._reserve is None:
+                raise OSError
+            os.ftruncate(self._reserve, _RESERVE)
+            keep_room(lock, 0, _BESIDE)
+        except OSError as error:
+            self._release()
+            self._file.close()
+            os.close(lock)
+            self.path.unlink()
+            raise self._no_room() from error
+
     def _rows(self, sample: Sample) -> dict[str, Any]:
         rows: dict[str, Any] = {
             "/time": sample.time,
@@ -393,43 +333,6 @@ class RunLogWriter:
                 # not the dataset's, which would wait for what is being written
                 rows[name] = np.full(self._shapes[name], np.nan) if array is None else array
         return rows
-
-    def _write_garment(self, group: str, garment: GarmentMesh) -> None:
-        self._fixed(f"{group}/faces", np.asarray(garment.faces, dtype=np.int32))
-        rest = np.asarray(garment.rest_position, dtype=np.float64)
-        self._fixed(f"{group}/rest_position", rest, "m", "garment")
-        for name in LOOPS:
-            self._fixed(f"{group}/loops/{name}", np.asarray(garment.loops[name], dtype=np.int32))
-
-    def _fixed(
-        self, name: str, value: npt.NDArray[Any], unit: str | None = None, frame: str | None = None
-    ) -> None:
-        _label(self._file.create_dataset(name, data=value), unit, frame)
-
-    def _add(
-        self,
-        name: str,
-        shape: tuple[int, ...],
-        unit: str,
-        frame: str | None = None,
-        dtype: str = "f4",
-    ) -> None:
-        bulky = int(np.prod(shape, dtype=int)) > 100
-        # Compressed rows are a chunk each: a chunk that grew would move, and a killed process
-        # could leave the file pointing at its old place.
-        options: dict[str, Any] = (
-            {"compression": "gzip", "compression_opts": 1, "shuffle": True} if bulky else {}
-        )
-        dataset = self._file.create_dataset(
-            name,
-            shape=(0, *shape),
-            maxshape=(None, *shape),
-            chunks=(1 if bulky else _SMALL_CHUNK, *shape),
-            dtype=dtype,
-            **options,
-        )
-        _label(dataset, unit, frame)
-        self._series[name], self._shapes[name] = dataset, shape
 
     def _hand_over(self, flush: bool) -> None:
         """Has the samples since the last time written by the thread, unless it is still busy."""
@@ -532,10 +435,3 @@ def _open(path: Path, mode: str) -> h5py.File:
     configuration.decr_mode = 0
     file.id.set_mdc_config(configuration)
     return file
-
-
-def _label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:
-    if unit is not None:
-        dataset.attrs["unit"] = unit
-    if frame is not None:
-        dataset.attrs["frame"] = frame

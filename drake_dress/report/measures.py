@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.dressing.linking import arm_linking_number
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
-
-FloatArray = npt.NDArray[np.float64]
 
 # The arm's line is closed through the trunk: a point below the middle of the shoulders.
 _INTERIOR_BELOW_SHOULDERS = 0.1  # m

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog

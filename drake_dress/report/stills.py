@@ -30,7 +30,9 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
+
+_Color = tuple[float, float, float]
 
 OUTSIDE_COLOR = (0.22, 0.44, 0.70)
 LINING_COLOR = (0.87, 0.62, 0.28)
@@ -85,43 +87,18 @@ def render_still(
         floor: height of the floor, m; None: just below everything shown.
         arms: ends (k,3), (k,3) and radii (k,) of capsules that are robot arms, m.
     """
-    graph: SceneGraph = SceneGraph()
-    graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters()))
-    source = graph.RegisterSource("still")
-
-    def add(shape: Shape, X_WG: RigidTransform, color: tuple[float, float, float]) -> None:
-        instance = GeometryInstance(X_WG, shape, f"g{graph.model_inspector().num_geometries()}")
-        properties = PerceptionProperties()
-        properties.AddProperty("phong", "diffuse", Rgba(*color, 1.0))
-        properties.AddProperty("label", "id", RenderLabel(1))
-        instance.set_perception_properties(properties)
-        graph.RegisterAnchoredGeometry(source, instance)
-
-    normals = node_normals(faces, position)
-    add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
-    lining = position - _LINING_OFFSET * normals
-    add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
-    bodies = [((capsule_a, capsule_b, capsule_radius), SKIN_COLOR)]
+    scene = _Scene()
+    scene.add_garment(faces, position)
+    scene.add_capsules(capsule_a, capsule_b, capsule_radius, SKIN_COLOR)
     if arms is not None:
-        bodies.append((arms, ARM_COLOR))
-    for capsules, color in bodies:
-        for a, b, r in zip(*capsules, strict=True):
-            length = float(np.linalg.norm(b - a))
-            if length > 1e-6:
-                rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
-                add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), color)
-            else:
-                add(Sphere(r), RigidTransform(a), color)
+        scene.add_capsules(*arms, ARM_COLOR)
     for p in np.reshape(grippers, (-1, 3)):
-        add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
+        scene.add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
         floor = floor_height(position, capsule_a, capsule_b, capsule_radius)
     middle = [camera.target[0], camera.target[1], floor - 0.01]
-    add(Cylinder(_FLOOR_RADIUS, 0.02), RigidTransform(middle), _FLOOR_COLOR)
-
-    query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
-    image = query.RenderColorImage(_camera(camera, size), graph.world_frame_id(), _pose(camera))
-    return np.array(image.data[:, :, :3])
+    scene.add(Cylinder(_FLOOR_RADIUS, 0.02), RigidTransform(middle), _FLOOR_COLOR)
+    return scene.picture(camera, size)
 
 
 def floor_height(
@@ -144,6 +121,51 @@ def node_normals(faces: npt.NDArray[np.int32], position: FloatArray) -> FloatArr
         np.add.at(normals, faces[:, corner], face)
     unit: FloatArray = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
     return unit
+
+
+class _Scene:
+    """What a picture shows: shapes in the world, each of one colour."""
+
+    def __init__(self) -> None:
+        self._graph: SceneGraph = SceneGraph()
+        self._graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters()))
+        self._source = self._graph.RegisterSource("still")
+
+    def add(self, shape: Shape, X_WG: RigidTransform, color: _Color) -> None:
+        """Adds a shape."""
+        name = f"g{self._graph.model_inspector().num_geometries()}"
+        instance = GeometryInstance(X_WG, shape, name)
+        properties = PerceptionProperties()
+        properties.AddProperty("phong", "diffuse", Rgba(*color, 1.0))
+        properties.AddProperty("label", "id", RenderLabel(1))
+        instance.set_perception_properties(properties)
+        self._graph.RegisterAnchoredGeometry(self._source, instance)
+
+    def add_garment(self, faces: npt.NDArray[np.int32], position: FloatArray) -> None:
+        """Adds a garment (n,3), m: its outside, and the lining behind it."""
+        normals = node_normals(faces, position)
+        self.add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
+        lining = position - _LINING_OFFSET * normals
+        self.add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
+
+    def add_capsules(
+        self, first: FloatArray, second: FloatArray, radius: FloatArray, color: _Color
+    ) -> None:
+        """Adds capsules with ends (c,3), (c,3) and radii (c,), m; one without length is a ball."""
+        for a, b, r in zip(first, second, radius, strict=True):
+            length = float(np.linalg.norm(b - a))
+            if length > 1e-6:
+                rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
+                self.add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), color)
+            else:
+                self.add(Sphere(r), RigidTransform(a), color)
+
+    def picture(self, camera: CameraPose, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
+        """Returns what the camera sees, (height, width, 3), RGB."""
+        graph = self._graph
+        query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
+        image = query.RenderColorImage(_camera(camera, size), graph.world_frame_id(), _pose(camera))
+        return np.array(image.data[:, :, :3])
 
 
 def _mesh(faces: npt.NDArray[np.int32], position: FloatArray, normals: FloatArray) -> Mesh:

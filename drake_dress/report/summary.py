@@ -84,45 +84,10 @@ def summarize(
     m = measures if measures is not None else measure(log)
     arms = measure_arms(log)
     reason = _reason(log, m, rules) or _arm_reason(log, arms, rules)
-    s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
-    on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
-    dressed = first_lasting(on.all(axis=1))
-    duration = float(log.time[-1] - log.time[0]) if len(log) else 0.0
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
-    for k, side in enumerate(SIDES):
-        summary[f"s_{side}"] = _number(s[-1, k]) if len(log) else None
-        summary[f"armhole_to_shoulder_{side}_m"] = _to_shoulder(log, side)
-    for k, side in enumerate(SIDES):
-        summary[f"arm_inside_{side}"] = bool(len(log)) and abs(int(m.linking[-1, k])) == 1
-        summary[f"linking_number_{side}"] = int(m.linking[-1, k]) if len(log) else None
-    for k, side in enumerate(SIDES):
-        summary[f"hand_through_cuff_{side}"] = (
-            bool(len(log)) and abs(int(m.cuff_linking[-1, k])) == 1
-        )
-    summary |= {
-        "dressing_time_s": None if dressed is None else float(log.time[dressed]),
-        "simulated_time_s": duration,
-        "max_gripper_force_N": _largest(m.gripper_force),
-        "max_contact_force_N": _largest(m.node_contact_force),
-        "max_total_contact_force_N": _largest(m.total_contact_force),
-        "max_edge_strain": _largest(m.edge_strain),
-        "max_edge_strain_all": _largest(m.edge_strain_max),
-        "max_penetration_m": _largest(m.penetration),
-        "layers_crossed_at_end": _layers_crossed(log),
-        "realtime_factor": duration / wall_time if wall_time > 0.0 else None,
-        "wall_time_s": float(wall_time),
-    }
-    for name in ("global", "local"):
-        solve = log.solve_time(name)
-        solve = solve[np.isfinite(solve)]
-        summary[f"{name}_rate_hz"] = (
-            float(log.solves(name).sum()) / duration if duration > 0.0 else None
-        )
-        summary[f"{name}_solve_ms"] = {
-            "median": 1e3 * float(np.median(solve)) if len(solve) else None,
-            "p95": 1e3 * float(np.quantile(solve, 0.95)) if len(solve) else None,
-            "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
-        }
+    summary |= _sleeve_figures(log, m)
+    summary |= _course_figures(log, m, rules, wall_time)
+    summary |= _solve_figures(log)
     summary["late_plans"] = _late_plans(log)
     summary["safety_cut_s"] = _safety_cuts(log)
     summary |= _command_figures(log) | _arm_figures(arms)
@@ -188,6 +153,67 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         limit = f"{100 * m.edge_strain[i]:.1f} % > {100 * rules.max_edge_strain:g} %"
         return f"edges over-strained: 99th percentile {limit} at t = {log.time[i]:.2f} s"
     return None
+
+
+def _sleeve_figures(log: RunLog, m: Measures) -> dict[str, Any]:
+    """Returns how far each sleeve is on at the end."""
+    figures: dict[str, Any] = {}
+    for side in SIDES:
+        figures[f"s_{side}"] = _number(log.dressing[side][-1, 0]) if len(log) else None
+        figures[f"armhole_to_shoulder_{side}_m"] = _to_shoulder(log, side)
+    for k, side in enumerate(SIDES):
+        figures[f"arm_inside_{side}"] = bool(len(log)) and abs(int(m.linking[-1, k])) == 1
+        figures[f"linking_number_{side}"] = int(m.linking[-1, k]) if len(log) else None
+    for k, side in enumerate(SIDES):
+        through = bool(len(log)) and abs(int(m.cuff_linking[-1, k])) == 1
+        figures[f"hand_through_cuff_{side}"] = through
+    return figures
+
+
+def _course_figures(
+    log: RunLog, m: Measures, rules: SuccessRules, wall_time: float
+) -> dict[str, Any]:
+    """Returns times, and the largest forces, strains and penetrations of the run."""
+    s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
+    on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
+    dressed = first_lasting(on.all(axis=1))
+    duration = _duration(log)
+    return {
+        "dressing_time_s": None if dressed is None else float(log.time[dressed]),
+        "simulated_time_s": duration,
+        "max_gripper_force_N": _largest(m.gripper_force),
+        "max_contact_force_N": _largest(m.node_contact_force),
+        "max_total_contact_force_N": _largest(m.total_contact_force),
+        "max_edge_strain": _largest(m.edge_strain),
+        "max_edge_strain_all": _largest(m.edge_strain_max),
+        "max_penetration_m": _largest(m.penetration),
+        "layers_crossed_at_end": _layers_crossed(log),
+        "realtime_factor": duration / wall_time if wall_time > 0.0 else None,
+        "wall_time_s": float(wall_time),
+    }
+
+
+def _solve_figures(log: RunLog) -> dict[str, Any]:
+    """Returns rate and solve times of both controllers."""
+    figures: dict[str, Any] = {}
+    duration = _duration(log)
+    for name in ("global", "local"):
+        solve = log.solve_time(name)
+        solve = solve[np.isfinite(solve)]
+        figures[f"{name}_rate_hz"] = (
+            float(log.solves(name).sum()) / duration if duration > 0.0 else None
+        )
+        figures[f"{name}_solve_ms"] = {
+            "median": 1e3 * float(np.median(solve)) if len(solve) else None,
+            "p95": 1e3 * float(np.quantile(solve, 0.95)) if len(solve) else None,
+            "p99": 1e3 * float(np.quantile(solve, 0.99)) if len(solve) else None,
+        }
+    return figures
+
+
+def _duration(log: RunLog) -> float:
+    """Returns the simulated time of a log, s."""
+    return float(log.time[-1] - log.time[0]) if len(log) else 0.0
 
 
 def _to_shoulder(log: RunLog, side: Side) -> float | None:

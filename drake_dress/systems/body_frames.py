@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 
 def frames(poses: Sequence[RigidTransform], bodies: Sequence[int]) -> FloatArray:

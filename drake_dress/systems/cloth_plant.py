@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -12,6 +10,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.grasp import Pressing, press
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -19,14 +18,14 @@ from drake_dress.models.cloth.contact.wrenches import body_wrenches
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
-from drake_dress.models.human.body import Capsule
-from drake_dress.systems.body_frames import frames
+from drake_dress.models.sides import SIDES
 from drake_dress.systems.garment_steps import Steps, StepsBeside, StepsHere, Surroundings
-
-FloatArray = np.ndarray
+from drake_dress.systems.person_bodies import PersonBodies
 
 # By which a rehearsal lets the garment into the person, m.
 _REHEARSED_DEPTH = 2e-3
+# Share of its depth to which a rehearsal squashes the garment: its layers meet then.
+_REHEARSED_FLATNESS = 0.02
 
 
 class ClothPlant(LeafSystem):
@@ -66,8 +65,7 @@ class ClothPlant(LeafSystem):
         held_count: how many nodes the left and the right gripper hold.
         start: (n,3) garment at time 0, m.
         start_grippers: (2,3) p_WG of left and right at time 0, m.
-        capsules: of the person, fixed in their bodies.
-        body_indices: body name to its index in the plant.
+        person: its capsules, and the plant's bodies that they are fixed in.
         grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
         mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
             limbs that do not know of it.
@@ -80,27 +78,19 @@ class ClothPlant(LeafSystem):
         held_count: tuple[int, int],
         start: FloatArray,
         start_grippers: FloatArray,
-        capsules: Sequence[Capsule],
-        body_indices: dict[str, BodyIndex],
+        person: PersonBodies,
         grasp_stiffness: float,
         mounts: Mounts | None = None,
         beside: bool = False,
     ) -> None:
         super().__init__()
         self.cloth = cloth
-        n = cloth.elements.node_count
-        self._n = n
+        self._n = cloth.elements.node_count
         self.start_position = np.array(start)
         self._side = np.repeat([0, 1], held_count)
         self._offset = start[cloth.held] - start_grippers[self._side]
-        self._capsules = list(capsules)
-        self._names = sorted({c.body for c in capsules})
-        self._body_of = np.array([self._names.index(c.body) for c in capsules], dtype=np.int32)
-        self._index = [int(body_indices[name]) for name in self._names]
-        self._a = np.array([c.a_B for c in capsules])
-        self._b = np.array([c.b_B for c in capsules])
-        self._radius = np.array([c.radius for c in capsules])
-        self._surroundings = Surroundings(self._radius, len(cloth.held))
+        self._person = person
+        self._surroundings = Surroundings(person.radius, len(cloth.held))
         self._steps: Steps = (StepsBeside if beside else StepsHere)(cloth, self._surroundings)
         # what the step under way was begun with
         self._begun: tuple[ClothState, FloatArray] | None = None
@@ -108,12 +98,16 @@ class ClothPlant(LeafSystem):
         self._mounts = mounts or Mounts([])
         self._grasp_stiffness = grasp_stiffness
         self._moved_mass = self._mounts.moved_mass(cloth, self._side)
-        limbs = [name for name in self._names if name.endswith("arm")]
-        self._limb_of = np.array(
-            [limbs.index(c.body) if c.body in limbs else -1 for c in self._capsules]
-        )
 
-        self._x = self.DeclareDiscreteState(np.array(start).ravel())
+        self._declare_state()
+        self._declare_inputs()
+        self._declare_outputs()
+        self.DeclarePeriodicDiscreteUpdateEvent(cloth.time_step, 0.0, self._update)
+
+    def _declare_state(self) -> None:
+        """Declares what is carried from one step to the next: garment, forces, mounts."""
+        n, held_count = self._n, len(self.cloth.held)
+        self._x = self.DeclareDiscreteState(self.start_position.ravel())
         self._v = self.DeclareDiscreteState(np.zeros(3 * n))
         self._mode = self.DeclareDiscreteState(np.zeros(n))
         self._owner = self.DeclareDiscreteState(np.full(n, -1.0))
@@ -121,13 +115,14 @@ class ClothPlant(LeafSystem):
         self._solver = self.DeclareDiscreteState(np.full(2 * (n + 1), -1.0))
         self._tangled = self.DeclareDiscreteState(np.zeros(n))
         # Force and moment about the body's origin, of the garment on each body.
-        self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._names)))
+        self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._person.index)))
         # of the person on the held nodes, N
-        self._pressing = self.DeclareDiscreteState(np.zeros(3 * len(cloth.held)))
-        self._mount = self.DeclareDiscreteState(MountState.at_rest(len(limbs)).flat())
+        self._pressing = self.DeclareDiscreteState(np.zeros(3 * held_count))
+        self._mount = self.DeclareDiscreteState(MountState.at_rest(self._person.limb_count).flat())
         # what the step under way depends on beside the garment; not finite before the first one
         self._around = self.DeclareDiscreteState(np.full(self._surroundings.size, np.nan))
 
+    def _declare_inputs(self) -> None:
         self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self._velocities = self.DeclareAbstractInputPort(
             "body_spatial_velocities", Value[list[SpatialVelocity]]()
@@ -137,14 +132,17 @@ class ClothPlant(LeafSystem):
                 self.DeclareVectorInputPort(f"{side}_gripper_position", 3),
                 self.DeclareVectorInputPort(f"{side}_gripper_velocity", 3),
             )
-            for side in ("left", "right")
+            for side in SIDES
         ]
-        ticket = {self.xd_ticket()}
+
+    def _declare_outputs(self) -> None:
+        """Declares the output ports, which depend on discrete state only."""
+        n, ticket = self._n, {self.xd_ticket()}
         self.DeclareVectorOutputPort("garment_position", 3 * n, self._calc(self._x), ticket)
         self.DeclareVectorOutputPort("garment_velocity", 3 * n, self._calc(self._v), ticket)
         self.DeclareVectorOutputPort("contact", n, self._calc_contact, ticket)
         self.DeclareVectorOutputPort("contact_force", 3 * n, self._calc_contact_force, ticket)
-        for i, side in enumerate(("left", "right")):
+        for i, side in enumerate(SIDES):
             self.DeclareVectorOutputPort(
                 f"{side}_gripper_force", 3, self._calc_gripper_force(i), ticket
             )
@@ -154,34 +152,32 @@ class ClothPlant(LeafSystem):
             self._calc_person_forces,
             ticket,
         )
-        self.DeclarePeriodicDiscreteUpdateEvent(cloth.time_step, 0.0, self._update)
 
     def obstacles(self, context: Context) -> Obstacles:
         """Returns the person's capsules in the world, as the body ports say."""
-        poses, velocities = self._poses.Eval(context), self._velocities.Eval(context)
-        body = self._body_of
-        frame = frames(poses, self._index)[body]
-        rotation, origin = frame[:, :, :3], frame[:, :, 3]
-        twist = np.array([velocities[i].get_coeffs() for i in self._index])[body]
-        omega = np.ascontiguousarray(twist[:, :3])
-        to_a = np.einsum("kij,kj->ki", rotation, self._a)
-        to_b = np.einsum("kij,kj->ki", rotation, self._b)
-        velocity = twist[:, 3:] + np.cross(omega, to_a)
-        return Obstacles(origin + to_a, origin + to_b, self._radius, velocity, omega)
+        return self._person.obstacles(self._poses.Eval(context), self._velocities.Eval(context))
 
     def rehearse(self, context: Context) -> None:
-        """Steps the garment as it would lie on the person, so that nothing is compiled later."""
+        """Steps the garment on the person and squashed, so that nothing is compiled later."""
         bodies = self.obstacles(context)
         if not bodies.count:
             return
+        still = np.zeros((len(self.cloth.held), 3))
         near = find_proximity(self.start_position, bodies, self.cloth.material.margin)
         first = int(np.argmin(near.gap))
         down = (near.gap[first] + _REHEARSED_DEPTH) * near.normal[first]
         state = ClothState.at_rest(self.start_position - down)
-        still = np.zeros((len(self.cloth.held), 3))
         for _ in range(2):
             self._steps.begin(state, self._surroundings.flat(bodies, still))
             state = self._steps.end()
+        # layers that meet, and some that might have crossed
+        x = self.start_position.copy()
+        thin = int(np.argmin(np.ptp(x, axis=0)))
+        x[:, thin] = x[:, thin].mean() + _REHEARSED_FLATNESS * (x[:, thin] - x[:, thin].mean())
+        flat = ClothState.at_rest(x)
+        flat.tangled[: len(flat.x) // 2] = 1
+        self._steps.begin(flat, self._surroundings.flat(bodies, still))
+        self._steps.end()
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         # between the end of a step and the begin of the next one nothing is done that could be
@@ -195,7 +191,7 @@ class ClothPlant(LeafSystem):
         else:
             after = self._stepped(context)
             mount = self._mounted(context, after)
-            bodies = displaced(bodies, self._limb_of, mount.limb, mount.limb_rate)
+            bodies = displaced(bodies, self._person.limb_of, mount.limb, mount.limb_rate)
             taken, pressing = self._taken(target + mount.held, bodies)
             discrete.set_value(self._mount, mount.flat())
         velocity = (taken - after.x[self.cloth.held]) / h
@@ -267,19 +263,18 @@ class ClothPlant(LeafSystem):
         """Returns how far grippers and limbs have given way at the end of this step."""
         pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
         mount = MountState.of(context.get_discrete_state(self._mount).value())
-        force = limb_forces(self._limb_of, len(mount.limb), state.owner, state.reaction)
+        force = limb_forces(self._person.limb_of, len(mount.limb), state.owner, state.reaction)
         h = self.cloth.time_step
         return self._mounts.step(mount, np.stack(pulled), force, h, self._moved_mass)
 
     def _wrenches(self, context: Context, after: ClothState, pressing: Pressing) -> FloatArray:
         """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
-        poses = self._poses.Eval(context)
-        origin = np.ascontiguousarray(frames(poses, self._index)[:, :, 3])
+        origin = self._person.origins(self._poses.Eval(context))
         owner, reaction = after.owner, after.reaction
         if (pressing.owner >= 0).any():
             owner, reaction = owner.copy(), reaction.copy()
             owner[self.cloth.held], reaction[self.cloth.held] = pressing.owner, pressing.force
-        return body_wrenches(self._body_of, origin, after.x, owner, reaction)
+        return body_wrenches(self._person.body_of, origin, after.x, owner, reaction)
 
     def _calc(self, index):  # type: ignore[no-untyped-def]
         def calc(context: Context, output: BasicVector) -> None:
@@ -312,7 +307,7 @@ class ClothPlant(LeafSystem):
     def _calc_person_forces(self, context: Context, output: Value) -> None:
         wrench = context.get_discrete_state(self._wrench).value().reshape(-1, 6)
         forces = []
-        for k, index in enumerate(self._index):
+        for k, index in enumerate(self._person.index):
             if not np.any(wrench[k]):
                 continue
             applied = ExternallyAppliedSpatialForce()

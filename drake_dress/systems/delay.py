@@ -12,7 +12,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-FloatArray = np.ndarray
+from drake_dress.models.arrays import FloatArray
 
 
 class Delay(LeafSystem):

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.supervision.fault import Finding
 from drake_dress.models.supervision.garment_belief import (
     GarmentBounds,
@@ -22,8 +22,6 @@ from drake_dress.models.supervision.person_belief import PersonBounds, PersonTra
 from drake_dress.models.supervision.person_pose import POINT_NAMES
 from drake_dress.systems.lcm_inbox import stamp
 from drake_dress.systems.point_messages import read_points
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class PersonCheck:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
-FloatArray = np.ndarray
+from drake_dress.models.arrays import FloatArray
 
 
 class FloatingGripper(LeafSystem):

@@ -17,13 +17,13 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.systems.shared_memory import SharedMemory
 from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 
-FloatArray = npt.NDArray[np.float64]
 # The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
 # solvers go on with.
 _VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner", "tangled"), "solver"

@@ -130,15 +130,12 @@ class GlobalMpc(LeafSystem):
         beside: bool = False,
     ) -> None:
         super().__init__()
-        if not 0.0 < delay < period:
-            raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
-        committed = policy.parameters.committed_steps * policy.parameters.time_step
-        if abs(committed - delay) > 1e-9:
-            raise ValueError(f"delay is {delay} s, expected that of the committed steps")
+        _check_delay(policy, period, delay)
         self._policy = policy
         self._delay = delay
         self._period = period
         self._patience = patience
+        self._waits = waits
         solve = _Solve(policy)
         self._apart = Apart(solve) if beside or not waits else None
         if self._apart is None:
@@ -148,27 +145,33 @@ class GlobalMpc(LeafSystem):
             self._submit = self._apart.submit
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
-        self._waits = waits
-        idle = GlobalPlan(
+        self._idle = GlobalPlan(
             0.0, policy.parameters.time_step, np.zeros((n, 2, 3)), np.zeros((n + 1, 2, 3))
         )
-        self._idle = idle
-        self._plan = self.DeclareAbstractState(Value(idle))
+        self._plan = self.DeclareAbstractState(Value(self._idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
         self._progress = self.DeclareAbstractState(Value(_Progress()))
-        # what `_show` shows, and when was seen what the plan in use answers
+        # what `_show` shows, and the time of the observation that the plan in use is based on
         self._shown = self.DeclareDiscreteState(np.zeros(11))
         self.DeclareVectorInputPort("garment_position", 3 * m)
         self.DeclareVectorInputPort("garment_velocity", 3 * m)
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (n + 1))
-        ticket = {self.abstract_state_ticket(self._plan)}
+        self._declare_outputs()
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
+        if waits:
+            self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._finish)
+        else:
+            self.DeclarePeriodicUnrestrictedUpdateEvent(_LOOKING_PERIOD, 0.0, self._look)
+
+    def _declare_outputs(self) -> None:
+        """Declares the output ports; all but the age depend on state only."""
         self.DeclareAbstractOutputPort(
             "plan",
-            lambda: Value(idle),
+            lambda: Value(self._idle),
             lambda context, output: output.set_value(
                 context.get_abstract_state(self._plan).get_value()
             ),
-            ticket,
+            {self.abstract_state_ticket(self._plan)},
         )
         shown = {self.discrete_state_ticket(self._shown)}
         for name, rows in (
@@ -178,11 +181,6 @@ class GlobalMpc(LeafSystem):
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), shown)
         self.DeclareVectorOutputPort("age", 1, self._calc_age)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
-        if waits:
-            self.DeclarePeriodicUnrestrictedUpdateEvent(period, delay, self._finish)
-        else:
-            self.DeclarePeriodicUnrestrictedUpdateEvent(_LOOKING_PERIOD, 0.0, self._look)
 
     def rehearse(
         self, x: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool]
@@ -317,3 +315,12 @@ class GlobalMpc(LeafSystem):
             output.SetFromVector(context.get_discrete_state(self._shown).value()[rows])
 
         return calc
+
+
+def _check_delay(policy: DressingPolicy, period: float, delay: float) -> None:
+    """Raises a ValueError if a plan would not be used when its committed steps end."""
+    if not 0.0 < delay < period:
+        raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
+    committed = policy.parameters.committed_steps * policy.parameters.time_step
+    if abs(committed - delay) > 1e-9:
+        raise ValueError(f"delay is {delay} s, expected that of the committed steps")

@@ -109,7 +109,7 @@ class Decoder:
                     return None
                 if len(self._lengths) < _MOST_LENGTHS:
                     self._lengths.add(len(message_bytes))
-        except Exception:  # noqa: BLE001 - generated code raises what struct, codecs or lists raise
+        except Exception:
             return None
         return message
 

@@ -84,7 +84,7 @@ class LocalCompensation(LeafSystem):
         joints_step: float,
         joints_count: int,
         feedback: bool = True,
-        record: list | None = None,
+        record: list[Any] | None = None,
         beside: bool = False,
     ) -> None:
         super().__init__()

@@ -10,15 +10,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from drake import lcmt_point_cloud, lcmt_point_cloud_field
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.systems.lcm_inbox import Received
-
-FloatArray = npt.NDArray[np.float64]
 
 FRAME = "world"
 _FIELDS = ("x", "y", "z", "vx", "vy", "vz")

@@ -155,74 +155,90 @@ class RunRecorder(LeafSystem):
             )
 
     def _append(self, context: Context) -> None:
-        def value(name: str) -> np.ndarray:
-            return self.GetInputPort(name).Eval(context)
-
-        active = self.GetInputPort("active")
-        if active.HasValue(context) and not active.Eval(context)[0] > 0.0:
+        if not (self._is_active(context) and self._has_heard(context)):
             return
-        if self._model is not None and not self._heard:
-            # of hardware nothing is known before its first messages
-            grippers = [value(f"{side}_gripper_position") for side in SIDES]
-            self._heard = bool(np.isfinite(grippers).all())
-            if not self._heard:
-                return
         if self._begun is None:
-            self._begun = context.get_time() if active.HasValue(context) else 0.0
+            has_signal = self.GetInputPort("active").HasValue(context)
+            self._begun = context.get_time() if has_signal else 0.0
+        self._writer.append(self._sample(context, context.get_time() - self._begun))
+
+    def _is_active(self, context: Context) -> bool:
+        """Returns whether samples are taken: always, where nothing is connected to `active`."""
+        active = self.GetInputPort("active")
+        return not active.HasValue(context) or bool(active.Eval(context)[0] > 0.0)
+
+    def _has_heard(self, context: Context) -> bool:
+        """Returns whether the grippers are known: of hardware, only after its first messages."""
+        if self._model is None or self._heard:
+            return True
+        grippers = [self._value(context, f"{side}_gripper_position") for side in SIDES]
+        self._heard = bool(np.isfinite(grippers).all())
+        return self._heard
+
+    def _sample(self, context: Context, time: float) -> Sample:
+        """Returns the sample of an instant; what was collected since the last one starts anew."""
+
+        def value(name: str) -> np.ndarray:
+            return self._value(context, name)
+
         x = value("garment_position").reshape(-1, 3)
         joints = value("joint_position").reshape(6, 3)
-        interior = torso_interior(joints[0], joints[3])
-        dressing = {}
-        for i, side in enumerate(SIDES):
-            axis = ArmAxis(hand=joints[3 * i + 2], elbow=joints[3 * i + 1], shoulder=joints[3 * i])
-            sleeve = sleeve_state(x, self._mesh.loops[f"{side}_armhole"], self._signs[i])
-            s, l, theta = axis.coordinates(sleeve.p_c)
-            inside = arm_linking_number(
-                x[self._mesh.loops[f"{side}_armhole"]],
-                joints[3 * i],
-                joints[3 * i + 1],
-                joints[3 * i + 2],
-                interior,
-            )
-            # a sleeve that does not cover its arm has no progress, wherever its centre is
-            dressing[side] = (s if inside else 0.0, l, theta)
+        dressing = self._dressing(x, joints)
         if self._has_control:
             self._collect(context)
         capsule_a, capsule_b = self._ends(context, joints)
         verdict, self._verdict = self._verdict, np.zeros(2, dtype=int)
         clearance, self._clearance = self._clearance, np.full(3, np.inf)
-        arms = None
-        if self._has_arms:
-            self._watch_arms(context)
-            arms = {side: self._arm(context, side) for side in SIDES}
         spent, solves = self._ended(context, "solve_time")
         local_spent, local_solves = self._ended(context, "local_solve_time")
-        self._writer.append(
-            Sample(
-                time=context.get_time() - self._begun,
-                garment_position=x,
-                contact=value("contact") if self._model is None else None,
-                contact_force=(
-                    value("contact_force").reshape(-1, 3) if self._model is None else None
-                ),
-                joint_position=joints,
-                gripper_position={side: value(f"{side}_gripper_position") for side in SIDES},
-                gripper_force={side: value(f"{side}_gripper_force") for side in SIDES},
-                dressing=dressing,
-                stage=value("stage") if self._has_control else np.zeros(2),
-                safety=verdict,
-                global_solve_time=spent,
-                local_solve_time=local_spent,
-                global_solves=solves,
-                local_solves=local_solves,
-                estimate_garment_position=value("estimated_position").reshape(-1, 3),
-                estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
-                capsule_a=capsule_a,
-                capsule_b=capsule_b,
-                arms=arms,
-                clearance=clearance if self._has_control else None,
-            )
+        has_truth = self._model is None
+        return Sample(
+            time=time,
+            garment_position=x,
+            contact=value("contact") if has_truth else None,
+            contact_force=value("contact_force").reshape(-1, 3) if has_truth else None,
+            joint_position=joints,
+            gripper_position={side: value(f"{side}_gripper_position") for side in SIDES},
+            gripper_force={side: value(f"{side}_gripper_force") for side in SIDES},
+            dressing=dressing,
+            stage=value("stage") if self._has_control else np.zeros(2),
+            safety=verdict,
+            global_solve_time=spent,
+            local_solve_time=local_spent,
+            global_solves=solves,
+            local_solves=local_solves,
+            estimate_garment_position=value("estimated_position").reshape(-1, 3),
+            estimate_joint_position=value("estimated_joint_position").reshape(6, 3),
+            capsule_a=capsule_a,
+            capsule_b=capsule_b,
+            arms=self._arms(context),
+            clearance=clearance if self._has_control else None,
         )
+
+    def _value(self, context: Context, name: str) -> np.ndarray:
+        return self.GetInputPort(name).Eval(context)
+
+    def _dressing(
+        self, x: np.ndarray, joints: np.ndarray
+    ) -> dict[Side, tuple[float, float, float]]:
+        """Returns (s, l, theta) of both sleeves of the garment (n,3) on joints (6,3)."""
+        interior = torso_interior(joints[0], joints[3])
+        dressing = {}
+        for i, side in enumerate(SIDES):
+            shoulder, elbow, hand = joints[3 * i : 3 * i + 3]
+            axis = ArmAxis(hand=hand, elbow=elbow, shoulder=shoulder)
+            loop = self._mesh.loops[f"{side}_armhole"]
+            s, l, theta = axis.coordinates(sleeve_state(x, loop, self._signs[i]).p_c)
+            inside = arm_linking_number(x[loop], shoulder, elbow, hand, interior)
+            # a sleeve that does not cover its arm has no progress, wherever its centre is
+            dressing[side] = (s if inside else 0.0, l, theta)
+        return dressing
+
+    def _arms(self, context: Context) -> dict[Side, ArmSample] | None:
+        if not self._has_arms:
+            return None
+        self._watch_arms(context)
+        return {side: self._arm(context, side) for side in SIDES}
 
     def _arm(self, context: Context, side: Side) -> ArmSample:
         q, v, command, torque = (

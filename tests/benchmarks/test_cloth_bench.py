@@ -32,8 +32,9 @@ from benchmarks.cloth import (
 from benchmarks.cloth.engines import Engine, Recipe, explicit_bias, implicit
 from benchmarks.cloth.measure import Session, race, ratio
 from benchmarks.cloth.peers import flat, mujoco_flex, newton_style3d, newton_vbd
-from benchmarks.cloth.scene import SOFT, STIFF, FloatArray, Scene
+from benchmarks.cloth.scene import SOFT, STIFF, Scene
 from benchmarks.cloth.table import shown
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 
 _RUN_KEYS = {
@@ -111,7 +112,8 @@ def test_reference_is_computed_once_per_setting(session: Session) -> None:
     begin = time.perf_counter()
     again = reference.fine_reference(session, scene)
     assert time.perf_counter() - begin < 0.2
-    assert first is not None and again is not None
+    assert first is not None
+    assert again is not None
     for k, x in first.sample.items():
         np.testing.assert_allclose(again.sample[k], x, atol=1e-6)
     reference.fine_reference(session, _tiny_draping(0.1))
@@ -134,7 +136,8 @@ def test_placement_tells_cost_in_contact(session: Session) -> None:
     _assert_json(result)
     coat = placement.placement_scene(garments.QUICK_SPACING, SOFT, (0.3, 0.1, 0.1), "placement")
     run = race(session, coat, [explicit_bias(1)], 0.02)[0]
-    assert run.contact[0] == 0 and max(run.contact) > 10
+    assert run.contact[0] == 0
+    assert max(run.contact) > 10
 
 
 @pytest.mark.usefixtures("few_engines")
@@ -172,14 +175,16 @@ def test_grippers_feel_the_weight_they_carry(
 def test_growth_fits_an_exponent(session: Session) -> None:
     result = growth.measure(session)
     nodes = [size["nodes"] for size in result["sizes"]]
-    assert nodes == sorted(nodes) and nodes[0] > 300
+    assert nodes == sorted(nodes)
+    assert nodes[0] > 300
     assert 0.3 < result["exponent"] < 2.5
 
 
 def test_backward_is_finite_in_contact(session: Session) -> None:
     result = backward.measure(session)
     run = result["runs"][0]
-    assert run["contacts"] > 0 and run["finite"]
+    assert run["contacts"] > 0
+    assert run["finite"]
     assert run["adjoint_median_s"] > 0.0
     assert "backward" in backward.tables(result)[0].text()
     _assert_json(result)
@@ -221,7 +226,8 @@ def test_explosion_is_told_and_the_others_go_on(session: Session) -> None:
         session, _tiny_draping(), [explicit_bias(1), _recipe("bad", _Diverging), missing], 0.01
     )
     assert [run.name for run in runs] == ["explicit bias, 1 it.", "bad"]
-    assert runs[0].exploded is None and runs[0].reached == pytest.approx(0.2)
+    assert runs[0].exploded is None
+    assert runs[0].reached == pytest.approx(0.2)
     assert runs[1].exploded == pytest.approx(0.03)
 
 
@@ -303,7 +309,8 @@ def test_peer_hangs_the_same_garment(recipe: Recipe, session: Session) -> None:
     np.testing.assert_allclose(theirs[scene.held], scene.position[scene.held], atol=1e-6)
     fallen = ours[:, 2].mean() - scene.position[:, 2].mean()
     assert abs(theirs[:, 2].mean() - ours[:, 2].mean()) < 0.01
-    assert fallen < 0.0 and theirs[:, 2].mean() < scene.position[:, 2].mean()
+    assert fallen < 0.0
+    assert theirs[:, 2].mean() < scene.position[:, 2].mean()
     assert measure.edge_strain(theirs, scene.elements()) < 0.05
 
 
@@ -324,7 +331,8 @@ def test_command_writes_tables_json_and_plots(
     arguments = ["--quick", "--only", "growth", "--json", str(file), "--png", str(folder)]
     assert command.main([*arguments, "--cache", str(tmp_path)]) == 0
     out = capsys.readouterr().out
-    assert "processor:" in out and "| nodes " in out
+    assert "processor:" in out
+    assert "| nodes " in out
     document = json.loads(file.read_text())
     assert set(document) == {"about", "quick", "wall_s", "scenes"}
     assert set(document["scenes"]) == {"growth"}

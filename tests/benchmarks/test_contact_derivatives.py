@@ -2,7 +2,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from contact_derivatives import STEPS, run  # noqa: E402
+from contact_derivatives import STEPS, run
 
 
 def test_adjoint_of_random_contact_states_is_that_of_finite_differences() -> None:

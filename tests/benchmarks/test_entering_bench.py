@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from benchmarks import entering  # noqa: E402
-from benchmarks.entering import Ahead, Entry, table  # noqa: E402
+from benchmarks import entering
+from benchmarks.entering import Ahead, Entry, table
 
 
 def entry(really: bool, moving: bool, staying: bool, off: float) -> Entry:
@@ -27,8 +27,10 @@ def test_hands_that_are_in_and_others_are_counted_apart() -> None:
     found = [entry(True, True, True, 0.01)] * 3 + [entry(True, True, False, 0.02)]
     found += [entry(False, False, True, 0.03)] * 2 + [entry(False, True, True, 0.04)]
     moved, stayed = table(found).rows
-    assert moved[1:3] == ["4 of 4", "1 of 3"] and moved[3] == pytest.approx(20.0)
-    assert stayed[1:3] == ["3 of 4", "3 of 3"] and stayed[3] == pytest.approx(40.0)
+    assert moved[1:3] == ["4 of 4", "1 of 3"]
+    assert moved[3] == pytest.approx(20.0)
+    assert stayed[1:3] == ["3 of 4", "3 of 3"]
+    assert stayed[3] == pytest.approx(40.0)
 
 
 def test_no_moment_is_a_table_without_figures() -> None:

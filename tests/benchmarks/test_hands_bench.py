@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from benchmarks import hands  # noqa: E402
-from benchmarks.hands import Moment, quantities, tables  # noqa: E402
-from drake_dress.models.dressing.sleeve import SleeveState  # noqa: E402
-from tests.report import synthetic  # noqa: E402
+from benchmarks import hands
+from benchmarks.hands import Moment, quantities, tables
+from drake_dress.models.dressing.sleeve import SleeveState
+from tests.report import synthetic
 
 
 def moment(value: float, wait: float | None, second: bool, touches: bool = False) -> Moment:
@@ -31,7 +31,8 @@ def test_shares_by_sixths_are_those_that_were_made() -> None:
     (row,) = table.rows
     assert row[0] == "way, cm"
     assert [cell.split(": ")[1] for cell in row[1:]] == ["100 %"] * 2 + ["0 %"] * 4
-    assert row[1].startswith("0 to 9:") and row[6].startswith("50 to 59:")
+    assert row[1].startswith("0 to 9:")
+    assert row[6].startswith("50 to 59:")
 
 
 def test_first_and_second_hands_and_touches_are_told_apart() -> None:
@@ -86,7 +87,9 @@ def test_a_hand_is_in_where_it_stays_in() -> None:
     holds = np.zeros(30, dtype=bool)
     holds[3:6] = holds[10:20] = holds[27:] = True
     stays = hands._stays(time, holds)
-    assert not stays[:10].any() and stays[10:20].all() and not stays[20:].any()
+    assert not stays[:10].any()
+    assert stays[10:20].all()
+    assert not stays[20:].any()
 
 
 def test_a_log_that_is_none_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,7 +38,8 @@ def test_a_run_drives_a_lab_of_another_process(tmp_path: Path) -> None:
     for name in ("left arm", "right arm", "garment", "person"):
         assert f"heard: {name}" in done.run_words
     with RunLog.open(tmp_path / "run" / "run.h5") as log:
-        assert log.estimated and log.ended_by is None
+        assert log.estimated
+        assert log.ended_by is None
         assert log.time[-1] > 3.5
         summary = summarize(log, wall_time=0.0)
         assert summary["command_rate_hz"] > 100.0
@@ -111,7 +112,8 @@ def test_what_cannot_be_measured_is_told(
         main(words)
     assert ended.value.code == 2
     error = capsys.readouterr().err
-    assert told in error and error.count("\n") == 1
+    assert told in error
+    assert error.count("\n") == 1
 
 
 def test_commands_are_measured_often_and_told_with_their_spread(

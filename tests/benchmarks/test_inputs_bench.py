@@ -59,7 +59,8 @@ def test_each_way_to_fail_is_told(
     if problem is None:
         assert result.problem is None
     else:
-        assert result.problem is not None and problem in result.problem
+        assert result.problem is not None
+        assert problem in result.problem
     assert table([result], 1).rows[-1][-1] == int(problem is None)
 
 

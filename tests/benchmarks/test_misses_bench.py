@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from benchmarks import misses  # noqa: E402
-from benchmarks.misses import Hand, Look, hands, table  # noqa: E402
+from benchmarks import misses
+from benchmarks.misses import Hand, Look, hands, table
 
 NONE, LEFT, RIGHT, BOTH = (False, False), (True, False), (False, True), (True, True)
 

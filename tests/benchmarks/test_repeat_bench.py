@@ -76,5 +76,5 @@ def test_runs_are_compared_with_the_log_of_another_version(
 def test_a_log_to_compare_with_that_cannot_be_read_is_told_before_anything_runs(
     tmp_path: Path,
 ) -> None:
-    with pytest.raises(UserError, match="missing.h5"):
+    with pytest.raises(UserError, match=r"missing\.h5"):
         repeat.main(["--out", str(tmp_path), "--against", str(tmp_path / "missing.h5")])

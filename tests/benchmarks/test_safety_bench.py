@@ -6,7 +6,7 @@ import numpy as np
 from tests.drawing import drawn_seed
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import safety  # noqa: E402
+import safety
 
 
 def test_no_failure_of_controller_or_sensors_gets_past_the_limits() -> None:

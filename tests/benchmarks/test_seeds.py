@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 
 import pytest
 from hypothesis import given
@@ -50,7 +51,7 @@ def test_all_seeds_of_a_purpose_can_be_drawn() -> None:
 
 def test_purposes_share_no_seed() -> None:
     ranges = sorted(PURPOSES.values(), key=lambda r: r.start)
-    assert all(a.stop == b.start for a, b in zip(ranges, ranges[1:], strict=False))
+    assert all(a.stop == b.start for a, b in itertools.pairwise(ranges))
 
 
 @pytest.mark.parametrize("text", ["report", "report:0", "develop:101", "show:3", "report:-1", "7"])

@@ -33,7 +33,8 @@ def test_arms_start_where_grippers_are(ahead: float) -> None:
         np.testing.assert_allclose(tool[:3, 3], grippers[i], atol=1e-3)
         if ahead:
             np.testing.assert_allclose(tool[:3, :3], BEHIND.hand, atol=0.1)
-        assert (setup.start[i] > LIMITS.lower).all() and (setup.start[i] < LIMITS.upper).all()
+        assert (setup.start[i] > LIMITS.lower).all()
+        assert (setup.start[i] < LIMITS.upper).all()
 
 
 def test_a_place_out_of_reach_is_told() -> None:
@@ -63,16 +64,19 @@ def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
             q, asked = log[f"arm/{side}/q"][:], log[f"arm/{side}/q_commanded"][:]
             assert np.abs(q - asked).max() < 0.02
             assert (np.abs(log[f"arm/{side}/v"][:]) <= LIMITS.speed).all()
-            assert (q > LIMITS.lower).all() and (q < LIMITS.upper).all()
+            assert (q > LIMITS.lower).all()
+            assert (q < LIMITS.upper).all()
             # what joints came to between samples is in the log, too
             least, most = log[f"arm/{side}/q_least"][:], log[f"arm/{side}/q_most"][:]
-            assert (least <= q).all() and (q <= most).all()
+            assert (least <= q).all()
+            assert (q <= most).all()
             between = (least[1:] < np.minimum(q[1:], q[:-1])) | (
                 most[1:] > np.maximum(q[1:], q[:-1])
             )
             assert between.any()
             peak, now = log[f"arm/{side}/v_peak"][:], np.abs(log[f"arm/{side}/v"][:])
-            assert (peak >= now).all() and (peak > now).mean() > 0.5
+            assert (peak >= now).all()
+            assert (peak > now).mean() > 0.5
             assert (peak <= LIMITS.speed).all()
             torque = log[f"arm/{side}/torque_peak"][:]
             assert (torque >= np.abs(log[f"arm/{side}/torque"][:])).all()

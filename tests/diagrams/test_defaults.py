@@ -134,7 +134,8 @@ def test_a_mirror_has_what_its_model_has_and_leads_back_to_it() -> None:
     values.approaches[2].tilt = 0.7
     values.flat = 0.6
     changed = model_of(values)
-    assert changed.approaches[2].tilt == 0.7 and changed.flat == 0.6
+    assert changed.approaches[2].tilt == 0.7
+    assert changed.flat == 0.6
     # what a mirror begins with is its own
     assert Tasks().approaches[2].tilt == model.approaches[2].tilt
     with pytest.raises(TypeError, match="speed"):

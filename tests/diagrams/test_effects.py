@@ -34,7 +34,7 @@ def test_what_is_not_given_is_off_and_uncertainties_do_not_matter():
 
 
 @pytest.mark.parametrize(
-    "setting, words",
+    ("setting", "words"),
     [
         ("effects.air_drag.coefficient=-1", ["effects.air_drag.coefficient", "0 to 10"]),
         ("effects.air_drag.size=1", ["effects.air_drag.size", "coefficient"]),

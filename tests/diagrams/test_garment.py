@@ -60,7 +60,7 @@ def test_keys_of_a_mesh_reach_the_file(tmp_path, reads):
     assert np.allclose(
         np.ptp(mesh.rest_position, axis=0), np.ptp(JACKET.rest_position, axis=0), atol=0.03
     )
-    with pytest.raises(UserError, match="garment.mesh.up: y"):
+    with pytest.raises(UserError, match=r"garment\.mesh\.up: y"):
         garment.build_garment(Garment(mesh=Mesh(file="coat.obj")), 0.06, tmp_path)
 
 

@@ -25,7 +25,7 @@ from drake_dress.diagrams.build import (
     rates,
     station_parameters,
 )
-from drake_dress.diagrams.dressing import make_dressing
+from drake_dress.diagrams.dressing import ControlSetup, make_dressing
 from drake_dress.diagrams.hardware_station import (
     HardwareStation,
     Heard,
@@ -88,7 +88,8 @@ class Pair:
         }
         heard = Heard(joints, seen["garment_position"], seen["joint_position"])
         self.station: HardwareStation = make_hardware_station(p, lcm, person, robots, heard)
-        self.dressing = make_dressing(self.station, meshes.belief, policy, rates(scenario), limits)
+        control = ControlSetup(policy, rates(scenario), limits)
+        self.dressing = make_dressing(self.station, meshes.belief, control)
         builder = DiagramBuilder()
         builder.AddNamedSystem("lab", self.lab.diagram)
         builder.AddNamedSystem("run", self.dressing.diagram)
@@ -248,7 +249,8 @@ def test_at_a_fault_both_arms_hold_then_go_on_or_the_run_ends(
         assert permitted[-1] == 1.0
     else:
         told = pair.conclusion()
-        assert told is not None and told.startswith(ends.split(":")[0])
+        assert told is not None
+        assert told.startswith(ends.split(":")[0])
         assert ends.split(": ")[1] in told
         assert (permitted[since > start + seen] == 0.0).all()
 
@@ -347,7 +349,9 @@ def test_messages_out_of_order_hold_nothing_and_are_counted() -> None:
     assert (permitted[since > 0.3] == 1.0).all()
     assert pair.conclusion() is None
     dropped = pair.dropped()
-    assert dropped["left_arm"] > 20 and dropped["right_arm"] > 20 and dropped["person"] > 5
+    assert dropped["left_arm"] > 20
+    assert dropped["right_arm"] > 20
+    assert dropped["person"] > 5
     # of an estimate that comes every 20 ms, a clock set back by 8 ms makes none late
     assert dropped["garment"] == 0
 

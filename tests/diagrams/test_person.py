@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from pydrake.geometry import Role
 from pydrake.math import RigidTransform
@@ -21,6 +20,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from drake_dress.diagrams.person import JointParameters, Person, add_person, joint_positions
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
     SIDES,
     ArmPose,
@@ -30,8 +30,6 @@ from drake_dress.models.human.body import (
     arm_points,
     shoulder_height,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 M = BodyMeasures()
 JOINTS = JointParameters(2.0, 1.0, 1.5, 0.4)

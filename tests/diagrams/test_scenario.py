@@ -104,7 +104,8 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
     )
     assert scenario.plant.material.friction == 0.7
     assert scenario.duration == 3.0
-    assert scenario.garment.mesh is not None and scenario.garment.mesh.file == "x.obj"
+    assert scenario.garment.mesh is not None
+    assert scenario.garment.mesh.file == "x.obj"
     assert scenario.seed == 5
 
 
@@ -269,7 +270,9 @@ def test_scale_of_a_mesh_file_is_drawn_with_the_coat_s(tmp_path: Path) -> None:
 
 def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None:
     made = behaviour(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)))
-    assert made.kind == "active" and made.turns and made.seed == 4
+    assert made.kind == "active"
+    assert made.turns
+    assert made.seed == 4
     assert made.active.following == FollowingParameters(0.5, 0.3, 20.0)
     assert made.active.max_hand_speed == 0.6
     assert made.tremor == TremorParameters(0.01, 5.0)

@@ -61,8 +61,10 @@ def test_the_rules_separate_good_tools_from_bad_ones_as_often_as_is_said():
         return sum(comb(cases, k) * (1 - p) ** k * p ** (cases - k) for k in range(wrong + 1))
 
     nothing, weight = (NOTHING_WRONG, NOTHING_MADE_UP), (WEIGHT_WRONG, WEIGHT_MADE_UP)
-    assert 1.0 - at_most(*nothing, GOOD) < 0.001 and at_most(*nothing, HALF) < 3e-9
-    assert 1.0 - at_most(*weight, GOOD) < 0.011 and at_most(*weight, HALF) < 0.02
+    assert 1.0 - at_most(*nothing, GOOD) < 0.001
+    assert at_most(*nothing, HALF) < 3e-9
+    assert 1.0 - at_most(*weight, GOOD) < 0.011
+    assert at_most(*weight, HALF) < 0.02
     # so many right ones, and at most one wrong one, which is not the last
     for enough, failing, passing in ((2, 0.005, 0.5), (1, 0.002, 0.75)):
         assert 1.0 - GOOD**enough * (1.0 + enough * (1.0 - GOOD)) < failing

@@ -57,7 +57,8 @@ def test_a_file_may_hold_one_recording_at_its_root_and_lack_what_is_not_required
         nodes = cKDTree(MESH.rest_position).query(r.marker_rest_position)[1]
         file["garment/marker_node"] = nodes
     (read,) = read_recordings([path], MESH)
-    assert read.gripper_force is None and read.joint_position is None
+    assert read.gripper_force is None
+    assert read.joint_position is None
     np.testing.assert_array_equal(read.marker_rest_position, MESH.rest_position[nodes])
     # the noise is found from the data
     assert read.marker_noise == pytest.approx(1e-3, rel=0.25)
@@ -165,7 +166,7 @@ def test_what_cannot_be_used_is_named(log, case):
 
 
 @pytest.mark.parametrize(
-    "name, content", [("lab.txt", "a"), ("lab.h5", "not HDF5"), ("lab.csv", "")]
+    ("name", "content"), [("lab.txt", "a"), ("lab.h5", "not HDF5"), ("lab.csv", "")]
 )
 def test_files_of_another_kind_are_refused(tmp_path, name, content):
     path = tmp_path / name

@@ -38,7 +38,8 @@ def test_bounded_least_squares_keeps_its_bounds():
     free = solve_bounded(columns, columns, residual, -np.inf, np.inf)
     np.testing.assert_allclose(free, truth, rtol=1e-4)
     bound = solve_bounded(columns, columns, residual, np.zeros(3), np.full(3, 0.8))
-    assert np.all((bound >= -1e-9) & (bound <= 0.8 + 1e-9)) and bound[1] == pytest.approx(0.0)
+    assert np.all((bound >= -1e-9) & (bound <= 0.8 + 1e-9))
+    assert bound[1] == pytest.approx(0.0)
 
 
 def test_what_is_left_of_the_step_does_not_move_parameters(rng, recording):

@@ -40,7 +40,8 @@ def test_a_kin_whose_own_numerics_explain_as_much_makes_room_for_the_cause(found
     lab = MadeUp(np.random.default_rng(0), np.inf, besides=1e-3, during=slice(160, None))
     # alone it is refused, and what is left is told by the noise that was there before it was tried
     alone = found(lab, STIFFNESS)
-    assert alone.named == () and alone.model is alone.plain
+    assert alone.named == ()
+    assert alone.model is alone.plain
     left = np.mean((alone.comparison.whitening.data - alone.plain.predicted) ** 2)
     assert left > 2.0
     result = found(lab, STIFFNESS, WEIGHT)

@@ -33,7 +33,8 @@ def test_a_process_that_is_gone_is_told_in_one_line() -> None:
         with pytest.raises(FailedError, match="a process that simulates has ended") as caught:
             workers.map(os._exit, [()])
         assert "\n" not in str(caught.value)
-        assert caught.value.__cause__ is None and caught.value.__suppress_context__
+        assert caught.value.__cause__ is None
+        assert caught.value.__suppress_context__
     finally:
         workers.end()
 

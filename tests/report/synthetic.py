@@ -6,14 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
+from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter, Sample
-
-FloatArray = npt.NDArray[np.float64]
 
 SHOULDER_HEIGHT = 1.4  # m
 ARM_RADIUS = 0.035  # m
@@ -125,13 +124,15 @@ def write(
     _, _, radius = capsules(dressed_joints(garment))
     with RunLogWriter(
         path,
-        garment=garment,
-        scenario_text=scenario,
-        version="0.0",
-        seed=seed,
-        radius=np.full(6, ARM_RADIUS),
-        capsule_radius=radius,
-        estimate_garment=garment,
+        LogContent(
+            garment=garment,
+            scenario_text=scenario,
+            version="0.0",
+            seed=seed,
+            radius=np.full(6, ARM_RADIUS),
+            capsule_radius=radius,
+            estimate_garment=garment,
+        ),
     ) as log:
         for sample in samples:
             log.append(sample)

@@ -17,6 +17,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report import disk, log_writer
 from drake_dress.report.log import RunLog
+from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_schema import JOINT_NAMES
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
@@ -40,9 +41,17 @@ def path(tmp_path, garment, samples):
 def eager_writer(path, garment):
     """Returns one that flushes every sample."""
     return RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.0,
-    )  # fmt: skip
+        path,
+        LogContent(
+            garment=garment,
+            scenario_text="",
+            version="",
+            seed=0,
+            radius=np.ones(6),
+            capsule_radius=np.ones(6),
+        ),
+        flush_period=0.0,
+    )
 
 
 def test_what_is_read_is_what_was_written(path, garment, samples):
@@ -136,7 +145,8 @@ def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):
 
     with pytest.raises(KeyboardInterrupt):
         with RunLogWriter(
-            path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)
+            path,
+            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
         ) as writer:
             for sample in samples[:3]:
                 writer.append(sample)
@@ -160,13 +170,14 @@ import time
 import numpy as np
 from dataclasses import replace
 from drake_dress.report import log_writer
+from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 log_writer._MOST_OPEN = 50
 garment = synthetic.coat(0.06)
 sample = synthetic.dressing(garment, count=2)[0]
-writer = RunLogWriter({str(path)!r}, garment=garment, scenario_text="", version="", seed=0,
-                      radius=np.ones(6), capsule_radius=np.ones(6), flush_period=0.05)
+content = LogContent(garment, "", "", 0, np.ones(6), capsule_radius=np.ones(6))
+writer = RunLogWriter({str(path)!r}, content, flush_period=0.05)
 for i in range(10**6):
     writer.append(replace(sample, time=0.01 * i))
     if i in (600, 601):
@@ -252,16 +263,20 @@ def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
         return opened(*words)
 
     words = {
-        "garment": garment, "scenario_text": "", "version": "", "seed": 0, "radius": np.ones(6),
-        "capsule_radius": np.ones(6), "flush_period": 0.0,
-    }  # fmt: skip
-    with RunLogWriter(path, **words) as writer:
+        "garment": garment,
+        "scenario_text": "",
+        "version": "",
+        "seed": 0,
+        "radius": np.ones(6),
+        "capsule_radius": np.ones(6),
+    }
+    with RunLogWriter(path, LogContent(**words), flush_period=0.0) as writer:
         monkeypatch.setattr(log_writer, "_open", refused)
         for sample in samples[:3]:
             writer.append(sample)
             writer._drain()
         with pytest.raises(UserError, match="cannot be written"):
-            RunLogWriter(path, **words)
+            RunLogWriter(path, LogContent(**words), flush_period=0.0)
     with RunLog.open(path) as log:
         assert len(log) == 3
 
@@ -269,11 +284,7 @@ def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
 def test_time_must_increase(tmp_path, garment, samples):
     with RunLogWriter(
         tmp_path / "run.h5",
-        garment=garment,
-        scenario_text="",
-        version="",
-        seed=0,
-        radius=np.ones(6),
+        LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
     ) as writer:
         writer.append(samples[1])
         with pytest.raises(ValueError, match="not later"):
@@ -284,11 +295,7 @@ def test_wrong_shape_is_told(tmp_path, garment, samples):
     bad = replace(samples[0], joint_position=np.zeros((5, 3)))
     with RunLogWriter(
         tmp_path / "run.h5",
-        garment=garment,
-        scenario_text="",
-        version="",
-        seed=0,
-        radius=np.ones(6),
+        LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
     ) as writer:
         with pytest.raises(ValueError, match="joint_position"):
             writer.append(bad)
@@ -413,6 +420,7 @@ from pathlib import Path
 import numpy as np
 from benchmarks.hardware.two_processes import fill
 from drake_dress.report.log import RunLog
+from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 
@@ -426,10 +434,8 @@ def fill_later(after):
     fill(filler)
 
 for after in np.random.default_rng(0).uniform(0.1, 0.5, 6):
-    writer = RunLogWriter(
-        path, garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6),
-        capsule_radius=np.ones(6), flush_period=0.02,
-    )
+    content = LogContent(garment, "", "", 0, np.ones(6), capsule_radius=np.ones(6))
+    writer = RunLogWriter(path, content, flush_period=0.02)
     filling = threading.Thread(target=fill_later, args=[after])
     filling.start()
     count, begin = 0, time.monotonic()
@@ -482,9 +488,9 @@ def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
     monkeypatch.setattr(os, "posix_fallocate", none)
     with pytest.raises(UserError, match="no room on the disk"):
         RunLogWriter(
-            tmp_path / "run.h5", garment=garment, scenario_text="", version="", seed=0,
-            radius=np.ones(6),
-        )  # fmt: skip
+            tmp_path / "run.h5",
+            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -500,7 +506,8 @@ def test_a_run_for_which_there_is_no_room_costs_nothing_of_the_one_before(
     monkeypatch.setattr(os, "posix_fallocate", none)
     with pytest.raises(UserError, match="no room on the disk"):
         RunLogWriter(
-            tmp_path / "run.h5", garment=garment, scenario_text="", version="", seed=0,
-            radius=np.ones(6), results=["summary.json"],
-        )  # fmt: skip
+            tmp_path / "run.h5",
+            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+            results=["summary.json"],
+        )
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before

@@ -88,7 +88,8 @@ def test_grippers_follow_their_commands() -> None:
     for i, arm in enumerate(arms.arms):
         now = arm.tool_position(q[-1, i])
         np.testing.assert_allclose(now, arm.tool_position(HOME) + velocity, atol=2e-3)
-    assert np.isfinite(clearance[-1]).all() and clearance[-1].min() > 0.05
+    assert np.isfinite(clearance[-1]).all()
+    assert clearance[-1].min() > 0.05
     rates = np.diff(q, axis=0) / PERIOD
     assert (np.abs(rates) <= LIMITS.speed * (1 + 1e-9)).all()
 

@@ -77,7 +77,8 @@ def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
         # seen at 0.5 s, used from 0.7 s to 1.3 s, and for another period
         assert moves[7:10].all(), ends
         first = int(np.argmin(moves[7:])) + 7
-        assert not moves[first] and 0.1 * first <= 1.3 + _PERIOD + 0.11, ends
+        assert not moves[first], ends
+        assert 0.1 * first <= 1.3 + _PERIOD + 0.11, ends
         mpc = controllers[ends]
         found = mpc.failure(mpc.GetMyContextFromRoot(simulator.get_context()))
         if failure is None:
@@ -85,7 +86,8 @@ def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
             assert moves[first:].any(), "it goes on with the plan that came late"
         else:
             assert not moves[first:].any(), ends
-            assert found is not None and found.startswith(failure)
+            assert found is not None
+            assert found.startswith(failure)
 
 
 def test_a_run_is_finished_while_sleeves_that_are_done_are_still_on() -> None:

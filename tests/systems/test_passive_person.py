@@ -43,7 +43,8 @@ def test_the_arm_that_is_led_is_followed_and_the_other_is_not() -> None:
 def test_set_point_stays_within_the_joints_limits() -> None:
     low, high = ARMS.limits[:, 0].ravel(), ARMS.limits[:, 1].ravel()
     set_point = held(person(time_constant=0.1, max_speed=5.0), high + 1.0, 3.0)
-    assert (set_point <= high + 1e-12).all() and (set_point >= low).all()
+    assert (set_point <= high + 1e-12).all()
+    assert (set_point >= low).all()
     assert np.abs(set_point - high).max() < 0.05
 
 

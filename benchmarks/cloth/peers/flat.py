@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cloth.scene import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 
 def flat_triangles(position: FloatArray, faces: IntArray) -> FloatArray:

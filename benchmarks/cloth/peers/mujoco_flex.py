@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.engines import Engine, Recipe
-from benchmarks.cloth.scene import FloatArray, Scene
+from benchmarks.cloth.scene import Scene
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.matrices import lumped_mass
 
 _GRIPPER_MASS = 1000.0  # kg; 1 N moves it by 1e-7 m in 0.01 s

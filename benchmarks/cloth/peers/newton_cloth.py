@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cloth.scene import FloatArray, Scene
+from benchmarks.cloth.scene import Scene
+from drake_dress.models.arrays import FloatArray
 
 # Penalty of a contact, N/m: at 1e3 Style3D sinks into a table by centimetres, at 1e4 not at all.
 _CONTACT_STIFFNESS = 1.0e5

@@ -11,16 +11,14 @@ and marker that says where. What counts as evidence:
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.marker_faults.exchanges import exchanged
 from drake_dress.discrepancy.marker_faults.lost import held_values, substitutes
 from drake_dress.discrepancy.marker_faults.telling import told
 from drake_dress.discrepancy.marker_faults.tracks import find_jumps, out_of_reach, strays
+from drake_dress.models.arrays import FloatArray
 
 __all__ = ["without_faults", "without_substitutes"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def without_substitutes(

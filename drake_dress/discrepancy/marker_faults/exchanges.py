@@ -6,9 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.discrepancy.marker_faults.tracks import Jump
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from drake_dress.models.arrays import BoolArray, FloatArray
 
 # A marker takes another's place if it is so much nearer to that than to its own.
 _NEARER = 0.4

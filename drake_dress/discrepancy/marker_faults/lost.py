@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from drake_dress.models.arrays import BoolArray, FloatArray
 
 # A value farther from the middle of all markers than so many times their usual distance is none.
 _FAR = 12.0

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-BoolArray = npt.NDArray[np.bool_]
+from drake_dress.models.arrays import BoolArray
 
 # Stretches of samples that a line lists; names of markers with the same stretches.
 _LISTED, _NAMED = 4, 8

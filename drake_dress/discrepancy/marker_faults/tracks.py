@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
 # A step is a jump where it is off the steps about it by more than
 #     _FLOOR + _NOISES σ + min(_CURVED dt², _FASTEST dt).
@@ -132,7 +129,7 @@ def strays(time: FloatArray, marker: FloatArray, jumps: list[Jump], far: BoolArr
 
 
 def _joined(
-    time: FloatArray, track: FloatArray, pieces: list[IntArray], cuts: list[Jump], far: BoolArray
+    time: FloatArray, track: FloatArray, pieces: list[IndexArray], cuts: list[Jump], far: BoolArray
 ) -> set[int]:
     """Returns which pieces are the marker's: the heaviest chain of pieces that join."""
     weight = [len(p) - 2.0 * np.count_nonzero(far[p]) for p in pieces]
@@ -154,11 +151,13 @@ def _joined(
     return chosen
 
 
-def _lasts(time: FloatArray, *pieces: IntArray) -> bool:
+def _lasts(time: FloatArray, *pieces: IndexArray) -> bool:
     return all(time[p[-1]] - time[p[0]] >= _LASTING for p in pieces)
 
 
-def _meet(time: FloatArray, track: FloatArray, a: IntArray, b: IntArray, allowed: float) -> bool:
+def _meet(
+    time: FloatArray, track: FloatArray, a: IndexArray, b: IndexArray, allowed: float
+) -> bool:
     """Returns whether the marker may have got from the end of one piece to the begin of another."""
     gap = float(time[b[0]] - time[a[-1]])
     return float(np.linalg.norm(track[b[0]] - track[a[-1]])) <= allowed + _JOINED * gap

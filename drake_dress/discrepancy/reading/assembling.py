@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.marker_faults import without_faults, without_substitutes
 from drake_dress.discrepancy.reading.clock import checked_time
@@ -28,12 +27,11 @@ from drake_dress.discrepancy.reading.raw import (
 from drake_dress.discrepancy.reading.weight import check_forces
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.geodesic_reach import reach_between
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
-
-FloatArray = npt.NDArray[np.float64]
 
 # Fewest and most markers: fewer say nothing, each costs time in every step of every simulation.
 _LEAST_MARKERS, _MOST_MARKERS = 4, 1000

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Fewest samples that say anything; shortest and longest recording, s: an hour of simulations at
 # four levels of numerics begins at about ten minutes.

@@ -8,11 +8,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # A file is not larger than this, bytes: 600 s of 60 markers at 100 Hz are 0.1 GB.
 _MOST_BYTES = 2**29

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.reading.raw import MARKERS, UNITS, RawRecording
 from drake_dress.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Noise is never taken below this, and no sensor of use has more, by unit.
 _LEAST = {"m": 1e-4, "N": 1e-3}

@@ -12,16 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from drake_dress.discrepancy.reading.raw import JOINTS, MARKERS, PLACES, RawRecording
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
-
-FloatArray = npt.NDArray[np.float64]
 
 # A world's origin is within this, m.
 _FARTHEST = 20.0

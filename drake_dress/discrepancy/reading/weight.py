@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.reading.plausibility import at_start, axis_name
 from drake_dress.discrepancy.reading.raw import RawRecording
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
-
-FloatArray = npt.NDArray[np.float64]
 
 _GRAVITY = 9.81
 # Mass of any fabric, kg/m²: voile to a lined winter coat.
@@ -23,6 +21,8 @@ _FACTOR = 3.5
 _DOWN = 0.7
 # Forces of a person or of arms that hold a garment stay below this, N.
 _MOST = 1000.0
+# Name of both grippers' forces in messages.
+_BOTH = "gripper/*/force"
 # Force of one newton in other units.
 _UNITS = (
     (1e3, "millinewtons"),
@@ -52,60 +52,90 @@ def check_forces(
         mesh: the scenario's garment.
         surface_density: of it, kg/m²; None for any.
     """
-    keys = [raw.key(f"gripper/{side}/force") for side in SIDES]
-    both = raw.key("gripper/*/force")
     begin, whole = at_start(time, force), _mean(force)
     if not np.isfinite(begin).all():
         return
-    weights = [_GRAVITY * _area(mesh) * d for d in _densities(surface_density)]
-    least, most = weights[0], weights[-1]
-    about = f"{least:.2g} to {most:.2g} N"
+    least, most = (_GRAVITY * _area(mesh) * d for d in _densities(surface_density))
     totals = [begin.sum(axis=0), whole.sum(axis=0)]
     sizes = [float(np.linalg.norm(t)) for t in totals]
-    for k, other in ((0, 1), (1, 0)):
-        # one up, one down, and together no weight
-        if begin[k, 2] > 0.25 * least and begin[other, 2] < -0.25 * least and sizes[0] < least:
-            raise UserError(
-                raw.source,
-                keys[k],
-                f"points up, {begin[k, 2]:.3g} N, where the other gripper's points down: the sign "
-                "is reversed, expected the force of the garment on the gripper",
-            )
+    _check_signs_agree(raw, begin, sizes[0], least)
     # a garment that begins on the person hangs from the grippers later, or the other way round
     bearing = [t for t, size in zip(totals, sizes, strict=True) if least <= size <= most]
     if not bearing:
-        unit = _unit(sizes[0], float(np.sqrt(least * most)), _FACTOR)
-        hint = f"; is it in {unit}?" if unit else ""
-        if not unit and sizes[0] > most:
-            hint = "; was the sensor tared without the garment?"
-        raise UserError(
-            raw.source,
-            both,
-            f"is {sizes[0]:.3g} N in all while the garment hangs, expected newtons, its weight, "
-            f"{about}{hint}",
-        )
+        raise _not_the_weight(raw, sizes[0], least, most)
+    _check_points_down(raw, bearing)
+    _check_sizes(raw, force)
+
+
+def _check_signs_agree(raw: RawRecording, begin: FloatArray, total: float, least: float) -> None:
+    """Raises UserError where one gripper's force has the wrong sign.
+
+    Args:
+        raw: the recording.
+        begin: (2,3) forces at the start, N.
+        total: size of their sum, N.
+        least: that the garment weighs, N.
+    """
+    for k, other in ((0, 1), (1, 0)):
+        # one up, one down, and together no weight
+        if begin[k, 2] > 0.25 * least and begin[other, 2] < -0.25 * least and total < least:
+            raise UserError(
+                raw.source,
+                raw.key(f"gripper/{SIDES[k]}/force"),
+                f"points up, {begin[k, 2]:.3g} N, where the other gripper's points down: the sign "
+                "is reversed, expected the force of the garment on the gripper",
+            )
+
+
+def _not_the_weight(raw: RawRecording, total: float, least: float, most: float) -> UserError:
+    """Returns the error of forces that are too small or too large for the garment's weight.
+
+    Args:
+        raw: the recording.
+        total: size of both grippers' force at the start, N.
+        least: that the garment weighs, N.
+        most: that it weighs, N.
+    """
+    unit = _unit(total, float(np.sqrt(least * most)), _FACTOR)
+    hint = f"; is it in {unit}?" if unit else ""
+    if not unit and total > most:
+        hint = "; was the sensor tared without the garment?"
+    return UserError(
+        raw.source,
+        raw.key(_BOTH),
+        f"is {total:.3g} N in all while the garment hangs, expected newtons, its weight, "
+        f"{least:.2g} to {most:.2g} N{hint}",
+    )
+
+
+def _check_points_down(raw: RawRecording, bearing: list[FloatArray]) -> None:
+    """Raises UserError where none of the forces (3,) that are the weight's size points down."""
     down = [-float(t[2] / np.linalg.norm(t)) for t in bearing]
     if max(down) < -_DOWN:
         raise UserError(
             raw.source,
-            both,
+            raw.key(_BOTH),
             f"points up, {bearing[0][2]:.3g} N in all: the sign is reversed, expected the force of "
             "the garment on the gripper, down (-z)",
         )
     if max(down) < _DOWN:
         raise UserError(
             raw.source,
-            both,
+            raw.key(_BOTH),
             f"points along {axis_name(bearing[0])} while the garment hangs, expected down (-z) in "
             "the world's frame, z up",
         )
-    for k, key in enumerate(keys):
+
+
+def _check_sizes(raw: RawRecording, force: FloatArray) -> None:
+    """Raises UserError where a single force (T,2,3) is larger than any that occurs."""
+    for k, side in enumerate(SIDES):
         largest = float(np.nanmax(np.abs(force[:, k])))
         if largest > _MOST:
             at = int(np.nanargmax(np.abs(force[:, k]).max(axis=1)))
             raise UserError(
                 raw.source,
-                key,
+                raw.key(f"gripper/{side}/force"),
                 f"is {largest:.4g} N at sample {at}, expected newtons, up to {_MOST:g}",
             )
 

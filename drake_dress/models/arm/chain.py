@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.vector3 import length
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.vector3 import length
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class ArmShape:
         capsules: in the frames of their links.
     """
 
-    link: IntArray
+    link: IndexArray
     capsules: Capsules
 
     def placed(self, links: FloatArray) -> Capsules:
@@ -59,14 +56,14 @@ class Clearance:
         away: (M,3) unit vector from there to here; along it the distance grows.
     """
 
-    pair: IntArray
+    pair: IndexArray
     distance: FloatArray
     here: FloatArray
     there: FloatArray
     away: FloatArray
 
 
-def clearance(a: Capsules, b: Capsules, pairs: IntArray) -> Clearance:
+def clearance(a: Capsules, b: Capsules, pairs: IndexArray) -> Clearance:
     """Returns how far capsules of `a` are from those of `b`, for `pairs` (M,2) of both."""
     here, there, away = (np.empty((len(pairs), 3)) for _ in range(3))
     distance = np.empty(len(pairs))

@@ -22,11 +22,9 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.models.arm.chain import JointLimits
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 
 class Stop(IntEnum):

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.models.arm.chain import SerialArm, find_tool_jacobian, place_links
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Of the damping of the least squares, m: directions in which an arm near a singular pose feels
 # nothing are given no force.

@@ -7,12 +7,10 @@ Denavit-Hartenberg parameters (Craig) and the limits of the joints.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.models.arm.chain import JointLimits, SerialArm
 from drake_dress.models.arm.clearance import ArmShape, Capsules
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 LIMITS = JointLimits(
     lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),

@@ -34,9 +34,9 @@ from drake_dress.models.arm.clearance import (
     place_capsules,
 )
 from drake_dress.models.arm.joint_bounds import find_rate_bounds
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.vector3 import length
 
-FloatArray = npt.NDArray[np.float64]
 # DAQP's kinds of rows.
 _BOUND, _EQUAL, _SOFT = 0, 5, 8
 _NOBODY = Capsules(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))

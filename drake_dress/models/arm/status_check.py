@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.models.arm.chain import JointLimits
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
-
-FloatArray = npt.NDArray[np.float64]
 
 # What sensors may be beyond a limit that is kept, rad, and share of speed.
 _ROOM, _SHARE = 0.005, 1.05

@@ -18,7 +18,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, in_lanes
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import LANES, Elements, in_lanes
 from drake_dress.models.cloth.filtered_stiffness import PLAIN_ROWS
 from drake_dress.models.cloth.forces import (
     deformation,

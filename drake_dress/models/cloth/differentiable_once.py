@@ -31,7 +31,7 @@ def differentiable_once(
     if not torch.is_grad_enabled():
         return tuple(gradients)
     given = [g for g in gradients if g is not None]
-    guarded = iter(_Once.apply(name, len(given), *given, *inputs))  # type: ignore[no-untyped-call]
+    guarded = iter(_Once.apply(name, len(given), *given, *inputs))
     return tuple(None if g is None else next(guarded) for g in gradients)
 
 

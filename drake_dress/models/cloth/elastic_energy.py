@@ -9,7 +9,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.forces import LEAST_CURVATURE, SMALLEST_STRETCH
 
 

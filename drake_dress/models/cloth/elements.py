@@ -9,17 +9,16 @@ paper's energy (Eq. Wx).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray, IntArray
+
 # Elements that a kernel works on at once: vector units want the same number of many elements side
 # by side, and this many fit in the first cache.
 LANES = 32
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     )
 
 
-def in_lanes(rows: npt.NDArray) -> npt.NDArray:
+def in_lanes(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Returns (k,c) rows, one an element, as (⌈k/L⌉,c,L) tiles, L = LANES, padded with zeros."""
     count, columns = rows.shape
     tiles = -(-count // LANES)

@@ -30,11 +30,13 @@ the step with contact types held: friction follows the sticking force, normals f
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.adjoint import Gradient, run_adjoint
 from drake_dress.models.cloth.contact.detection import (
     ATTEMPTS,
@@ -53,7 +55,7 @@ from drake_dress.models.cloth.contact.friction import (
     revise_modes,
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import force_and_product
@@ -218,12 +220,26 @@ class ExplicitBiasCloth:
                 f"attachment_stiffness is {attachment_stiffness} N/m, expected a number above 0"
             )
         self.spring = attachment_stiffness
+        self._options = {
+            "tolerance": tolerance,
+            "iterations": iterations,
+            "inner": inner,
+            "self_collision": self_collision,
+            "attachment_stiffness": attachment_stiffness,
+        }
         # Springs leave all nodes free.
         self._fixed = self.held if self.spring is None else self.held[:0]
         self.inner = self._make_inner(
             inner or ("one_step" if iterations == 1 else "conjugate_gradients"),
             iterations,
             tolerance,
+        )
+
+    def with_material(self, material: Material) -> ExplicitBiasCloth:
+        """Returns the same garment of another fabric."""
+        options: dict[str, Any] = self._options
+        return ExplicitBiasCloth(
+            self.elements, material, self.time_step, self.held, self.gravity, **options
         )
 
     def step(

@@ -12,7 +12,8 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 
 # A fibre crushed to less than this has no direction.
 _SHORTEST = 1e-3

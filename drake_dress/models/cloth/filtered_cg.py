@@ -13,8 +13,9 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.buckling import BUCKLED_ROWS, buckled_product
-from drake_dress.models.cloth.elements import LANES, Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import LANES, Elements
 from drake_dress.models.cloth.factor.kernels import row_product
 from drake_dress.models.cloth.factor.masked import Factor, solve_pair_into, solve_rows
 from drake_dress.models.cloth.fibres import Fibres, no_fibres

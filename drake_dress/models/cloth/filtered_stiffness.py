@@ -10,7 +10,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import LANES, Elements
 from drake_dress.models.cloth.forces import deformation, gather, polar, put_stress, scatter
 
 # Rows that a triangle has in a block.

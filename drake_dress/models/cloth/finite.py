@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 
 def explain_not_finite(

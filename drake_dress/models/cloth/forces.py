@@ -15,7 +15,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import LANES, Elements, FloatArray
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import LANES, Elements
 
 # Smallest value det S is taken at: a triangle crushed to a line has no normal.
 SMALLEST_STRETCH = 1e-3

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.buckling import Buckling
 from drake_dress.models.cloth.contact.corners import held_off_corners
 from drake_dress.models.cloth.contact.detection import (
@@ -29,7 +30,7 @@ from drake_dress.models.cloth.contact.detection import (
     nothing_near,
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK, SystemMatrix

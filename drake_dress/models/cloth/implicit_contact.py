@@ -19,10 +19,10 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
 from drake_dress.models.cloth.contact.distance import distance_to, nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK
 
 # A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, in_lanes
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import Elements, in_lanes
 from drake_dress.models.cloth.layers.bonds import Bonds
 
 

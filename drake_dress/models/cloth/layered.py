@@ -13,9 +13,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.filtered_cg import HELD, STICK
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.material import Material
 
 

@@ -30,10 +30,11 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import cannot_land, depth_of_elements
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.fibres import filtered_product as fibre_product
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product, project

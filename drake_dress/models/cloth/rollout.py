@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
 
 Observer = Callable[[int, FloatArray, FloatArray, FloatArray], None]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.layered import Integrator

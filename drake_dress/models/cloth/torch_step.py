@@ -3,7 +3,8 @@
     x, v, reaction = cloth_step(cloth, x, v, held_motion, obstacles)
 
 are tensors that know how to go backward. `bodies` and `material` let gradients flow to where the
-obstacles are and to what the garment is made of. Torch is imported with this module only.
+obstacles are and to what the garment is made of, whose values may differ from those of `cloth`: so
+fabrics are fitted. Torch is imported with this module only.
 
 The step keeps copies of its inputs, and torch keeps their version numbers: an input that is written
 to before the backward pass raises RuntimeError there. So does a second derivative.
@@ -11,7 +12,9 @@ to before the backward pass raises RuntimeError there. So does a second derivati
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import torch
@@ -19,6 +22,7 @@ import torch
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.differentiable_once import differentiable_once
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.material import Material
 
 MATERIAL = ("surface_density", "stretch_stiffness", "bending_stiffness", "friction", "margin")
 
@@ -84,26 +88,42 @@ def cloth_step(
         held_motion: (k,3) displacement of the held nodes over the step, m.
         obstacles: at the start of the step.
         bodies: (m,4,3) how they are displaced, turned and sped up; see `Obstacles.moved`.
-        material: (5,) the values of `MATERIAL` that the cloth was made with. Gradients flow to
-            them; for other values make another cloth.
+        material: (5,) the values of `MATERIAL`; the cloth's own by default. The garment of the
+            values last used is kept: a rollout of one fabric makes it once.
 
     Raises:
-        ValueError: a tensor is not float64, or `material` is not what the cloth was made with.
+        ValueError: a tensor is not float64, or a value of `material` is outside its range.
     """
     for name, tensor in (("x", x), ("v", v), ("held_motion", held_motion)):
         if tensor.dtype != torch.float64:
             raise ValueError(f"{name} is {tensor.dtype}, expected torch.float64")
-    own = torch.tensor([getattr(cloth.material, n) for n in MATERIAL], dtype=torch.float64)
     if bodies is None:
         bodies = torch.zeros((obstacles.count, 4, 3), dtype=torch.float64)
     if material is None:
-        material = own
-    elif not torch.allclose(material.detach(), own, rtol=1e-12, atol=0.0):
-        raise ValueError(
-            f"material is {material.tolist()}, the cloth was made with {own.tolist()}: "
-            "make another cloth for other values"
-        )
-    return ClothStep.apply(cloth, obstacles, x, v, held_motion, bodies, material)  # type: ignore[no-any-return]
+        material = material_tensor(cloth.material)
+    made = _made_of(cloth, material)
+    return ClothStep.apply(made, obstacles, x, v, held_motion, bodies, material)
+
+
+def material_tensor(material: Material) -> torch.Tensor:
+    """Returns (5,) the values of `MATERIAL`, float64."""
+    return torch.tensor([getattr(material, n) for n in MATERIAL], dtype=torch.float64)
+
+
+# By garment, the one of another fabric that was used last.
+_last: WeakKeyDictionary[ExplicitBiasCloth, ExplicitBiasCloth] = WeakKeyDictionary()
+
+
+def _made_of(cloth: ExplicitBiasCloth, material: torch.Tensor) -> ExplicitBiasCloth:
+    """Returns the garment with the values of `material`."""
+    if material.shape != (len(MATERIAL),):
+        raise ValueError(f"material has shape {tuple(material.shape)}, expected (5,)")
+    values = dict(zip(MATERIAL, material.detach().tolist(), strict=True))
+    for made in (cloth, _last.get(cloth)):
+        if made is not None and all(getattr(made.material, n) == v for n, v in values.items()):
+            return made
+    _last[cloth] = cloth.with_material(replace(cloth.material, **values))
+    return _last[cloth]
 
 
 def _array(tensor: torch.Tensor) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 
 _SUMS = {"reassoc", "contract"}
 

@@ -61,9 +61,9 @@ class Spending:
     def allows(self, *parts: Cost) -> bool:
         """Returns whether parts that take as much as these are within the budget."""
         b = self.budget
-        if b.iterations is not None:
-            if self.iterations + sum(part.iterations for part in parts) > b.iterations:
-                return False
+        iterations = self.iterations + sum(part.iterations for part in parts)
+        if b.iterations is not None and iterations > b.iterations:
+            return False
         if b.seconds is not None:
             passed = self.clock() - self._begin
             return passed + sum(part.seconds for part in parts) <= b.seconds

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.control.interior_point import interior_point
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution, NormBounds
 from drake_dress.models.control.small_matrices import (
@@ -134,40 +134,17 @@ def solve_constrained_ddp(
         settings: when to give up.
     """
     p = problem
-    steps, m = p.input_weight.shape
-    v = np.zeros((steps, m)) if guess is None else np.array(guess, dtype=np.float64)
-    # x_j − x_0 = B u_j with u_j the sum of inputs: m coordinates in place of n
-    b = p.input_matrix
-    w, r = 2.0 * p.state_weight, 2.0 * p.input_weight
-    hessian, slope = np.einsum("tn,na,nb->tab", w, b, b), (w * (p.start - p.state_target)) @ b
-    cost = _Cost(*map(np.ascontiguousarray, (hessian, slope, r, -r * p.input_target)))
-    of_x, of_v = p.state_bounds, p.input_bounds
-    on_x = _about(of_x.matrix @ b, of_x.offset + of_x.matrix @ p.start, of_x.radius, 1)
-    on_v = _about(of_v.matrix, of_v.offset, of_v.radius, 0)
-    if state_multiplier is not None:
-        # those of the start are passed over
-        on_x.multiplier[1:] = state_multiplier[1:]
-    if input_multiplier is not None:
-        on_v.multiplier[:] = input_multiplier
-    u = np.empty((steps + 1, m))
-    sweep: Any = _sweep
+    passes = _prepared(p, guess, state_multiplier, input_multiplier)
+    v, on_x, on_v = passes.v, passes.on_x, passes.on_v
     sweeps, interior, converged = 0, 0, False
     if state_multiplier is not None:
-        sweeps, converged = sweep(
-            cost, on_x, on_v, v, u, settings.warm_sweeps, settings.max_halvings
-        )
-        converged = converged and _are_within(p.price, on_x, on_v)
+        sweeps, converged = passes.sweep(settings.warm_sweeps, settings.max_halvings)
+        converged = converged and passes.are_within_price
     if not converged:
-        interior, near = _start_inside(p.price, cost, on_x, on_v, v, u, guess, settings)
+        interior, near = _start_inside(passes, guess, settings)
         if near:
-            inside = v.copy(), on_x.multiplier.copy(), on_v.multiplier.copy()
-            more, ended = sweep(cost, on_x, on_v, v, u, settings.max_sweeps, settings.max_halvings)
+            more, converged = _polish(passes, settings)
             sweeps += more
-            if not ended:
-                v = inside[0]
-            if not ended or not _are_within(p.price, on_x, on_v):
-                on_x.multiplier[:], on_v.multiplier[:] = inside[1:]
-            converged = ended
         elif not np.isfinite(v).all():
             v[:], on_x.multiplier[:], on_v.multiplier[:] = 0.0, 0.0, 0.0
     return LocalSolution(
@@ -183,15 +160,67 @@ def solve_constrained_ddp(
     )
 
 
-def _start_inside(
-    price: float,
-    cost: _Cost,
-    on_x: _Bounds,
-    on_v: _Bounds,
-    v: FloatArray,
-    u: FloatArray,
+@dataclass(frozen=True)
+class _Passes:
+    """A problem in the coordinates of the passes, and the solution so far; arrays change in place.
+
+    Attributes:
+        price: of the excess of a bound.
+        cost: of u and v.
+        on_x, on_v: bounds on u and v, with multipliers.
+        v: (N,m) inputs.
+        u: (N+1,m) their sums, filled by the passes.
+    """
+
+    price: float
+    cost: _Cost
+    on_x: _Bounds
+    on_v: _Bounds
+    v: FloatArray
+    u: FloatArray
+
+    def sweep(self, most: int, max_halvings: int) -> tuple[int, bool]:
+        """Makes passes; returns how many, and whether they ended at an optimum."""
+        sweep: Any = _sweep
+        made, ended = sweep(self.cost, self.on_x, self.on_v, self.v, self.u, most, max_halvings)
+        return made, ended
+
+    @property
+    def are_within_price(self) -> bool:
+        """Whether no multiplier is beyond the price of an excess.
+
+        Of bounds that only just leave room, sweeps may end on multipliers beyond all measure.
+        """
+        return all(b.multiplier.max(initial=0.0) <= self.price for b in (self.on_x, self.on_v))
+
+
+def _prepared(
+    p: LocalProblem,
     guess: FloatArray | None,
-    settings: Settings,
+    state_multiplier: FloatArray | None,
+    input_multiplier: FloatArray | None,
+) -> _Passes:
+    """Returns a problem for the passes, with what an earlier solution suggests."""
+    steps, m = p.input_weight.shape
+    v = np.zeros((steps, m)) if guess is None else np.array(guess, dtype=np.float64)
+    # x_j − x_0 = B u_j with u_j the sum of inputs: m coordinates in place of n
+    b = p.input_matrix
+    w, r = 2.0 * p.state_weight, 2.0 * p.input_weight
+    hessian, slope = np.einsum("tn,na,nb->tab", w, b, b), (w * (p.start - p.state_target)) @ b
+    cost = _Cost(*map(np.ascontiguousarray, (hessian, slope, r, -r * p.input_target)))
+    of_x, of_v = p.state_bounds, p.input_bounds
+    on_x = _about(of_x.matrix @ b, of_x.offset + of_x.matrix @ p.start, of_x.radius, 1)
+    on_v = _about(of_v.matrix, of_v.offset, of_v.radius, 0)
+    if state_multiplier is not None:
+        # those of the start are passed over
+        on_x.multiplier[1:] = state_multiplier[1:]
+    if input_multiplier is not None:
+        on_v.multiplier[:] = input_multiplier
+    return _Passes(p.price, cost, on_x, on_v, v, np.empty((steps + 1, m)))
+
+
+def _start_inside(
+    passes: _Passes, guess: FloatArray | None, settings: Settings
 ) -> tuple[int, bool]:
     """Fills inputs and multipliers by the interior point method, and widens what nothing keeps.
 
@@ -199,18 +228,18 @@ def _start_inside(
         Its iterations, and whether they sufficed.
     """
     method: Any = interior_point
+    on_x, on_v, v = passes.on_x, passes.on_v, passes.v
     together = [np.concatenate([x[1:], y], axis=1) for x, y in zip(on_x[:3], on_v[:3], strict=True)]
     n_x = on_x.radius.shape[1]
     multiplier, excess = np.empty(together[2].shape), np.empty(together[2].shape)
+    given = (*passes.cost, *together, n_x, v, passes.u, multiplier, excess, passes.price)
     starts = [(np.zeros_like(v), settings.max_interior_steps)]
     if guess is not None:
         starts.insert(0, (guess, settings.max_interior_steps // 3))
     total, near = 0, False
     for start, most in starts:
         v[:] = start
-        iterations, near = method(
-            *cost, *together, n_x, v, u, multiplier, excess, price, most, settings.tolerance
-        )
+        iterations, near = method(*given, most, settings.tolerance)
         total += iterations
         if near:
             break
@@ -222,12 +251,20 @@ def _start_inside(
     return total, near
 
 
-def _are_within(price: float, *bounds: _Bounds) -> bool:
-    """Returns whether no multiplier is beyond the price of an excess.
+def _polish(passes: _Passes, settings: Settings) -> tuple[int, bool]:
+    """Makes passes from where the interior point method ended, and takes back what is worse.
 
-    Of bounds that only just leave room, sweeps may end on multipliers beyond all measure.
+    Returns:
+        How many, and whether they ended at an optimum.
     """
-    return all(b.multiplier.max(initial=0.0) <= price for b in bounds)
+    v, on_x, on_v = passes.v, passes.on_x, passes.on_v
+    inside = v.copy(), on_x.multiplier.copy(), on_v.multiplier.copy()
+    made, ended = passes.sweep(settings.max_sweeps, settings.max_halvings)
+    if not ended:
+        v[:] = inside[0]
+    if not ended or not passes.are_within_price:
+        on_x.multiplier[:], on_v.multiplier[:] = inside[1:]
+    return made, ended
 
 
 def _widen(radius: FloatArray, excess: FloatArray) -> None:

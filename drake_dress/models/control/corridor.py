@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 
 # The cylinder begins this far behind the hand's centre, and fades over this at both ends, m.
 _BEHIND, _FADE = 0.02, 0.04

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
-from drake_dress.models.control.budget import Budget, Spending
+from drake_dress.models.control.budget import Budget, Cost, Spending
 from drake_dress.models.control.corridor import Corridor, corridor_cost
 from drake_dress.models.dressing.sleeve import (
     Entry,
@@ -30,6 +30,8 @@ from drake_dress.models.dressing.sleeve import (
 )
 
 UNLIMITED = Budget()
+# Step lengths tried along one gradient.
+_MAX_TRIALS = 5
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,45 @@ class SleeveTarget:
 
 
 @dataclass(frozen=True)
+class Situation:
+    """The garment now, its targets, and the predicted person.
+
+    Attributes:
+        x: (n,3) garment now, m.
+        v: (n,3) its velocity, m/s.
+        targets: of left and right sleeve.
+        obstacles: the predicted person at the start of each of the N steps.
+        leftward: (N,3) horizontal unit vectors to the person's left; if None, the grippers' level
+            costs nothing.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    targets: tuple[SleeveTarget, SleeveTarget]
+    obstacles: Sequence[Obstacles]
+    leftward: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class HeldGarment:
+    """How the controller's garment is held, and where its openings are.
+
+    Attributes:
+        held_count: number of nodes held by left and by right gripper.
+        armholes: loop nodes of left and right armhole.
+        signs: orientation signs of the loops (see `loop_orientation`).
+        span: distance of the grippers at rest, m.
+        entry: where arms come into the garment.
+    """
+
+    held_count: tuple[int, int]
+    armholes: tuple[IntArray, IntArray]
+    signs: tuple[float, float]
+    span: float
+    entry: Entry
+
+
+@dataclass(frozen=True)
 class Plan:
     """Result of a solve.
 
@@ -142,20 +183,39 @@ class _Rollout:
         return sum(tape.system.iterations for tape in self.tapes)
 
 
+@dataclass
+class _Search:
+    """A descent under way.
+
+    Attributes:
+        velocity: (N,2,3) the best plan so far, m/s.
+        now: its rollout.
+        fastest: (N,1,1) speed limits, m/s.
+        spending: of the solve.
+        rolling: what the last rollout took.
+        length: of the next trial step, relative to the scaled gradient.
+        evaluations: rollouts so far.
+    """
+
+    velocity: FloatArray
+    now: _Rollout
+    fastest: FloatArray
+    spending: Spending
+    rolling: Cost
+    length: float = 1.0
+    evaluations: int = 1
+
+
 class GlobalController:
     """Plans gripper velocities over a horizon.
 
     Args:
         cloth: the controller's garment; its held nodes are those of left, then right gripper.
-        held_count: number of nodes held by left and by right gripper.
-        armholes: loop nodes of left and right armhole.
-        signs: orientation signs of the loops (see `loop_orientation`).
+        garment: how it is held, and its openings.
         horizon: N.
         weights: of the costs.
         max_speed: of a gripper, m/s.
         max_iterations: gradient steps per solve.
-        span: distance of the grippers at rest, m.
-        entry: where arms come into the garment.
         frozen_contact: the gradient takes contact as frozen; the exact one does not descend once
             cloth lies on a limb (see cloth/adjoint.py).
     """
@@ -163,15 +223,11 @@ class GlobalController:
     def __init__(
         self,
         cloth: ExplicitBiasCloth,
-        held_count: tuple[int, int],
-        armholes: tuple[IntArray, IntArray],
-        signs: tuple[float, float],
+        garment: HeldGarment,
         horizon: int,
         weights: Weights,
         max_speed: float,
         max_iterations: int,
-        span: float,
-        entry: Entry,
         frozen_contact: bool = True,
     ) -> None:
         self.cloth = cloth
@@ -180,113 +236,120 @@ class GlobalController:
         self.max_speed = max_speed
         self.max_iterations = max_iterations
         self.frozen_contact = frozen_contact
-        self._span = span
-        self._entry = entry
-        self._armholes = armholes
-        self._signs = signs
-        self._side = np.repeat([0, 1], held_count)
+        self._span = garment.span
+        self._entry = garment.entry
+        self._armholes = garment.armholes
+        self._signs = garment.signs
+        self._side = np.repeat([0, 1], garment.held_count)
         self._split = [np.flatnonzero(self._side == i) for i in (0, 1)]
 
     def solve(
         self,
-        x: FloatArray,
-        v: FloatArray,
-        targets: tuple[SleeveTarget, SleeveTarget],
-        obstacles: Sequence[Obstacles],
+        situation: Situation,
         guess: FloatArray,
         committed_steps: int = 0,
-        leftward: FloatArray | None = None,
         budget: Budget = UNLIMITED,
         max_speed: float = np.inf,
     ) -> Plan:
         """Returns the plan that gradient descent reaches from `guess` within a budget.
 
-        The guess is rolled out whatever the budget is. What goes beyond is done where the budget
-        has as much left as the last such part took.
+        The guess is rolled out whatever the budget is. Each further rollout or gradient is computed
+        only if the budget has as much left as the last one took.
 
         Args:
-            x: (n,3) garment now, m.
-            v: (n,3) its velocity, m/s.
-            targets: of left and right sleeve.
-            obstacles: the predicted person at the start of each of the N steps.
+            situation: the garment, the targets and the predicted person.
             guess: (N,2,3) velocities to start from, m/s.
-            committed_steps: the first steps of `guess` that are on their way already and stay.
-            leftward: (N,3) horizontal unit vectors to the person's left; None: nothing is level.
+            committed_steps: the first steps of `guess` that are already under way and stay.
             budget: of the solve.
-            max_speed: of a gripper in the steps that are not on their way, m/s, where that is less
-                than what is allowed ever.
+            max_speed: of a gripper in the steps that are not under way, m/s; it applies where it is
+                less than the controller's own limit.
         """
-        h, n = self.cloth.time_step, self.horizon
-        spending = Spending(budget)
-        fastest = np.full((n, 1, 1), self.max_speed)
+        fastest = np.full((self.horizon, 1, 1), self.max_speed)
         fastest[committed_steps:] = min(self.max_speed, max_speed)
-        velocity = _limited(guess, fastest)
-        now = self._rollout(x, v, velocity, targets, obstacles, leftward)
-        rolling = spending.charge(now.iterations())
-        descending = rolling
-        initial, evaluations, iterations, reason = now.cost, 1, 0, "iterations"
-        # A velocity at step j moves every later state: curvature of the position cost.
-        remaining = np.arange(n, 0, -1.0)
-        scale = 1.0 / (2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed))
-        length = 1.0
+        search = self._begun(situation, _limited(guess, fastest), fastest, Spending(budget))
+        spending, descending = search.spending, search.rolling
+        initial, iterations, reason = search.now.cost, 0, "iterations"
+        scale = self._step_scale()
         while iterations < self.max_iterations:
-            if not spending.allows(descending, rolling):
+            if not spending.allows(descending, search.rolling):
                 reason = "budget"
                 break
+            now = search.now
             before = now.iterations()
-            gradient = self._gradient(now, velocity, targets, obstacles, leftward)
+            gradient = self._gradient(now, search.velocity, situation)
             descending = spending.charge(now.iterations() - before)
             gradient[:committed_steps] = 0.0
-            descent = scale[:, None, None] * gradient
-            accepted = afforded = False
-            for _ in range(5):
-                afforded = spending.allows(rolling)
-                if not afforded:
-                    break
-                trial_velocity = _limited(velocity - length * descent, fastest)
-                moved = trial_velocity - velocity
-                if np.abs(moved).max() < 1e-3 * self.max_speed:
-                    break
-                trial = self._rollout(x, v, trial_velocity, targets, obstacles, leftward)
-                rolling = spending.charge(trial.iterations())
-                evaluations += 1
-                if trial.cost < now.cost + 1e-4 * float(np.sum(gradient * moved)):
-                    accepted = True
-                    break
-                length *= 0.4
-            if not accepted:
-                small = afforded and np.abs(moved).max() < 1e-3 * self.max_speed
-                reason = "small_step" if small else "no_descent" if afforded else "budget"
+            failure = self._advance(search, situation, gradient, scale[:, None, None] * gradient)
+            if failure is not None:
+                reason = failure
                 break
-            gained = now.cost - trial.cost
-            velocity, now = trial_velocity, trial
             iterations += 1
-            length = min(2.0 * length, 8.0)
-            if gained < 1e-4 * initial:
+            if now.cost - search.now.cost < 1e-4 * initial:
                 reason = "small_step"
                 break
         return Plan(
-            velocity,
-            now.cost,
+            search.velocity,
+            search.now.cost,
             initial,
             iterations,
-            evaluations,
+            search.evaluations,
             reason,
-            now.armhole,
-            now.force,
+            search.now.armhole,
+            search.now.force,
             spending.iterations,
         )
 
-    def _rollout(
-        self,
-        x: FloatArray,
-        v: FloatArray,
-        velocity: FloatArray,
-        targets: tuple[SleeveTarget, SleeveTarget],
-        obstacles: Sequence[Obstacles],
-        leftward: FloatArray | None = None,
-    ) -> _Rollout:
+    def _begun(
+        self, situation: Situation, velocity: FloatArray, fastest: FloatArray, spending: Spending
+    ) -> _Search:
+        """Returns the search with its first rollout done and charged."""
+        now = self._rollout(situation, velocity)
+        return _Search(velocity, now, fastest, spending, spending.charge(now.iterations()))
+
+    def _step_scale(self) -> FloatArray:
+        """Returns (N,) the length of a gradient step at each time step, per unit of gradient."""
+        h, n = self.cloth.time_step, self.horizon
+        # A velocity at step j moves every later state: curvature of the position cost.
+        remaining = np.arange(n, 0, -1.0)
+        scale: FloatArray = 1.0 / (
+            2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed)
+        )
+        return scale
+
+    def _advance(
+        self, search: _Search, situation: Situation, gradient: FloatArray, descent: FloatArray
+    ) -> str | None:
+        """Moves the search along minus `descent` (N,2,3), as far as that lowers the cost.
+
+        Returns:
+            None if a step was accepted, otherwise why none was: a `reason` of `Plan`.
+        """
+        for _ in range(_MAX_TRIALS):
+            if not search.spending.allows(search.rolling):
+                return "budget"
+            velocity = _limited(search.velocity - search.length * descent, search.fastest)
+            moved = velocity - search.velocity
+            if np.abs(moved).max() < 1e-3 * self.max_speed:
+                return "small_step"
+            trial = self._rollout(situation, velocity)
+            search.rolling = search.spending.charge(trial.iterations())
+            search.evaluations += 1
+            if trial.cost < search.now.cost + 1e-4 * float(np.sum(gradient * moved)):
+                search.velocity, search.now = velocity, trial
+                search.length = min(2.0 * search.length, 8.0)
+                return None
+            search.length *= 0.4
+        return "no_descent"
+
+    def _rollout(self, situation: Situation, velocity: FloatArray) -> _Rollout:
+        """Returns where velocities (N,2,3) lead, m/s, and what that costs."""
         h, n, w = self.cloth.time_step, self.horizon, self.weights
+        x, v, targets, obstacles = (
+            situation.x,
+            situation.v,
+            situation.targets,
+            situation.obstacles,
+        )
         cost = float(w.speed * h * h * np.sum(velocity**2))
         tapes, states, reactions, sleeves = [], [], [], []
         armhole, force = np.empty((n, 2, 3)), np.empty((n, 2))
@@ -319,7 +382,7 @@ class GlobalController:
             sleeves.append((pair[0], pair[1]))
             apart = self._apart(x)
             cost += w.separation * self._spread_error(float(np.linalg.norm(apart)), targets) ** 2
-            cost += w.level * self._level_error(apart, leftward, j) ** 2
+            cost += w.level * self._level_error(apart, situation.leftward, j) ** 2
             cost += self._clearance(x, obstacles[j])[0]
         return _Rollout(cost, tapes, states, armhole, reactions, sleeves, force)
 
@@ -363,71 +426,85 @@ class GlobalController:
         return cost, (-2.0 * w.clearance * short / count * near.slope)[:, None] * near.normal
 
     def _gradient(
-        self,
-        rollout: _Rollout,
-        velocity: FloatArray,
-        targets: tuple[SleeveTarget, SleeveTarget],
-        obstacles: Sequence[Obstacles],
-        leftward: FloatArray | None = None,
+        self, rollout: _Rollout, velocity: FloatArray, situation: Situation
     ) -> FloatArray:
+        """Returns ∂(cost)/∂(velocity) (N,2,3) by the adjoint of a rollout."""
         h, n, w = self.cloth.time_step, self.horizon, self.weights
         gradient = 2.0 * w.speed * h * h * velocity
         x_bar = np.zeros_like(rollout.states[0])
         v_bar = np.zeros_like(x_bar)
         for j in range(n - 1, -1, -1):
-            held_bar = np.zeros((len(self.cloth.held), 3))
+            x = rollout.states[j]
             for i in (0, 1):
-                t, sleeve = targets[i], rollout.sleeves[j][i]
-                p_bar = 2.0 * w.position * t.position_weight * (sleeve.p_c - t.position[j])
-                scale = 2.0 * w.direction * t.direction_weight
-                if t.entering:
-                    state = rollout.states[j]
-                    d = entry_direction(state, sleeve.p_c, self._entry)
-                    e_bar, c_bar = entry_direction_vjp(
-                        state, sleeve.p_c, self._entry, scale * (d - t.direction[j])
-                    )
-                    x_bar[self._entry.nodes] += e_bar
-                    p_bar = p_bar + c_bar
-                    d_bar = np.zeros(3)
-                else:
-                    d_bar = scale * (sleeve.v_c - t.direction[j])
-                if t.corridor is not None:
-                    x_bar += w.corridor * self._corridor(rollout.states[j], t.corridor, j)[1]
-                if t.passage is not None and w.passage > 0.0:
-                    crossing = self._passage(rollout.states[j], sleeve.p_c, t.passage[j])[1]
-                    x_bar += w.passage * crossing
-                    p_bar = p_bar - w.passage * crossing.sum(axis=0)
-                loop = self._armholes[i]
-                np.add.at(
-                    x_bar,
-                    loop,
-                    sleeve_state_vjp(rollout.states[j], loop, self._signs[i], p_bar, d_bar),
-                )
-                excess = rollout.force[j, i] - w.free_force
-                if excess > 0.0:
-                    total = rollout.reaction[j][self._split[i]].sum(axis=0)
-                    held_bar[self._split[i]] += (
-                        2.0 * w.safety * excess * total / rollout.force[j, i]
-                    )
-            apart = self._apart(rollout.states[j])
-            distance = float(np.linalg.norm(apart))
-            error = self._spread_error(distance, targets)
-            tilt = self._level_error(apart, leftward, j)
-            if error != 0.0 or tilt != 0.0:
-                pull = 2.0 * w.separation * error * apart / distance
-                if leftward is not None:
-                    pull -= 2.0 * w.level * tilt * leftward[j]
-                for i, sign in ((0, 1.0), (1, -1.0)):
-                    nodes = self.cloth.held[self._split[i]]
-                    x_bar[nodes] += sign * pull / len(nodes)
-            x_bar[self.cloth.held] += self._clearance(rollout.states[j], obstacles[j])[1]
+                self._add_sleeve_slope(x_bar, rollout, situation.targets[i], j, i)
+            self._add_spread_slope(x_bar, x, situation, j)
+            x_bar[self.cloth.held] += self._clearance(x, situation.obstacles[j])[1]
             back = self.cloth.vector_jacobian_product(
-                rollout.tapes[j], x_bar, v_bar, held_bar, frozen_contact=self.frozen_contact
+                rollout.tapes[j],
+                x_bar,
+                v_bar,
+                self._force_slope(rollout, j),
+                frozen_contact=self.frozen_contact,
             )
             x_bar, v_bar = back.x, back.v
             for i in (0, 1):
                 gradient[j, i] += h * back.held_motion[self._split[i]].sum(axis=0)
         return gradient
+
+    def _add_sleeve_slope(
+        self, x_bar: FloatArray, rollout: _Rollout, target: SleeveTarget, j: int, i: int
+    ) -> None:
+        """Adds to `x_bar` (n,3) the derivative of what sleeve `i` costs at step `j`."""
+        w, x, sleeve = self.weights, rollout.states[j], rollout.sleeves[j][i]
+        p_bar = 2.0 * w.position * target.position_weight * (sleeve.p_c - target.position[j])
+        d_bar = np.zeros(3)
+        scale = 2.0 * w.direction * target.direction_weight
+        if target.entering:
+            d = entry_direction(x, sleeve.p_c, self._entry)
+            e_bar, c_bar = entry_direction_vjp(
+                x, sleeve.p_c, self._entry, scale * (d - target.direction[j])
+            )
+            x_bar[self._entry.nodes] += e_bar
+            p_bar = p_bar + c_bar
+        else:
+            d_bar = scale * (sleeve.v_c - target.direction[j])
+        if target.corridor is not None:
+            x_bar += w.corridor * self._corridor(x, target.corridor, j)[1]
+        if target.passage is not None and w.passage > 0.0:
+            crossing = self._passage(x, sleeve.p_c, target.passage[j])[1]
+            x_bar += w.passage * crossing
+            p_bar = p_bar - w.passage * crossing.sum(axis=0)
+        loop = self._armholes[i]
+        np.add.at(x_bar, loop, sleeve_state_vjp(x, loop, self._signs[i], p_bar, d_bar))
+
+    def _force_slope(self, rollout: _Rollout, j: int) -> FloatArray:
+        """Returns (k,3) the derivative of the force cost of step `j` by the held reactions."""
+        w = self.weights
+        slope = np.zeros((len(self.cloth.held), 3))
+        for i in (0, 1):
+            excess = rollout.force[j, i] - w.free_force
+            if excess > 0.0:
+                total = rollout.reaction[j][self._split[i]].sum(axis=0)
+                slope[self._split[i]] += 2.0 * w.safety * excess * total / rollout.force[j, i]
+        return slope
+
+    def _add_spread_slope(
+        self, x_bar: FloatArray, x: FloatArray, situation: Situation, j: int
+    ) -> None:
+        """Adds to `x_bar` (n,3) the derivative of what the grippers' distance and level cost."""
+        w, leftward = self.weights, situation.leftward
+        apart = self._apart(x)
+        distance = float(np.linalg.norm(apart))
+        error = self._spread_error(distance, situation.targets)
+        tilt = self._level_error(apart, leftward, j)
+        if error == 0.0 and tilt == 0.0:
+            return
+        pull = 2.0 * w.separation * error * apart / distance
+        if leftward is not None:
+            pull -= 2.0 * w.level * tilt * leftward[j]
+        for i, sign in ((0, 1.0), (1, -1.0)):
+            nodes = self.cloth.held[self._split[i]]
+            x_bar[nodes] += sign * pull / len(nodes)
 
 
 def _limited(velocity: FloatArray, max_speed: FloatArray) -> FloatArray:

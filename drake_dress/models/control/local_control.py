@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
 from drake_dress.models.control.local_model import (
     LocalParameters,
@@ -25,7 +25,7 @@ from drake_dress.models.control.local_model import (
 from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
-from drake_dress.models.dressing.stages import Task
+from drake_dress.models.dressing.stages import SleeveFacts, Task
 from drake_dress.models.garment.geodesics import Reach, reach
 from drake_dress.models.immutable import Immutable
 
@@ -111,6 +111,27 @@ class LocalOutcome:
     problem: LocalProblem | None
 
 
+# Where a sleeve shall be (M+1,3), m, and turned to (M+1,3), and the weight of that.
+_Place = tuple[FloatArray, FloatArray, float]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a solve sees of garment and person.
+
+    Attributes:
+        sleeves: of left and right now.
+        joints: (M+1,6,3) predicted, m; row 0 is now.
+        joints_step: between its rows, s.
+        time: now, s.
+    """
+
+    sleeves: Sequence[SleeveState]
+    joints: FloatArray
+    joints_step: float
+    time: float
+
+
 @dataclass(frozen=True)
 class LocalController:
     """Solves local problems one after the other.
@@ -165,47 +186,67 @@ class LocalController:
         p = self.parameters
         if plan.assignment is None:
             return LocalOutcome(LocalState(), self.resting(time), None)
-        sleeves = self.planner.sleeves(x)
-        centers = np.stack([sleeve.p_c for sleeve in sleeves])
+        seen = _Seen(self.planner.sleeves(x), joints, joints_step, time)
+        centers = np.stack([sleeve.p_c for sleeve in seen.sleeves])
         nominal, foreseen = continued(plan, centers, gripper, time, p)
         coupled = is_coupled(
             state.coupled, float(np.linalg.norm(centers[0] - centers[1])), self.reach, p
         )
-        assignment = self.planner.renewed(plan.assignment, sleeves, joints[0])
-        places = self._places(assignment, sleeves, joints, joints_step)
-        if plan.joints is not None:
-            soon = time + joints_step * np.arange(len(joints), dtype=np.float64)
-            planned = joints_of_plan(plan, soon)
-            planned = _own_motion(planned, joints, assignment, p.dragged)
-            believed = self._places(assignment, sleeves, planned, joints_step)
+        assignment = self.planner.renewed(plan.assignment, seen.sleeves, joints[0])
+        goals = self._goals(plan, assignment, seen, nominal, foreseen)
+        problem = local_problem(nominal, goals, coupled, self.reach, p)
+        found = self.solver(problem, _shifted(state, time, p))
+        local = _local_plan(nominal, problem, found, time, p)
+        return LocalOutcome(LocalState(found, time, coupled), local, problem)
+
+    def _goals(
+        self,
+        plan: GlobalPlan,
+        assignment: Assignment,
+        seen: _Seen,
+        nominal: Nominal,
+        foreseen: FloatArray,
+    ) -> tuple[SleeveGoal, SleeveGoal]:
+        """Returns the goals of left and right sleeve.
+
+        Args:
+            plan: the newest global plan.
+            assignment: its tasks, as they are now.
+            seen: garment and person.
+            nominal: what the plan leads to.
+            foreseen: (N+1,2,3) where the plan foresaw the sleeves, m.
+        """
+        p, step = self.parameters, seen.joints_step
+        places = self._places(assignment, seen.sleeves, seen.joints, step)
+        believed = self._believed_places(plan, assignment, seen)
         goals = []
         for i, (place, direction, weight) in enumerate(places):
             task = assignment.tasks[i]
-            on_arm = assignment.facts[i].linked and task in (Task.DRESS, Task.WAIT)
             # between the times of the predicted joints targets go straight
-            arm = position = _resampled(place, joints_step, p)
-            if plan.joints is not None:
+            arm = position = _resampled(place, step, p)
+            if believed is not None:
                 # what the plan leads to, moved as the person moves otherwise than it believed
                 position = nominal.sleeve[:, i] + position
-                position = position - _resampled(believed[i][0], joints_step, p)
+                position = position - _resampled(believed[i][0], step, p)
                 share = p.dress_correction if task == Task.DRESS else p.prepare_correction
                 position = position + share * (foreseen[:, i] - nominal.sleeve[:, i])
-            axis = _resampled(direction, joints_step, p)
+            axis = _resampled(direction, step, p)
             axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+            on_arm = _is_on_arm(assignment.facts[i], task)
             goals.append(SleeveGoal(position, weight, on_arm, arm, axis))
-        problem = local_problem(nominal, (goals[0], goals[1]), coupled, self.reach, p)
-        found = self.solver(problem, _shifted(state, time, p))
-        velocity = nominal.velocity + found.v.reshape(-1, 2, 3)
-        base = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
-        local = LocalPlan(
-            time,
-            p.time_step,
-            velocity,
-            base + found.x,
-            _bounded(feedback_gains(problem, found), 1.0 / p.time_step),
-            p.max_speed,
-        )
-        return LocalOutcome(LocalState(found, time, coupled), local, problem)
+        return goals[0], goals[1]
+
+    def _believed_places(
+        self, plan: GlobalPlan, assignment: Assignment, seen: _Seen
+    ) -> list[_Place] | None:
+        """Returns the places that follow from the joints the plan believed in; None if in none."""
+        if plan.joints is None:
+            return None
+        count = len(seen.joints)
+        soon = seen.time + seen.joints_step * np.arange(count, dtype=np.float64)
+        planned = joints_of_plan(plan, soon)
+        planned = _own_motion(planned, seen.joints, assignment, self.parameters.dragged)
+        return self._places(assignment, seen.sleeves, planned, seen.joints_step)
 
     def _places(
         self,
@@ -213,7 +254,7 @@ class LocalController:
         sleeves: Sequence[SleeveState],
         joints: FloatArray,
         joints_step: float,
-    ) -> list[tuple[FloatArray, FloatArray, float]]:
+    ) -> list[_Place]:
         """Returns for each sleeve (M+1,3) where it shall be, m, and turned to; and the weight.
 
         A sleeve on its arm begins where it is, one that is not at its first target.
@@ -223,8 +264,7 @@ class LocalController:
         for axis, fact, task, t in zip(
             arm_axes(joints[0]), assignment.facts, assignment.tasks, targets, strict=True
         ):
-            on_arm = fact.linked and task in (Task.DRESS, Task.WAIT)
-            first = axis.G(fact.s) if on_arm else t.position[0]
+            first = axis.G(fact.s) if _is_on_arm(fact, task) else t.position[0]
             position = np.vstack([first, t.position])
             direction = np.vstack([t.direction[:1], t.direction])
             places.append((position, direction, t.position_weight))
@@ -287,6 +327,26 @@ def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> Loca
         return solve_constrained_ddp(problem)
     return solve_constrained_ddp(
         problem, before.v, before.state_multiplier, before.input_multiplier
+    )
+
+
+def _is_on_arm(fact: SleeveFacts, task: Task) -> bool:
+    """Returns whether a sleeve is on its arm, and to be moved along it or kept there."""
+    return fact.linked and task in (Task.DRESS, Task.WAIT)
+
+
+def _local_plan(
+    nominal: Nominal, problem: LocalProblem, found: LocalSolution, time: float, p: LocalParameters
+) -> LocalPlan:
+    """Returns the plan of a solution, which begins at `time`, s."""
+    base = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
+    return LocalPlan(
+        time,
+        p.time_step,
+        nominal.velocity + found.v.reshape(-1, 2, 3),
+        base + found.x,
+        _bounded(feedback_gains(problem, found), 1.0 / p.time_step),
+        p.max_speed,
     )
 
 

@@ -15,11 +15,11 @@ garment, of which the local model knows nothing, would be stopped.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.local_problem import LocalProblem, NormBounds
 from drake_dress.models.garment.geodesics import Reach
 
@@ -159,43 +159,14 @@ def local_problem(
         reach: of the controller's garment.
         parameters: settings.
     """
-    p = parameters
-    n, h = p.horizon, p.time_step
+    p, n = parameters, parameters.horizon
     b = input_matrix(nominal, coupled, reach, p)
-    where = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(n + 1, 12)
-    velocity = nominal.velocity.reshape(n, 6)
-    weight, target = np.zeros((n + 1, 12)), np.zeros((n + 1, 12))
-    matrix, offset = np.zeros((n + 1, 6, 3, 12)), np.zeros((n + 1, 6, 3))
-    radius = np.full((n + 1, 6), np.inf)
-    matrix[:, :4] = _PAIRS
-    offset[:, :4] = np.einsum("kab,tb->tka", matrix[0, :4], where)
-    distances = [*reach.to_far_gripper, reach.between_sleeves, reach.between_grippers]
-    radius[:, :4] = p.stretch * np.array(distances)
-    moving, moved = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
-    limit = np.full((n, 4), np.inf)
+    weight, target = _tracking(nominal, goals, p)
+    on_states, on_inputs = _distance_bounds(nominal, reach, p), _speed_bounds(nominal, p)
     for i, goal in enumerate(goals):
-        rows = slice(3 * i, 3 * i + 3)
-        weight[:, rows] = p.position * goal.weight
-        target[:, rows] = goal.target - nominal.sleeve[:, i]
-        moving[:, 2 + i, :, rows], moved[:, 2 + i] = _EYE, velocity[:, rows]
-        limit[:, 2 + i] = p.max_speed
-        if not goal.on_arm:
-            continue
-        across = _EYE - goal.axis[:, :, None] * goal.axis[:, None, :]
-        away = nominal.sleeve[:, i] - goal.arm
-        matrix[:, 4 + i, :, rows] = across
-        offset[:, 4 + i] = np.einsum("tab,tb->ta", across, away)
-        radius[:, 4 + i] = p.beside
-        moving[:, i] = across[:-1] @ b[rows]
-        moved[:, i] = np.einsum("tab,tb->ta", across[:-1], np.diff(away, axis=0))
-        limit[:, i] = p.beside_speed * h
-    along = np.linalg.norm(offset, axis=2)
-    if nominal.planned:
-        radius = np.maximum(radius, along)
-        limit = np.maximum(limit, np.linalg.norm(moved, axis=2))
-    else:
-        # what is exceeded already comes back in time; at once it could not
-        radius = np.maximum(radius, along[0] - p.return_speed * h * np.arange(n + 1)[:, None])
+        if goal.on_arm:
+            _bind_to_arm(on_states, on_inputs, i, goal, nominal, b, p)
+    state_radius, input_radius = _reachable_radii(on_states, on_inputs, nominal.planned, p)
     return LocalProblem(
         start=np.zeros(12),
         input_matrix=b,
@@ -203,6 +174,86 @@ def local_problem(
         state_target=target,
         input_weight=np.full((n, 6), p.speed),
         input_target=np.zeros((n, 6)),
-        state_bounds=NormBounds(matrix, offset, radius),
-        input_bounds=NormBounds(moving, moved, limit),
+        state_bounds=replace(on_states, radius=state_radius),
+        input_bounds=replace(on_inputs, radius=input_radius),
     )
+
+
+def _tracking(
+    nominal: Nominal, goals: tuple[SleeveGoal, SleeveGoal], p: LocalParameters
+) -> tuple[FloatArray, FloatArray]:
+    """Returns weights and targets (N+1,12) of the state; grippers have none."""
+    weight, target = np.zeros((p.horizon + 1, 12)), np.zeros((p.horizon + 1, 12))
+    for i, goal in enumerate(goals):
+        rows = _rows(i)
+        weight[:, rows] = p.position * goal.weight
+        target[:, rows] = goal.target - nominal.sleeve[:, i]
+    return weight, target
+
+
+def _distance_bounds(nominal: Nominal, reach: Reach, p: LocalParameters) -> NormBounds:
+    """Returns the bounds on states: four distances, then a free row for each sleeve's arm."""
+    n = p.horizon
+    where = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(n + 1, 12)
+    matrix, offset = np.zeros((n + 1, 6, 3, 12)), np.zeros((n + 1, 6, 3))
+    radius = np.full((n + 1, 6), np.inf)
+    matrix[:, :4] = _PAIRS
+    offset[:, :4] = np.einsum("kab,tb->tka", matrix[0, :4], where)
+    distances = [*reach.to_far_gripper, reach.between_sleeves, reach.between_grippers]
+    radius[:, :4] = p.stretch * np.array(distances)
+    return NormBounds(matrix, offset, radius)
+
+
+def _speed_bounds(nominal: Nominal, p: LocalParameters) -> NormBounds:
+    """Returns the bounds on inputs: a free row for each sleeve's arm, then the grippers' speeds."""
+    n = p.horizon
+    velocity = nominal.velocity.reshape(n, 6)
+    matrix, offset = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
+    radius = np.full((n, 4), np.inf)
+    for i in (0, 1):
+        rows = _rows(i)
+        matrix[:, 2 + i, :, rows], offset[:, 2 + i] = _EYE, velocity[:, rows]
+        radius[:, 2 + i] = p.max_speed
+    return NormBounds(matrix, offset, radius)
+
+
+def _bind_to_arm(
+    on_states: NormBounds,
+    on_inputs: NormBounds,
+    i: int,
+    goal: SleeveGoal,
+    nominal: Nominal,
+    b: FloatArray,
+    p: LocalParameters,
+) -> None:
+    """Fills the rows that keep sleeve `i` near the axis of its arm, and slow across it."""
+    rows = _rows(i)
+    across = _EYE - goal.axis[:, :, None] * goal.axis[:, None, :]
+    away = nominal.sleeve[:, i] - goal.arm
+    on_states.matrix[:, 4 + i, :, rows] = across
+    on_states.offset[:, 4 + i] = np.einsum("tab,tb->ta", across, away)
+    on_states.radius[:, 4 + i] = p.beside
+    on_inputs.matrix[:, i] = across[:-1] @ b[rows]
+    on_inputs.offset[:, i] = np.einsum("tab,tb->ta", across[:-1], np.diff(away, axis=0))
+    on_inputs.radius[:, i] = p.beside_speed * p.time_step
+
+
+def _reachable_radii(
+    on_states: NormBounds, on_inputs: NormBounds, planned: bool, p: LocalParameters
+) -> tuple[FloatArray, FloatArray]:
+    """Returns the radii (N+1,6) and (N,4), widened where the nominal motion exceeds a bound.
+
+    A plan with the garment may exceed a bound. Without one, a bound that is exceeded already is
+    restored gradually: it could not be restored at once.
+    """
+    along = np.linalg.norm(on_states.offset, axis=2)
+    if planned:
+        moved = np.linalg.norm(on_inputs.offset, axis=2)
+        return np.maximum(on_states.radius, along), np.maximum(on_inputs.radius, moved)
+    returning = along[0] - p.return_speed * p.time_step * np.arange(p.horizon + 1)[:, None]
+    return np.maximum(on_states.radius, returning), on_inputs.radius
+
+
+def _rows(i: int) -> slice:
+    """Returns the rows of a sleeve's centre in the state, and of its gripper in the input."""
+    return slice(3 * i, 3 * i + 3)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 
 
 @dataclass(frozen=True)

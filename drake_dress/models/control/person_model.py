@@ -8,8 +8,8 @@ from functools import cached_property
 import numba as nb
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.human.body import Capsule
 from drake_dress.models.human.heading import heading
 

@@ -6,11 +6,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, make_elements
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
-from drake_dress.models.control.global_mpc import GlobalController, Plan, Weights
+from drake_dress.models.control.global_mpc import (
+    GlobalController,
+    HeldGarment,
+    Plan,
+    Situation,
+    Weights,
+)
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
@@ -104,15 +111,17 @@ class DressingPolicy:
         span = float(np.linalg.norm(left - right))
         self.controller = GlobalController(
             cloth,
-            (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
-            self.planner.armholes,
-            self.planner.signs,
+            HeldGarment(
+                (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
+                self.planner.armholes,
+                self.planner.signs,
+                span,
+                find_entry(mesh),
+            ),
             parameters.horizon,
             parameters.weights,
             parameters.max_speed,
             parameters.max_iterations,
-            span,
-            find_entry(mesh),
         )
 
     def initial_state(self) -> PolicyState:
@@ -152,13 +161,9 @@ class DressingPolicy:
         least = p.tasks.stages.creeping_progress
         settling = all(fact.linked and fact.s >= least for fact in assignment.facts)
         plan = self.controller.solve(
-            x,
-            v,
-            targets,
-            obstacles,
+            Situation(x, v, targets, obstacles, leftward),
             guess,
             p.committed_steps,
-            leftward,
             p.budget,
             p.tasks.settling_speed if settling else p.max_speed,
         )

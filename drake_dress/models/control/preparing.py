@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.task_parameters import Approach, TaskParameters
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts

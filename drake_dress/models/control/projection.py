@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Kinds of sets in rows.
 HALF_SPACE, BALL = 0.0, 1.0

@@ -62,12 +62,10 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.projection import BALL, HALF_SPACE, excess, find_nearest
 from drake_dress.models.vector3 import dot, length
-
-FloatArray = npt.NDArray[np.float64]
 
 # A request this many times faster than allowed was not meant: it is in mm/s, or garbage.
 _ABSURD = 10.0

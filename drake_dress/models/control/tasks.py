@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.corridor import Corridor
 from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.control.preparing import (

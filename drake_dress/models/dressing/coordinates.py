@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Share of the shorter limb that the arc at the elbow takes when no radius is given.
 _FILLET_SHARE = 0.3
@@ -30,7 +29,7 @@ class DressingCoordinates(NamedTuple):
     """
 
     s: float
-    l: float  # noqa: E741
+    l: float
     theta: float
 
 
@@ -96,7 +95,7 @@ class ArmAxis:
             self._radius = cut / half_tangent
             self._half_arc = 0.5 * angle * self._radius
 
-    def G(self, s: float) -> FloatArray:  # noqa: N802
+    def G(self, s: float) -> FloatArray:
         """Returns the point (3,) of the axis at `s`, limited to [0, 2], m."""
         before, after = self._arc_length(s)
         if before <= self._lower:
@@ -129,7 +128,7 @@ class ArmAxis:
         on_upper = np.where(after <= self._upper, self._shoulder - after * self._w, arc)
         return np.where(before <= self._lower, self._hand + before * self._u, on_upper)
 
-    def D(self, s: float) -> FloatArray:  # noqa: N802
+    def D(self, s: float) -> FloatArray:
         """Returns the unit direction (3,) hand → shoulder at `s`, limited to [0, 2].
 
         It is the direction of dG/ds, and continuous.

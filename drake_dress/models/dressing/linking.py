@@ -21,9 +21,8 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # How far the fan's apex may be moved off the loop's centre, as a share of the loop's size.
 _APEX_SHIFT = 1e-6

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from trimesh.triangles import closest_point
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 # Moves of an opening that are tried, m: none, and along the 26 vectors from the centre of a cube to
 # its corners, edges and faces.

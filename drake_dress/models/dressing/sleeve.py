@@ -19,10 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
-FloatArray = npt.NDArray[np.float64]
 Center = Literal["arc_length", "keypoints"]
 
 _KEYPOINTS = 6  # per armhole, as in the paper's tracking section

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import ForceEffect, Sheet, parameter
 
 AIR_DENSITY = 1.2  # kg/m³

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import known_contacts
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray, make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.implicit import GRAVITY, ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences

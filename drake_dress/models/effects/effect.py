@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.human.body import BodyMeasures
 

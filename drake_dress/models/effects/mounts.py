@@ -17,10 +17,10 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sparse_linalg
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.matrices import bending_bound, stretch_matrix
-from drake_dress.models.cloth.scheme import Integrator
 from drake_dress.models.effects.effect import Effect, MountEffect
 from drake_dress.models.effects.grip import GripperCompliance, GripperSlip
 from drake_dress.models.effects.person import LimbCompliance

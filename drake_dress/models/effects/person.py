@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import BodyEffect, MountEffect, parameter
 from drake_dress.models.human.body import BodyMeasures
 

@@ -13,8 +13,9 @@ from math import dist, hypot, sqrt
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
-from drake_dress.models.garment.mesh import FloatArray, IntArray, face_areas
+from drake_dress.models.garment.mesh import face_areas
 
 LONGEST = 1.5  # no merging makes an edge longer than this by the spacing
 _SHORTEST = 0.75  # edges are merged up to this part of the spacing: the mean comes near 1

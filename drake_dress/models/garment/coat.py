@@ -24,13 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.mesh import (
-    FloatArray,
-    GarmentMesh,
-    IntArray,
-    edge_lengths,
-    loop_length,
-)
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, loop_length
 
 SPACING_RANGE = (0.01, 0.06)  # m
 

@@ -8,8 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from drake_dress.errors import UserError
-
-IntArray = npt.NDArray[np.int32]
+from drake_dress.models.arrays import IntArray
 
 
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:

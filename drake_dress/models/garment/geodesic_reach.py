@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def reach_between(mesh: GarmentMesh, places: FloatArray) -> FloatArray:

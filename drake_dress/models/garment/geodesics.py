@@ -16,7 +16,8 @@ from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 from scipy.optimize import linprog
 from scipy.sparse import kron, vstack
 
-from drake_dress.models.garment.mesh import FloatArray, GarmentMesh, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
 

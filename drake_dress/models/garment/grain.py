@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.models.garment.mesh import FloatArray, GarmentMesh
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
 

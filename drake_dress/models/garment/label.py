@@ -7,16 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, turned
-from drake_dress.models.garment.mesh import (
-    LOOP_NAMES,
-    REGION_NAMES,
-    SIDES,
-    FloatArray,
-    GarmentMesh,
-    IntArray,
-)
+from drake_dress.models.garment.mesh import LOOP_NAMES, REGION_NAMES, GarmentMesh
 from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
+from drake_dress.models.sides import SIDES
 
 _GRASP_COUNT = 10  # nodes per gripper, where none are named
 _GRASP_INSET = 0.035  # from the shoulder tip toward the neck, m

@@ -9,19 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, turned
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
 from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
-from drake_dress.models.garment.mesh import (
-    LOOP_NAMES,
-    SIDES,
-    FloatArray,
-    GarmentMesh,
-    IntArray,
-    check_loop,
-)
+from drake_dress.models.garment.mesh import LOOP_NAMES, GarmentMesh, check_loop
 from drake_dress.models.garment.parts import (
     check_one_part,
     sizes_of,
@@ -30,6 +24,7 @@ from drake_dress.models.garment.parts import (
 )
 from drake_dress.models.garment.plausible import check_plausible
 from drake_dress.models.garment.simplify import to_spacing
+from drake_dress.models.sides import SIDES
 
 __all__ = ["EXTENSIONS", "UNITS", "MeshOptions", "WholeGarment", "load_garment", "read_garment"]
 

@@ -12,8 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.edges import border_edges, half_edges
-from drake_dress.models.garment.files.raw import FloatArray, IndexArray, RawMesh
+from drake_dress.models.garment.files.raw import RawMesh
 
 # Nodes nearer than this by the size of the mesh were one before their digits were cut.
 _ROUNDING = 1e-7

@@ -8,12 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.edges import IntArray, unique_edges
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.garment.edges import unique_edges
 from drake_dress.models.garment.manifold import Named, check_manifold, plain_node
 from drake_dress.models.sides import SIDES
-
-FloatArray = npt.NDArray[np.float64]
-
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")

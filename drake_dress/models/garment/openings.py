@@ -18,8 +18,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
-from drake_dress.models.garment.mesh import FloatArray, IntArray, loop_length
+from drake_dress.models.garment.mesh import loop_length
 
 _CUFF_GIRTH = (0.1, 0.8)  # m
 _STEP = 0.005  # between cuts, m

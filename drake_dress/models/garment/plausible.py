@@ -12,9 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.edges import border_edges, unique_edges
-from drake_dress.models.garment.files.raw import FloatArray, RawMesh
-from drake_dress.models.garment.mesh import IntArray, face_areas
+from drake_dress.models.garment.files.raw import RawMesh
+from drake_dress.models.garment.mesh import face_areas
 
 # An edge crosses the garment if it is longer than this part of the diagonal of the bounding box,
 # and than most edges by this factor: a mesh that is coarse throughout is not a damaged one.

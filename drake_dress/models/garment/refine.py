@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.edges import half_edges
-from drake_dress.models.garment.mesh import FloatArray, IntArray
 
 MOST_NODES = 200_000  # of a refined mesh
 

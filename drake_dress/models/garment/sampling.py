@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 
 def spread_out(points: FloatArray, count: int, first: int) -> npt.NDArray[np.int64]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
+from drake_dress.models.arrays import FloatArray, IntArray
 
 # Of a face's normal along that of its corners, below which it gets corners of its own.
 _LEAST_COSINE = 0.1

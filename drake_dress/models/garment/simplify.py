@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.coarsen import LONGEST, coarsen
-from drake_dress.models.garment.mesh import FloatArray, IntArray
 from drake_dress.models.garment.refine import refine
 
 

@@ -8,7 +8,8 @@ import trimesh
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
-from drake_dress.models.garment.mesh import FloatArray, GarmentMesh
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.mesh import GarmentMesh
 
 
 def barycentric_transfer(source: GarmentMesh, target: GarmentMesh) -> csr_array:

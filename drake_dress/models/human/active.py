@@ -17,8 +17,8 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.armhole import Armhole
 from drake_dress.models.human.following import FollowingParameters, following_rate
@@ -30,8 +30,6 @@ from drake_dress.models.human.hand_tracking import (
     tracking_rate,
 )
 from drake_dress.models.human.motions import Motion, Reach, Wave, Withdraw
-
-FloatArray = npt.NDArray[np.float64]
 
 # A reach is given up with the armhole this much further from where the hand was than it began.
 _LOST = 1.4

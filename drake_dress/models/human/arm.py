@@ -10,18 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
     ArmPose,
     BodyMeasures,
     Posture,
-    Side,
     arm_rotations,
     shoulder_joint,
 )
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.sides import Side
 
 JOINT_NAMES = ("abduction", "extension", "rotation", "elbow")
 GRAVITY = 9.81  # m/s², as the plant's

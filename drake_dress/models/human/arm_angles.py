@@ -15,11 +15,9 @@ from __future__ import annotations
 from math import asin, atan2, cos, hypot, pi, sin
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import Side
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def arm_angles(side: Side, upper: FloatArray, fore: FloatArray) -> FloatArray:

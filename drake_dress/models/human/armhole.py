@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
 from drake_dress.models.dressing.sleeve import sleeve_state
 from drake_dress.models.human.arm import Arm
-
-FloatArray = npt.NDArray[np.float64]
 
 # From a point to its mirror image across the torso's middle plane.
 _MIRROR = np.array([1.0, -1.0, 1.0])

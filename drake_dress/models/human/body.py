@@ -20,12 +20,11 @@ from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES, Side
 
-FloatArray = npt.NDArray[np.float64]
 Posture = Literal["standing", "sitting"]
 
 
@@ -112,8 +111,8 @@ class Capsule:
     """A capsule fixed in `body`; a sphere where a_B equals b_B. Ends (3,), m, radius, m."""
 
     body: str
-    a_B: FloatArray  # noqa: N815
-    b_B: FloatArray  # noqa: N815
+    a_B: FloatArray
+    b_B: FloatArray
     radius: float
 
 
@@ -198,7 +197,7 @@ def arm_points(
     posture: Posture,
     side: Side,
     pose: ArmPose,
-    X_WTorso: tuple[FloatArray, FloatArray] | None = None,  # noqa: N803
+    X_WTorso: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
     """Returns shoulder, elbow and hand (3,3), m, in the torso's frame or in the world.
 

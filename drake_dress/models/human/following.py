@@ -27,11 +27,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # A joint without a spring would follow infinitely fast, N·m/rad.
 _LEAST_STIFFNESS = 0.1

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import Arm
-
-FloatArray = npt.NDArray[np.float64]
 
 # Shortest time that is planned ahead, s: how fast a small correction is.
 _SHORTEST = 0.3
@@ -92,7 +90,7 @@ def tracking_rate(
     jacobian = arm.jacobian(angles)
     free, rate = np.ones(4, dtype=bool), np.zeros(4)
     for _ in range(4):
-        J = jacobian[:, free]  # noqa: N806
+        J = jacobian[:, free]
         inverse = J.T @ np.linalg.inv(J @ J.T + _DAMPING**2 * np.eye(3))
         rate[free] = inverse @ (wanted - jacobian[:, ~free] @ rate[~free])
         if free.all():

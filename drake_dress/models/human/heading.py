@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # A sine up to here is rounding: a person who does not turn is taken to face +x to the last bit.
 _ROUNDING = 1e-12
@@ -46,7 +45,7 @@ def heading(joints: FloatArray) -> Heading:
     """
     line = joints[0] - joints[3]
     length = float(np.hypot(line[0], line[1]))
-    if length == 0.0 or abs(line[0]) <= _ROUNDING * length and line[1] > 0.0:
+    if length == 0.0 or (abs(line[0]) <= _ROUNDING * length and line[1] > 0.0):
         return Heading(np.eye(3))
     c, s = line[1] / length, -line[0] / length
     return Heading(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))

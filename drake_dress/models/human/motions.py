@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES, Side
-
-FloatArray = npt.NDArray[np.float64]
 
 PEAK_OF_MEAN_SPEED = 15.0 / 8.0
 # A wave swells and fades over this share of its duration, at most for so long, s.

@@ -12,12 +12,8 @@ set-point exactly, but for its inertia.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import Arm
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def muscle_torque(

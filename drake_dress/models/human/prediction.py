@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # Rows of the joints, parents first: each hangs on the one before it by a limb of fixed length.
 _LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))

@@ -13,11 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
+from drake_dress.models.arrays import FloatArray
 
 # What drives: abduction, extension, rotation, elbow.
 _DRIVE = np.array([0.0, 0.0, 1.0, 1.0])

@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
+from drake_dress.models.arrays import FloatArray
+
 Image = npt.NDArray[np.uint8]
 
 # Of corners in a picture that counts, of pictures, and of the turns between them, rad.

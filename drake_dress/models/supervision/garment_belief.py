@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.garment_shape import ShapeBounds, impossible_shape
-
-FloatArray = npt.NDArray[np.float64]
 
 # Messages in a row without any change, before they are called frozen.
 _REPEATS = 3

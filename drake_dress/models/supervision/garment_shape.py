@@ -12,13 +12,10 @@ from functools import cached_property
 
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.remedies import COORDINATES, mistake
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int32]
 
 # Of which the longest of some thousand noisy edges is longer, in standard deviations.
 _LONGEST = 10.0

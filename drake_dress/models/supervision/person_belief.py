@@ -14,13 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.person_pose import POINT_NAMES, PoseBounds, impossible_pose
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # Messages in a row in which a point changes, before it may be called frozen; and repeats then.
 _LIVELY, _REPEATS = 25, 3
@@ -60,8 +57,8 @@ class PersonTrack:
     points: FloatArray
     anchor_stamp: float
     anchor: FloatArray
-    changes: IntArray = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
-    same: IntArray = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
+    changes: IndexArray = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
+    same: IndexArray = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
     changed: FloatArray = field(default_factory=lambda: np.full(6, -np.inf))
 
 

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, pi, radians, sin
 
 import numpy as np
-import numpy.typing as npt
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.human.arm_angles import arm_angles
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.remedies import COORDINATES, mistake
-
-FloatArray = npt.NDArray[np.float64]
 
 POINT_NAMES = tuple(f"{side} {name}" for side in SIDES for name in ("shoulder", "elbow", "hand"))
 _LIMBS = ("upper arm", "forearm")

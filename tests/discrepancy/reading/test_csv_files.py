@@ -121,7 +121,8 @@ def test_numbers_of_markers_are_those_of_the_columns(read, tmp_path, case):
     with pytest.raises(UserError) as error:
         read(TEXT, places_text(PLACES, numbers))
     assert str(tmp_path / "lab.markers.csv") in str(error.value)
-    assert word in str(error.value) and "0 to 7" in str(error.value)
+    assert word in str(error.value)
+    assert "0 to 7" in str(error.value)
 
 
 @pytest.mark.parametrize("places", ["", "marker,x,y,z\n", places_text(PLACES[:-1]), b"\xff\xfe\0"])

@@ -34,7 +34,8 @@ def refusal(path):
     with pytest.raises(UserError) as error:
         read_recordings([path], MESH, DENSITY)
     text = str(error.value)
-    assert text.startswith(str(path)) and "\n" not in text
+    assert text.startswith(str(path))
+    assert "\n" not in text
     return text
 
 
@@ -53,7 +54,8 @@ def test_flipped_and_missing_bytes_are_told_or_do_no_harm(whole, tmp_path_factor
     try:
         (read,) = read_recordings([path], MESH, DENSITY)
     except UserError as error:
-        assert str(error).startswith(str(path)) and "\n" not in str(error)
+        assert str(error).startswith(str(path))
+        assert "\n" not in str(error)
     else:
         assert np.isfinite(read.marker_position).any()
 
@@ -223,4 +225,5 @@ def test_what_is_not_used_is_told_and_what_may_be_meant_is_asked(sound, tmp_path
     assert "garment/marker_positions meant" in text
     del more["gripper/right/force"]
     (read,) = read_recordings([write_hdf5(tmp_path / "less.h5", more)], MESH, DENSITY)
-    assert read.gripper_force is None and "gripper/left/force" in " ".join(read.notes)
+    assert read.gripper_force is None
+    assert "gripper/left/force" in " ".join(read.notes)

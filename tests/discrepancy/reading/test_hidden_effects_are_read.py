@@ -23,7 +23,7 @@ HIDDEN = [
 ]
 
 
-@pytest.mark.parametrize("effects, motion", HIDDEN)
+@pytest.mark.parametrize(("effects", "motion"), HIDDEN)
 @pytest.mark.parametrize("size", [1.5])
 def test_hidden_effects_are_read_as_they_are(tmp_path, effects, motion, size):
     seed = len(effects)

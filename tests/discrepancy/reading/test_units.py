@@ -120,7 +120,8 @@ def test_what_is_sound_is_read_without_a_word(read, seed):
 
 def test_a_clock_may_count_from_1970(read):
     found = read(clock(lambda t: 1.7e9 + t))
-    assert found.time[0] == 0.0 and found.duration == pytest.approx(2.0)
+    assert found.time[0] == 0.0
+    assert found.duration == pytest.approx(2.0)
     assert "1.7e+09" in found.notes[0]
 
 
@@ -141,7 +142,8 @@ def test_noise_that_the_data_do_not_have_is_told(read):
         datasets[f"{MARKERS}/noise_std"] = np.array(1e-5)
 
     found = read(change)
-    assert found.marker_noise == 1e-5 and "scatter by 0.00" in found.notes[0]
+    assert found.marker_noise == 1e-5
+    assert "scatter by 0.00" in found.notes[0]
 
 
 def test_markers_that_are_mixed_up_are_told(read):

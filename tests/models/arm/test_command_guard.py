@@ -115,7 +115,8 @@ def test_whatever_is_commanded_drives_stay_within_limits(
         state = follow(state, near, velocity, fresh, LIMITS, DT)
         change = np.abs(state.velocity - before.velocity)
         assert (change <= DT * LIMITS.acceleration + 1e-9).all()
-        assert np.isfinite(state.position).all() and np.isfinite(state.velocity).all()
+        assert np.isfinite(state.position).all()
+        assert np.isfinite(state.velocity).all()
         assert ((state.position >= LIMITS.lower) & (state.position <= LIMITS.upper)).all()
         assert (np.abs(state.velocity) <= GuardSettings().speed * LIMITS.speed + 1e-12).all()
 

@@ -26,7 +26,8 @@ def test_whatever_is_chosen_no_limit_is_exceeded(seed: int, step: float) -> None
         assert (np.abs(new - rate) <= LIMITS.acceleration * step * (1.0 + 1e-9)).all()
         assert (np.abs(new) <= LIMITS.speed * (1.0 + 1e-9)).all()
         q, rate = q + step * new, new
-        assert (q <= LIMITS.upper + 1e-9).all() and (q >= LIMITS.lower - 1e-9).all()
+        assert (q <= LIMITS.upper + 1e-9).all()
+        assert (q >= LIMITS.lower - 1e-9).all()
 
 
 def test_full_speed_is_braked_just_in_time() -> None:
@@ -47,4 +48,5 @@ def test_a_joint_beyond_its_limit_brakes_and_comes_back_no_faster_than_it_may() 
     np.testing.assert_allclose(high, 1.0 - 5.0 * STEP)
     np.testing.assert_allclose(low, high)
     low, high = rate_bounds(np.array([1.1]), np.array([0.0]), STEP, limits)
-    assert high <= 0.0 and low < 0.0
+    assert high <= 0.0
+    assert low < 0.0

@@ -73,7 +73,8 @@ def test_no_limit_is_exceeded_whatever_is_asked(seed: int) -> None:
         assert (np.abs(found.rate - rate) <= LIMITS.acceleration * STEP * (1 + 1e-6)).all()
         rate = found.rate
         q = q + STEP * rate
-        assert (q <= LIMITS.upper + 1e-9).all() and (q >= LIMITS.lower - 1e-9).all()
+        assert (q <= LIMITS.upper + 1e-9).all()
+        assert (q >= LIMITS.lower - 1e-9).all()
         assert found.between_arms > 0.04
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray, make_elements
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements, make_elements
 
 
 def sheet(columns: int, rows: int, spacing: float) -> tuple[FloatArray, IntArray]:

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.buckling import Buckling, buckled_product, buckling_strain
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
 from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.material import Material

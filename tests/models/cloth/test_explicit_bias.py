@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP
 from drake_dress.models.cloth.material import Material

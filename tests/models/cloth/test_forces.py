@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, make_elements
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
 from drake_dress.models.cloth.forces import internal_force, stiffness_product
 from tests.models.cloth.sheets import sheet, sheet_elements

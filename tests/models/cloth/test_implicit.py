@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.filtered_cg import STICK
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray, make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.implicit import GRAVITY, ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
@@ -140,7 +141,7 @@ def test_clamped_strip_droops_by_its_bending_length(across: bool) -> None:
 def _capstan(scheme: str, mu: float, h: float, speed: float) -> float:
     """Returns the ratio of the tensions of a strip that slides over half a cylinder."""
     radius, spacing, straight = 0.06, 0.006, 0.06
-    along = int(round((2 * straight + np.pi * radius) / spacing)) + 1
+    along = round((2 * straight + np.pi * radius) / spacing) + 1
     flat, faces = sheet(along, 4, spacing)
     e = make_elements(flat, faces)
     m = Material(0.2, 800.0, 1e-6, 0.01, mu, 1e-3)

@@ -16,7 +16,7 @@ from tests.models.cloth.layers.scenes import two_sheets
 
 @pytest.mark.parametrize("integrator", ["implicit", "projective"])
 def test_a_sheet_that_falls_on_another_lies_on_it(integrator: str) -> None:
-    x, e, rim, upper = two_sheets(9, 0.03, 0.012)
+    x, e, rim, _ = two_sheets(9, 0.03, 0.012)
     material = Material(damping=0.01)
     plain = (
         ImplicitCloth(e, material, 0.01, rim)

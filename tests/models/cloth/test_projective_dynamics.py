@@ -8,11 +8,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 import trimesh
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elastic_energy import elastic_energy
-from drake_dress.models.cloth.elements import Elements, FloatArray, make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.forces import internal_force
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
@@ -182,7 +183,8 @@ def _true_distances(h: float, quasi_newton: bool) -> list[float]:
         truth, fine_info = fine.step(state, Obstacles.none(), pull)
         state, info = cloth.step(state, Obstacles.none(), pull)
         assert fine_info.converged
-        assert info.converged and info.remaining <= 1e-5
+        assert info.converged
+        assert info.remaining <= 1e-5
         distance.append(float(np.linalg.norm(state.x - truth.x, axis=1).max()))
     return distance
 
@@ -237,7 +239,8 @@ def test_hanging_sheet_is_at_the_implicit_schemes_equilibrium() -> None:
         a, _ = pd.step(a, Obstacles.none(), steady)
     for _ in range(400):
         b, _ = other.step(b, Obstacles.none(), steady)
-    assert np.abs(a.v).max() < 1e-3 and np.abs(b.v).max() < 1e-3
+    assert np.abs(a.v).max() < 1e-3
+    assert np.abs(b.v).max() < 1e-3
     assert np.linalg.norm(a.x - b.x, axis=1).max() < 5e-4
     weight = pd.mass.sum() * 9.81
     assert a.reaction[held].sum(axis=0)[2] == pytest.approx(weight, rel=1e-3)

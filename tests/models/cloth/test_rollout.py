@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.rollout import roll_back, roll_out
 from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb
@@ -95,7 +95,7 @@ def test_a_failed_step_is_named() -> None:
     motions = motions.copy()
     motions[4, 2, 1] = np.nan
     before = x.copy()
-    with pytest.raises(ValueError, match="step 4: motion of the held node 17 is .*nan"):
+    with pytest.raises(ValueError, match=r"step 4: motion of the held node 17 is .*nan"):
         roll_out(cloth, x, v, motions, [limb()] * STEPS)
     np.testing.assert_array_equal(x, before)
 

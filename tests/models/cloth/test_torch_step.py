@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from drake_dress.models.cloth.explicit_bias import INNER, ExplicitBiasCloth
 from drake_dress.models.cloth.torch_step import MATERIAL as NAMES
-from drake_dress.models.cloth.torch_step import cloth_step
+from drake_dress.models.cloth.torch_step import cloth_step, material_tensor
 from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb, make
 
 
@@ -29,7 +31,7 @@ def test_torch_gradient_is_that_of_the_adjoint() -> None:
 
     a = [t.detach().numpy() for t in inputs]
     y1, u1, _, first = cloth.step(a[0], a[1], a[2], limb())
-    _, _, r, second = cloth.step(y1, u1, a[2], limb())
+    _, _, _, second = cloth.step(y1, u1, a[2], limb())
     w = weight.numpy()
     g2 = cloth.vector_jacobian_product(second, w, 0.01 * w, np.full((4, 3), 1e-3), True)
     g1 = cloth.vector_jacobian_product(first, g2.x, g2.v, np.zeros((4, 3)), True)
@@ -54,11 +56,28 @@ def test_displaced_bodies_are_where_they_are_said_to_be() -> None:
 
 def test_wrong_tensors_are_refused() -> None:
     cloth, x, v, motion = _scene()
-    with pytest.raises(ValueError, match="x is torch.float32, expected torch.float64"):
+    with pytest.raises(ValueError, match=r"x is torch\.float32, expected torch\.float64"):
         cloth_step(cloth, x.float(), v, motion, limb())
-    other = torch.tensor([getattr(MATERIAL, n) for n in NAMES], dtype=torch.float64) * 1.1
-    with pytest.raises(ValueError, match="the cloth was made with"):
-        cloth_step(cloth, x, v, motion, limb(), material=other)
+    with pytest.raises(ValueError, match=r"material has shape \(4,\), expected \(5,\)"):
+        cloth_step(cloth, x, v, motion, limb(), material=torch.ones(4, dtype=torch.float64))
+    wrong = material_tensor(MATERIAL)
+    wrong[NAMES.index("stretch_stiffness")] = -1.0
+    with pytest.raises(ValueError, match="stretch_stiffness is -1"):
+        cloth_step(cloth, x, v, motion, limb(), material=wrong)
+
+
+def test_a_fabric_of_other_values_is_what_a_cloth_made_with_them_is() -> None:
+    cloth, x, v, motion = _scene()
+    other = (1.1 * material_tensor(MATERIAL)).requires_grad_()
+    x1, _, _ = cloth_step(cloth, x, v, motion, limb(), material=other)
+    x1.square().sum().backward()
+    fabric = dict(zip(NAMES, other.tolist(), strict=True))
+    made = cloth.with_material(replace(MATERIAL, **fabric))
+    expected, _, _, tape = made.step(x.numpy(), v.numpy(), motion.numpy(), limb())
+    np.testing.assert_array_equal(x1.detach().numpy(), expected)
+    bar = 2.0 * expected
+    g = made.vector_jacobian_product(tape, bar, np.zeros_like(bar), np.zeros((4, 3)), True)
+    np.testing.assert_allclose(other.grad.numpy(), [g.material[n] for n in NAMES], rtol=1e-12)
 
 
 def _leaves() -> tuple[ExplicitBiasCloth, list[torch.Tensor]]:

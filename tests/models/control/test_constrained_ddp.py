@@ -147,9 +147,11 @@ def test_rows_without_room_are_told_and_none_is_left_out() -> None:
 
     of_a_step = on_x.radius.shape[1] + on_v.radius.shape[1]
     dropped, number = passed(of_a_step + n)
-    assert dropped > 0 and number.max() == of_a_step + n
+    assert dropped > 0
+    assert number.max() == of_a_step + n
     dropped, number = passed(steps * of_a_step)
-    assert dropped == 0 and number.max() > of_a_step + n
+    assert dropped == 0
+    assert number.max() > of_a_step + n
     # gains are there all the same
     ones = replace(
         s,
@@ -433,7 +435,8 @@ def test_whatever_it_ends_with_is_reported_as_it_is(
     # what was handed in is as it was
     for a, was in zip(given_ones, before, strict=True):
         assert a is None or np.array_equal(a, was)
-    assert s.v.shape == p.input_weight.shape and np.isfinite(s.v).all()
+    assert s.v.shape == p.input_weight.shape
+    assert np.isfinite(s.v).all()
     np.testing.assert_array_equal(s.x, p.states(s.v))
     assert s.cost == p.cost(s.v)
     assert s.violation == p.violation(s.v)

@@ -6,13 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, make_elements
+from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.corridor import Corridor
-from drake_dress.models.control.global_mpc import GlobalController, Plan, SleeveTarget, Weights
+from drake_dress.models.control.global_mpc import (
+    GlobalController,
+    HeldGarment,
+    Plan,
+    Situation,
+    SleeveTarget,
+    Weights,
+)
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -35,17 +43,19 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
     signs = tuple(float(loop_orientation(mesh, s)) for s in SIDES)
     controller = GlobalController(
         cloth,
-        (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
-        (loops[0], loops[1]),
-        (signs[0], signs[1]),
+        HeldGarment(
+            (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
+            (loops[0], loops[1]),
+            (signs[0], signs[1]),
+            0.2,
+            find_entry(mesh),
+        ),
         HORIZON,
         Weights(
             direction=0.02, speed=0.5, safety=1e-3, free_force=0.5, separation=10.0, passage=2.0
         ),
         0.15,
         8,
-        0.2,
-        find_entry(mesh),
     )
     x = np.array(mesh.rest_position)
     targets = []
@@ -93,9 +103,9 @@ def test_gradient_of_the_plan_matches_finite_differences(
     velocity = 0.03 * rng.normal(size=(HORIZON, 2, 3))
     grip = x[controller.cloth.held[controller._split[0]]].mean(axis=0)
     person = [_beside(grip) if beside else Obstacles.none()] * HORIZON
-    rest = np.zeros_like(x)
     left = np.tile([0.6, 0.8, 0.0], (HORIZON, 1))
-    rollout = controller._rollout(x, rest, velocity, targets, person, left)
+    situation = Situation(x, np.zeros_like(x), targets, person, left)
+    rollout = controller._rollout(situation, velocity)
     assert (controller._level_error(controller._apart(x), left, 0) > 0.0) == (span == 1.0)
     assert targets[1].corridor is not None
     assert controller._corridor(x, targets[1].corridor, 0)[0] > 0.0
@@ -104,12 +114,12 @@ def test_gradient_of_the_plan_matches_finite_differences(
     assert controller._passage(rollout.states[0], sleeve.p_c, targets[0].passage[0])[0] > 0.0
     if beside:
         assert controller._clearance(x, person[0])[0] > 0.0
-    gradient = controller._gradient(rollout, velocity, targets, person, left)
+    gradient = controller._gradient(rollout, velocity, situation)
     for _ in range(5):
         d = rng.normal(size=velocity.shape)
         step = 1e-6
-        high = controller._rollout(x, rest, velocity + step * d, targets, person, left).cost
-        low = controller._rollout(x, rest, velocity - step * d, targets, person, left).cost
+        high = controller._rollout(situation, velocity + step * d).cost
+        low = controller._rollout(situation, velocity - step * d).cost
         assert np.sum(gradient * d) == pytest.approx((high - low) / (2 * step), rel=1e-4)
 
 
@@ -118,7 +128,8 @@ def test_plan_lowers_its_cost_and_keeps_the_speed_limit(
 ) -> None:
     controller, x, targets = setting
     plan = controller.solve(
-        x, np.zeros_like(x), targets, [Obstacles.none()] * HORIZON, np.zeros((HORIZON, 2, 3))
+        Situation(x, np.zeros_like(x), targets, [Obstacles.none()] * HORIZON),
+        np.zeros((HORIZON, 2, 3)),
     )
     assert plan.cost < 0.9 * plan.initial_cost
     assert np.linalg.norm(plan.velocity, axis=2).max() <= 0.15 + 1e-12
@@ -130,11 +141,11 @@ def test_a_plan_may_be_asked_to_be_slow_but_for_what_is_on_its_way(
 ) -> None:
     controller, x, targets = setting
     start = np.full((HORIZON, 2, 3), 0.05)
-    person = [Obstacles.none()] * HORIZON
-    plan = controller.solve(x, np.zeros_like(x), targets, person, start, 1, max_speed=0.01)
+    situation = Situation(x, np.zeros_like(x), targets, [Obstacles.none()] * HORIZON)
+    plan = controller.solve(situation, start, 1, max_speed=0.01)
     np.testing.assert_allclose(plan.velocity[0], start[0], atol=1e-12)
     assert np.linalg.norm(plan.velocity[1:], axis=2).max() == pytest.approx(0.01)
-    faster = controller.solve(x, np.zeros_like(x), targets, person, start, 1, max_speed=1.0)
+    faster = controller.solve(situation, start, 1, max_speed=1.0)
     assert 0.01 < np.linalg.norm(faster.velocity[1:], axis=2).max() <= 0.15 + 1e-12
 
 
@@ -144,14 +155,15 @@ def test_a_plan_is_as_good_as_its_budget_allows(
     """What is there when the budget is spent is used; more never makes a plan worse."""
     controller, x, targets = setting
     start = np.full((HORIZON, 2, 3), 0.01)
+    situation = Situation(x, np.zeros_like(x), targets, [_beside(x[0])] * HORIZON)
 
     def solved(budget: Budget) -> Plan:
-        return controller.solve(
-            x, np.zeros_like(x), targets, [_beside(x[0])] * HORIZON, start, budget=budget
-        )
+        return controller.solve(situation, start, budget=budget)
 
     whole = solved(Budget())
-    assert whole.reason != "budget" and whole.evaluations > 3 and whole.work > 0
+    assert whole.reason != "budget"
+    assert whole.evaluations > 3
+    assert whole.work > 0
     first = solved(Budget(iterations=1))
     assert (first.reason, first.evaluations, first.iterations) == ("budget", 1, 0)
     np.testing.assert_array_equal(first.velocity, start)
@@ -179,7 +191,8 @@ def test_plan_turns_a_garment_back_that_is_on_edge(
     idle = tuple(replace(t, position_weight=0.0, direction_weight=0.0) for t in targets)
     start = np.zeros((HORIZON, 2, 3))
     person = [Obstacles.none()] * HORIZON
-    plan = controller.solve(x, np.zeros_like(x), (idle[0], idle[1]), person, start, 0, left)
+    situation = Situation(x, np.zeros_like(x), (idle[0], idle[1]), person, left)
+    plan = controller.solve(situation, start)
     moved = controller.cloth.time_step * (plan.velocity[:, 0] - plan.velocity[:, 1]).sum(axis=0)
     assert left[0] @ moved > 0.03
 
@@ -205,15 +218,17 @@ def entering() -> tuple[GlobalController, dict[str, FloatArray], list[SleeveTarg
     )
     controller = GlobalController(
         cloth,
-        (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
-        (mesh.loops["left_armhole"], mesh.loops["right_armhole"]),
-        (loop_orientation(mesh, "left"), loop_orientation(mesh, "right")),
+        HeldGarment(
+            (len(mesh.grasp["left"]), len(mesh.grasp["right"])),
+            (mesh.loops["left_armhole"], mesh.loops["right_armhole"]),
+            (loop_orientation(mesh, "left"), loop_orientation(mesh, "right")),
+            0.44,
+            find_entry(mesh),
+        ),
         len(kept["start"]),
         Weights(speed=0.5, safety=1e-4, separation=10.0),
         0.12,
         3,
-        0.44,
-        find_entry(mesh),
     )
     targets = []
     for side in SIDES:
@@ -230,10 +245,10 @@ def test_gradient_with_frozen_contact_tells_what_motions_of_a_centimetre_do(
     """The exact one does not, from the third last step back: the reason for the other."""
     controller, seen, (left, right) = entering
     person = [Obstacles.resting(seen["a"], seen["b"], seen["radius"])] * len(seen["start"])
-    at = (seen["x"], seen["v"])
+    situation = Situation(seen["x"], seen["v"], (left, right), person)
 
     def cost(velocity: FloatArray) -> float:
-        return controller._rollout(*at, velocity, (left, right), person).cost
+        return controller._rollout(situation, velocity).cost
 
     start = seen["start"]
     slope = np.zeros_like(start)
@@ -241,18 +256,20 @@ def test_gradient_with_frozen_contact_tells_what_motions_of_a_centimetre_do(
         step = np.zeros_like(start)
         step[1:][index] = 0.01
         slope[1:][index] = (cost(start + step) - cost(start - step)) / 0.02
-    rollout = controller._rollout(*at, start, (left, right), person)
+    rollout = controller._rollout(situation, start)
     assert max(len(tape.contacts.nodes) for tape in rollout.tapes) > 50
     cosine, ratio = {}, {}
     for frozen in (True, False):
         controller.frozen_contact = frozen
-        gradient = controller._gradient(rollout, start, (left, right), person)[1:]
+        gradient = controller._gradient(rollout, start, situation)[1:]
         size, wanted = (np.linalg.norm(g, axis=(1, 2)) for g in (gradient, slope[1:]))
         cosine[frozen] = np.sum(gradient * slope[1:], axis=(1, 2)) / (size * wanted)
         ratio[frozen] = size / wanted
     controller.frozen_contact = True
-    assert cosine[True].min() > 0.8 and ratio[True].max() < 2.0
-    assert cosine[False][0] < 0.5 and ratio[False][0] > 3.0
+    assert cosine[True].min() > 0.8
+    assert ratio[True].max() < 2.0
+    assert cosine[False][0] < 0.5
+    assert ratio[False][0] > 3.0
 
 
 def test_plan_among_contacts_lowers_its_cost(
@@ -260,6 +277,7 @@ def test_plan_among_contacts_lowers_its_cost(
 ) -> None:
     controller, seen, (left, right) = entering
     person = [Obstacles.resting(seen["a"], seen["b"], seen["radius"])] * len(seen["start"])
-    plan = controller.solve(seen["x"], seen["v"], (left, right), person, seen["start"], 1)
+    situation = Situation(seen["x"], seen["v"], (left, right), person)
+    plan = controller.solve(situation, seen["start"], 1)
     assert plan.cost < 0.8 * plan.initial_cost
     np.testing.assert_allclose(plan.velocity[0], seen["start"][0], atol=1e-12)

@@ -108,7 +108,7 @@ def test_no_bound_is_exceeded_by_a_start_within_them(seed: int, coupled: bool) -
         goal(nominal, 0, ways[0] * ([1.0, 0.03, 0.03] if on_arm[0] else 1.0), bool(on_arm[0])),
         goal(nominal, 1, ways[1] * ([1.0, 0.03, 0.03] if on_arm[1] else 1.0), bool(on_arm[1])),
     )
-    s, sleeve, gripper = solved(nominal, goals, coupled)
+    _, sleeve, gripper = solved(nominal, goals, coupled)
     room = 1e-6
     for i in (0, 1):
         far = np.linalg.norm(sleeve[:, i] - gripper[:, 1 - i], axis=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -60,7 +62,7 @@ def test_torso_that_is_predicted_to_turn_moves_as_it_does() -> None:
     """Over a step, ends of capsules go where their velocity and rotation carry them."""
     rows = [joints(0.05 * j) for j in range(HORIZON + 1)]
     predicted = person_obstacles(PERSON, np.stack(rows), STEP)
-    for now, then in zip(predicted[:-1], predicted[1:], strict=True):
+    for now, then in itertools.pairwise(predicted):
         np.testing.assert_allclose(now.a + STEP * now.velocity, then.a, atol=1e-12)
     knee = int(np.argmax(predicted[0].a[:, 0]))
     assert np.linalg.norm(predicted[0].velocity[knee]) == pytest.approx(

@@ -178,7 +178,8 @@ def test_lasting_force_stops_both_until_it_is_under_the_soft_limit() -> None:
     arms.ask(0.1 * Y, left, duration=LIMITS.stop_time - DT)
     assert Verdict.STOPPED not in arms.verdicts[0]
     arms.ask(0.1 * Y, left, duration=2 * DT)
-    assert Verdict.STOPPED in arms.verdicts[0] and Verdict.STOPPED in arms.verdicts[1]
+    assert Verdict.STOPPED in arms.verdicts[0]
+    assert Verdict.STOPPED in arms.verdicts[1]
     # between soft and hard it stays stopped: the pulled gripper gives way, the other rests
     velocity = arms.ask(0.1 * Y, 0.6 * left, duration=3.0)[-1]
     np.testing.assert_allclose(velocity, [-LIMITS.relax_speed * X, 0.0 * X], atol=1e-9)
@@ -242,7 +243,8 @@ def test_one_side_that_is_no_velocity_brings_both_to_rest(bad: float) -> None:
     arms.ask(0.1 * X, duration=0.5)
     arms.ask(np.array([[0.1, 0.0, 0.0], [0.0, bad, 0.0]]), duration=0.1)
     np.testing.assert_allclose(arms.state.velocity, 0.0, atol=1e-12)
-    assert Verdict.INVALID in arms.verdicts[0] and Verdict.INVALID in arms.verdicts[1]
+    assert Verdict.INVALID in arms.verdicts[0]
+    assert Verdict.INVALID in arms.verdicts[1]
 
 
 @pytest.mark.parametrize("quantity", ["force", "position"])
@@ -253,7 +255,8 @@ def test_one_side_unmeasured_stops_both_until_it_is_measured(quantity: str) -> N
     hidden = hidden + (arms.state.position if quantity == "position" else 0.0)
     arms.ask(0.2 * X, duration=0.2 / LIMITS.max_braking + DT, **{quantity: hidden})
     np.testing.assert_allclose(arms.state.velocity, 0.0, atol=1e-12)
-    assert Verdict.UNMEASURED in arms.verdicts[0] and Verdict.UNMEASURED not in arms.verdicts[1]
+    assert Verdict.UNMEASURED in arms.verdicts[0]
+    assert Verdict.UNMEASURED not in arms.verdicts[1]
     arms.ask(0.2 * X, duration=0.5)
     np.testing.assert_allclose(arms.state.velocity, np.tile(0.2 * X, (2, 1)))
 
@@ -282,7 +285,8 @@ def test_workspace_is_reached_and_not_left() -> None:
     for _ in range(30):
         arms.ask(0.25 * rng.choice([-1.0, 1.0], size=(2, 3)), duration=0.8)
     path = np.array(arms.path)
-    assert np.all(path >= box[0] - 1e-12) and np.all(path <= box[1] + 1e-12)
+    assert np.all(path >= box[0] - 1e-12)
+    assert np.all(path <= box[1] + 1e-12)
     assert path[:, :, 2].min() < box[0, 2] + 1e-3
     assert Verdict.WORKSPACE in arms.seen
 

@@ -335,7 +335,9 @@ def test_a_garment_that_is_taken_back_goes_behind_both_shoulders(planner: TaskPl
     ):
         behind = turn.T @ (axis.G(2.0) - target.position[0])
         np.testing.assert_allclose(behind, [p.withdrawal_distance, 0.0, 0.0], atol=1e-12)
-        assert target.entering and target.corridor is None and target.passage is None
+        assert target.entering
+        assert target.corridor is None
+        assert target.passage is None
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -352,11 +354,13 @@ def test_a_second_sleeve_is_swung_back_behind_the_first(planner: TaskPlanner, si
     )
     target = planner.targets(given, sleeves, np.stack([q] * 2), STEP)[side]
     backward, outward, up = turn.T @ (sleeves[1 - side].p_c - target.position[0])
-    assert backward > 0.0 and up == pytest.approx(0.0)
+    assert backward > 0.0
+    assert up == pytest.approx(0.0)
     assert (outward < 0.0) == (side == 0)
     reach = armholes_apart(planner)
     assert np.hypot(backward, outward) == pytest.approx(p.swing_reach * reach)
-    assert target.corridor is None and target.passage is None
+    assert target.corridor is None
+    assert target.passage is None
 
 
 def test_sleeves_that_are_done_stay_where_they_are_on_their_arms(planner: TaskPlanner) -> None:
@@ -473,9 +477,11 @@ def test_sleeves_are_on_while_both_arms_are_far_enough_in_them(planner: TaskPlan
 
     up, down = kept + 0.01, kept - 0.01
     assert on((up, up))
-    assert not on((up, down)) and not on((down, up))
+    assert not on((up, down))
+    assert not on((down, up))
     # beside its arm a sleeve is not on it, however far up
-    assert not on((up, up), (0.0, 0.2)) and not on((up, up), (0.2, 0.0))
+    assert not on((up, up), (0.0, 0.2))
+    assert not on((up, up), (0.2, 0.0))
 
 
 def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner) -> None:
@@ -490,7 +496,8 @@ def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner
         given = Assignment((Task.PREPARE, Task.REST), (facts, off), (retreat, False))
         target = planner.targets(given, [away, away], q, STEP)[0]
         if retreat:
-            assert target.corridor is None and target.position_weight == 1.0
+            assert target.corridor is None
+            assert target.position_weight == 1.0
             assert target.passage is None
             continue
         assert target.position_weight == p.near_position

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.dressing.coordinates import ArmAxis
-
-FloatArray = npt.NDArray[np.float64]
 
 HAND = np.array([0.05, 0.60, 1.00])
 ELBOW = np.array([-0.05, 0.38, 1.20])

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import (
     _apex,
@@ -18,8 +20,6 @@ from drake_dress.models.dressing.linking import (
     linking_number,
 )
 from drake_dress.models.dressing.linking import _distance as _distance_of_points
-
-FloatArray = npt.NDArray[np.float64]
 
 SHOULDER = np.array([0.0, 0.18, 1.40])
 ELBOW = np.array([-0.05, 0.38, 1.20])
@@ -78,7 +78,7 @@ def test_apex_of_the_fan_is_next_to_the_centre_but_not_on_the_arm(radius: float)
         loop, turned = ring(center, ELBOW - HAND, radius) @ rotation.T, line @ rotation.T
         apex = _apex(loop, turned)
         assert np.linalg.norm(apex - loop.mean(axis=0)) < 2e-6 * radius
-        for p, q in zip(turned[:-1], turned[1:], strict=True):
+        for p, q in itertools.pairwise(turned):
             assert _aside(apex, p, q) / np.linalg.norm(q - p) > 1e-7 * radius
 
 

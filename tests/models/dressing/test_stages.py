@@ -99,9 +99,11 @@ def test_an_armhole_that_lingers_at_a_hand_is_taken_back() -> None:
     # and one that has the arm in it does not linger
     inside = facts(linked=True, s=0.1, hand=0.05)
     on, _ = advance_stages(state, (inside, facts()), P, FAR, P.lingering_timeout + 0.1)
-    assert on.attempts == (0, 0) and on.close_since[0] is None
+    assert on.attempts == (0, 0)
+    assert on.close_since[0] is None
     back, _ = advance_stages(state, (at, facts()), P, FAR, P.lingering_timeout + 0.1)
-    assert back.attempts == (1, 0) and back.stage[0] == Stage.PREPARE
+    assert back.attempts == (1, 0)
+    assert back.stage[0] == Stage.PREPARE
     assert back.close_since == (None, None)
 
 
@@ -127,7 +129,8 @@ def test_after_misses_of_the_first_hand_both_sleeves_are_taken_back_and_tried_an
         barred = replace(facts(hand=0.3), sight=0.1)
         after = time + P.withdrawal_time + P.barred_timeout
         waits, tasks = advance_stages(state, (barred, facts()), P, FAR, after - 0.1)
-        assert tasks == (Task.PREPARE, Task.REST) and waits.attempts == state.attempts
+        assert tasks == (Task.PREPARE, Task.REST)
+        assert waits.attempts == state.attempts
         gone, _ = advance_stages(state, (barred, facts()), P, FAR, after + 0.1)
         assert gone.attempts[0] == k + 1
 
@@ -179,14 +182,16 @@ def test_a_hand_that_was_seen_by_is_seen_by_for_a_while() -> None:
 
     def sight(state: StageState, fact: SleeveFacts, time: float) -> float:
         _, (other, found) = look(state, (facts(), fact), P, time)
-        assert other == facts() and replace(found, sight=fact.sight) == fact
+        assert other == facts()
+        assert replace(found, sight=fact.sight) == fact
         return found.sight
 
     assert sight(StageState(), barred, 0.1) == 0.0
     state, kept = look(StageState(), (facts(), sees), P, 1.0)
     assert kept == (facts(), sees)
     soon, late = 1.0 + 0.9 * P.sight_time, 1.0 + 1.1 * P.sight_time
-    assert sight(state, barred, soon) == 1.0 and sight(state, barred, late) == 0.0
+    assert sight(state, barred, soon) == 1.0
+    assert sight(state, barred, late) == 0.0
     assert sight(state, far, soon) == 0.0
     assert sight(state, replace(barred, linked=True), soon) == 0.0
     # seen again meanwhile
@@ -210,7 +215,8 @@ def test_a_sleeve_that_rests_has_not_missed_its_hand() -> None:
     on = facts(linked=True, s=P.waiting_progress)
     for time in np.arange(begun + 0.5, begun + P.barred_timeout, 0.5):
         state, tasks = advance_stages(state, (on, barred), P, FAR, float(time))
-        assert tasks[0] == Task.WAIT and state.attempts[1] == 0
+        assert tasks[0] == Task.WAIT
+        assert state.attempts[1] == 0
     state, _ = advance_stages(state, (on, barred), P, FAR, begun + P.barred_timeout + 0.6)
     assert state.attempts[1] == 1
     # one that rests again, while the first sleeve has slipped down, keeps away as it was told to
@@ -218,7 +224,8 @@ def test_a_sleeve_that_rests_has_not_missed_its_hand() -> None:
     began = state.since[1]
     for after in np.arange(0.1, P.retreat_time, 0.4):
         state, tasks = advance_stages(state, (slipped, barred), P, FAR, began + float(after))
-        assert tasks == (Task.WAIT, Task.REST) and retreats(state, 1, P, began + float(after))
+        assert tasks == (Task.WAIT, Task.REST)
+        assert retreats(state, 1, P, began + float(after))
     assert not retreats(state, 1, P, began + P.retreat_time)
 
 
@@ -378,7 +385,8 @@ def test_a_second_sleeve_that_missed_again_and_again_is_swung_back_for_a_while()
         # the hand was passed, and the armhole is in line again
         state, _ = advance_stages(state, (on, replace(off, prepared_error=0.0)), P, FAR, 20.0 * k)
         state, _ = advance_stages(state, (on, replace(off, passed=1.0)), P, FAR, 20.0 * k + 1.0)
-        assert state.attempts == (0, k) and state.stage[1] == Stage.PREPARE
+        assert state.attempts == (0, k)
+        assert state.stage[1] == Stage.PREPARE
         swung.append(swings(state, 1, (on, off), P, 20.0 * k + 1.0))
         assert not swings(state, 0, (on, off), P, 20.0 * k + 1.0)
         assert not swings(state, 1, (on, off), P, 20.0 * k + 1.1 + P.swing_time)

@@ -1,5 +1,6 @@
 """Effects act alike in the two schemes that simulate a plant."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -96,4 +97,4 @@ def test_contact_effects_slow_a_sheet_that_slides(scheme, effect):
         c = effect.rate
         expected = (0.5 + mu / c) * np.exp(-g * c * t) - mu / c
     assert speeds[-1] == pytest.approx(max(expected, 0.0), abs=0.03)
-    assert all(b <= a + 1e-9 for a, b in zip(speeds, speeds[1:], strict=False))
+    assert all(b <= a + 1e-9 for a, b in itertools.pairwise(speeds))

@@ -136,4 +136,5 @@ def test_docstrings_name_every_parameter(name):
     kind = EFFECTS[name]
     for p in kind.parameters():
         assert f"{p.name}:" in kind.__doc__
-        assert p.low <= p.off <= p.high and p.typical > 0.0
+        assert p.low <= p.off <= p.high
+        assert p.typical > 0.0

@@ -109,7 +109,7 @@ def test_a_local_mass_pulls_with_its_weight_where_it_sits():
 
 
 def test_stretch_halves_where_stiffness_doubles():
-    soft, garment = hung([])
+    soft, _garment = hung([])
     hard, _ = hung([StretchStiffness(added=MATERIAL.stretch_stiffness)])
     x, _ = sheet_mesh()
     drop = x[:, 2].min() - soft.x[:, 2].min(), x[:, 2].min() - hard.x[:, 2].min()
@@ -118,7 +118,7 @@ def test_stretch_halves_where_stiffness_doubles():
 
 def test_warp_stiffness_adds_along_the_warp_only():
     """Down the warp k + k_a bears the load, across it k alone."""
-    plain, garment = hung([])
+    plain, _garment = hung([])
     warp, stiff = hung([AnisotropicStiffness(warp=MATERIAL.stretch_stiffness)])
     x, _ = sheet_mesh()
     drop = x[:, 2].min() - plain.x[:, 2].min(), x[:, 2].min() - warp.x[:, 2].min()
@@ -263,7 +263,7 @@ def test_friction_across_and_along_the_warp_differ_as_the_contrast_says():
     assert speeds[1] == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("strength, stays", [(1.2, True), (0.8, False)])
+@pytest.mark.parametrize(("strength", "stays"), [(1.2, True), (0.8, False)])
 def test_cloth_hangs_from_a_ceiling_it_clings_to(strength, stays):
     from drake_dress.models.cloth.contact.obstacles import HalfSpaces
 
@@ -288,7 +288,9 @@ def test_limbs_grow_and_the_trunk_does_not():
     assert after.chest_width == before.chest_width
 
 
-@pytest.mark.parametrize("kind, name", [(GripperCompliance, "gripper"), (LimbCompliance, "limb")])
+@pytest.mark.parametrize(
+    ("kind", "name"), [(GripperCompliance, "gripper"), (LimbCompliance, "limb")]
+)
 def test_a_compliant_mount_comes_to_rest_at_compliance_times_force(kind, name):
     force = np.array([[1.0, 0.0, -3.0], [0.0, 2.0, 0.0]])
     limbs = np.vstack([force, force])

@@ -52,7 +52,8 @@ def check_smooth(states: list[ArmState], hand: np.ndarray) -> None:
     rates = np.diff(angles, axis=0) / STEP
     assert np.abs(rates).max() <= P.max_joint_speed + 1e-9
     assert np.abs(np.diff(rates, axis=0)).max() <= 30.0 * STEP + 1e-9
-    assert (angles >= LIMITS[0]).all() and (angles <= LIMITS[1]).all()
+    assert (angles >= LIMITS[0]).all()
+    assert (angles <= LIMITS[1]).all()
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=1) / STEP
     assert speed.max() < 1.05 * P.max_hand_speed
 
@@ -104,13 +105,15 @@ def test_reach_goes_through_an_armhole_that_is_near_and_then_follows() -> None:
     np.testing.assert_allclose(hand[: int(0.5 / STEP)], np.tile(rest, (125, 1)), atol=1e-12)
     wants = [s.want for s in states]
     assert Want.REACH in wants
-    assert states[-1].through and states[-1].want is Want.FOLLOW
+    assert states[-1].through
+    assert states[-1].want is Want.FOLLOW
     offset = hand - center
     unit = into / np.linalg.norm(into)
     depth = offset @ unit
     beside = np.linalg.norm(offset - depth[:, None] * unit, axis=1)
     passed = int(np.argmax(depth > 0.0))
-    assert depth[passed] > 0.0 and beside[passed] < 0.05
+    assert depth[passed] > 0.0
+    assert beside[passed] < 0.05
     assert 0.02 < depth[-1] < 0.08
     assert np.linalg.norm(hand[-1] - hand[-250]) < 1e-3
 
@@ -134,7 +137,8 @@ def test_armhole_that_goes_away_is_given_up_and_the_hand_goes_back() -> None:
     states, hand = play([Reach()], 5.0, leaving)
     check_smooth(states, hand)
     assert np.linalg.norm(hand - rest, axis=1).max() > 0.02
-    assert states[-1].want is Want.FOLLOW and not states[-1].through
+    assert states[-1].want is Want.FOLLOW
+    assert not states[-1].through
     assert np.linalg.norm(hand[-1] - rest) < 0.005
 
 
@@ -183,5 +187,5 @@ def test_motions_that_overlap_blend() -> None:
 
 
 def test_motions_of_the_other_hand_are_not_for_this_one() -> None:
-    states, hand = play([Wave(start=0.0, sides=("right",))], 1.0)
+    states, _hand = play([Wave(start=0.0, sides=("right",))], 1.0)
     np.testing.assert_array_equal(states[-1].set_point, REST)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
     SIDES,
     ArmPose,
@@ -21,7 +21,6 @@ from drake_dress.models.human.body import (
     shoulder_joint,
 )
 
-FloatArray = npt.NDArray[np.float64]
 M = BodyMeasures()
 POSTURES: tuple[Posture, Posture] = ("standing", "sitting")
 OUT = {"left": 1.0, "right": -1.0}

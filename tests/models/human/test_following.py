@@ -1,5 +1,7 @@
 """Who lets itself be led gives way, stays, and never pushes the leader round."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -96,7 +98,7 @@ def test_leader_never_gains_on_the_way(seed: int) -> None:
     t = np.arange(0.0, 2.0, STEP)
     path = random_cycle(np.random.default_rng(seed), t)
     s, gained, most = REST.copy(), 0.0, -np.inf
-    for before, after in zip(path[:-1], path[1:], strict=True):
+    for before, after in itertools.pairwise(path):
         middle = 0.5 * (before + after)
         gained += float(pull(s, middle) @ (after - before))
         s = s + STEP * rate(s, middle, p)
@@ -115,7 +117,7 @@ def test_closed_cycle_costs_the_leader_work(seed: int, back: float | None) -> No
     s, step = REST.copy(), 4.0 / 600
     for _ in range(4):
         start, gained = s.copy(), 0.0
-        for before, after in zip(path[:-1], path[1:], strict=True):
+        for before, after in itertools.pairwise(path):
             middle = 0.5 * (before + after)
             gained += float(pull(s, middle) @ (after - before))
             s = s + step * rate(s, middle, p)

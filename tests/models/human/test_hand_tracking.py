@@ -74,7 +74,8 @@ def test_hinges_at_their_limit_are_not_driven_outward() -> None:
     angles = np.array([0.2, 1.2, 0.0, 0.0])
     backward = ARM.hand(angles) + [-0.3, 0.0, 0.3]
     rate = tracking_rate(ARM, angles, backward, np.zeros(3), REST, bounds(angles), SPEED)
-    assert rate[1] <= 1e-12 and rate[3] >= -1e-12
+    assert rate[1] <= 1e-12
+    assert rate[3] >= -1e-12
     assert np.abs(rate).max() > 0.1
 
 
@@ -86,7 +87,8 @@ def test_hand_and_joints_keep_their_speeds_wherever_the_hand_is_sent() -> None:
         rate = tracking_rate(
             ARM, angles, rng.uniform(-2.0, 2.0, 3), np.zeros(3), REST, allowed, SPEED
         )
-        assert (rate >= allowed[0] - 1e-12).all() and (rate <= allowed[1] + 1e-12).all()
+        assert (rate >= allowed[0] - 1e-12).all()
+        assert (rate <= allowed[1] + 1e-12).all()
         assert np.linalg.norm(ARM.jacobian(angles) @ rate) <= SPEED + 1e-9
 
 

@@ -71,7 +71,7 @@ def test_torque_shakes_a_linear_arm_by_the_stated_amplitude() -> None:
 
 
 def test_unusable_parameters_are_told() -> None:
-    with pytest.raises(UserError, match="amplitude: is -0.1 m"):
+    with pytest.raises(UserError, match=r"amplitude: is -0\.1 m"):
         TremorParameters(amplitude=-0.1)
-    with pytest.raises(UserError, match="frequency: is 0.0 Hz"):
+    with pytest.raises(UserError, match=r"frequency: is 0\.0 Hz"):
         TremorParameters(frequency=0.0)

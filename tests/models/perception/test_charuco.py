@@ -96,7 +96,8 @@ def test_corners_are_found_in_a_picture_and_none_in_another() -> None:
     canvas = np.full((480, 640), 128, dtype=np.uint8)
     canvas[60 : 60 + picture.shape[0], 80 : 80 + picture.shape[1]] = picture
     corners = find_corners(canvas, BOARD)
-    assert corners is not None and len(corners.points) == 24
+    assert corners is not None
+    assert len(corners.points) == 24
     expected = corners.points[:, :2] / BOARD.square * 60.0 + [79.5, 59.5]
     np.testing.assert_allclose(corners.pixels, expected, atol=0.6)
     assert find_corners(np.full((480, 640), 128, dtype=np.uint8), BOARD) is None

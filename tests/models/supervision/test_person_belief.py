@@ -155,7 +155,8 @@ def test_an_elbow_that_bends_backward_is_told() -> None:
     angle, low, high = map(int, found.groups()[1:])
     # wider than the joint's limits: by a supple person's room, and by what errors of points turn
     limit = np.degrees([bound[JOINT_NAMES.index(found[1])] for bound in (LOW, HIGH)])
-    assert limit[0] - 180.0 < low < limit[0] - 9.0 and limit[1] + 9.0 < high < limit[1] + 180.0
+    assert limit[0] - 180.0 < low < limit[0] - 9.0
+    assert limit[1] + 9.0 < high < limit[1] + 180.0
     assert not low <= angle <= high
 
 
@@ -253,7 +254,8 @@ def test_a_frozen_hand_is_told_by_name() -> None:
             held = x[2].copy() if held is None else held
             x[2] = held
         found, track = judge_person(x, PERIOD * k, track, BOUNDS)
-    assert found is not None and found.fault is Fault.FROZEN
+    assert found is not None
+    assert found.fault is Fault.FROZEN
     assert found.reason.startswith("left hand the same to the last bit for 0.")
 
 

@@ -44,7 +44,8 @@ def test_arms_move_once_all_have_been_sound_for_a_while() -> None:
 def test_any_fault_holds_at_once_and_passes() -> None:
     state, now = permitted()
     state = supervise(state, STALE, now + PERIOD, PATIENCE)
-    assert not state.permitted and state.ended_by is None
+    assert not state.permitted
+    assert state.ended_by is None
     state, now = after(state, SOUND, now + PERIOD, 0.25)
     assert state.permitted
     assert state.faults == SOUND
@@ -55,7 +56,8 @@ def test_a_source_that_comes_and_goes_ends_a_run_as_well() -> None:
     for _ in range(29):
         state, now = after(state, (Fault.NONE, Fault.LEAP), now, 0.02)
         state, now = after(state, SOUND, now, 0.08)
-        assert state.ended_by is None and not state.permitted
+        assert state.ended_by is None
+        assert not state.permitted
     state, now = after(state, (Fault.NONE, Fault.LEAP), now, 0.15)
     assert state.ended_by == 1
 
@@ -78,7 +80,8 @@ def test_a_run_ends_when_patience_does(fault: Fault, time: float) -> None:
     assert state.ended_by == 1
     # what has ended stays so
     state, _ = after(state, SOUND, later, 1.0)
-    assert state.ended_by == 1 and not state.permitted
+    assert state.ended_by == 1
+    assert not state.permitted
 
 
 @given(st.lists(st.sampled_from([*Fault]), min_size=1, max_size=60))
@@ -86,7 +89,8 @@ def test_nothing_is_permitted_while_anything_is_wrong(faults: list[Fault]) -> No
     state, now = permitted()
     for k, fault in enumerate(faults):
         state = supervise(state, (fault, Fault.NONE), now + 0.05 * k, PATIENCE)
-        assert fault and not state.permitted
+        assert fault
+        assert not state.permitted
 
 
 @given(

@@ -16,10 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
 from drake_dress.models.cloth.contact.distance import nearest_other
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 
 # Between surfaces that face each other more directly a node has no way out, only a place: -c.
 _FACING = 0.97

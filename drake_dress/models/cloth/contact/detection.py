@@ -13,6 +13,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.distance import (
     distance_to,
     first_touch,
@@ -21,7 +22,6 @@ from drake_dress.models.cloth.contact.distance import (
     surface_frame,
 )
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.vectors import largest_length
 
 # A node so near to a surface, m, lies there while others are judged (those that slide on something

@@ -11,7 +11,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 # Farther than any garment is from anything, m.
 _FAR = 1e9
@@ -375,7 +375,7 @@ def normal_derivative(
     out: FloatArray,
 ) -> None:
     """Writes (k,3) the derivative of n̄·n with respect to the points `x` (k,3)."""
-    a, b, radius, point, plane, solids = shapes
+    a, b, radius, point, _, solids = shapes
     m, k = radius.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))

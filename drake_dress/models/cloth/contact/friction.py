@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 
 # A node within this gap lies on the surface, m.

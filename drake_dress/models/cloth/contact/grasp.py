@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import FloatArray, IntArray
 
 # A patch between two bodies is brought out of one after the other, at most this often.
 _MOST = 16

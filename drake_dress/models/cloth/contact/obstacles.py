@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
-from drake_dress.models.cloth.elements import FloatArray
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import trimesh
 from scipy import ndimage
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
-from drake_dress.models.cloth.elements import FloatArray
 
 # Beyond the mesh the grid reaches this far, m, at least: garments are looked at before they touch.
 _PADDING = 0.10

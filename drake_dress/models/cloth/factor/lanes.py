@@ -17,7 +17,7 @@ EIGHT = (0.0,) * 8
 _FUSED = ("contract",)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def load(typing_context: Any, work: Any, i: Any, like: Any) -> Any:
     """Returns the first numbers of row `i` of a C-contiguous array."""
 
@@ -28,7 +28,7 @@ def load(typing_context: Any, work: Any, i: Any, like: Any) -> Any:
     return like(work, i, like), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def store(typing_context: Any, work: Any, i: Any, a: Any) -> Any:
     """Writes the tuple `a` to the first numbers of row `i`."""
 
@@ -41,7 +41,7 @@ def store(typing_context: Any, work: Any, i: Any, a: Any) -> Any:
     return types.void(work, i, a), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def times(typing_context: Any, s: Any, a: Any) -> Any:
     """Returns s a."""
 
@@ -52,13 +52,13 @@ def times(typing_context: Any, s: Any, a: Any) -> Any:
     return a(s, a), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def less(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
     """Returns a − s b."""
     return a(a, s, b), _fused("fsub")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def more(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
     """Returns a + s b."""
     return a(a, s, b), _fused("fadd")

@@ -18,7 +18,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.kernels import (
     eliminate,
     factorize,

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from drake_dress.models.cloth.elements import IntArray
+from drake_dress.models.arrays import IntArray
 
 # Time of a row of a block of one, two and four columns, and of a block, in rows of one column.
 _COST = np.array([0.0, 1.0, 1.15, 0.0, 1.4])

@@ -13,7 +13,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import IntArray
+from drake_dress.models.arrays import IntArray
 from drake_dress.models.cloth.factor.masked import Factor, restricted_solve, solve_into
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
 from drake_dress.models.cloth.matrices import Csr

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.filtered_cg import SystemMatrix, matrix_product
 from drake_dress.models.cloth.filtered_stiffness import (
     filtered_derivative,

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
 # One of the solutions of a step, of a type that its scheme chooses; its `free` (n,3) is what it is
 # without contact.

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP
 
 _MOST_PASSES = 60

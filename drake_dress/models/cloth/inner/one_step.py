@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
 from drake_dress.models.cloth.inner.binding import (
@@ -267,8 +267,10 @@ class OneStepSystem:
         self, forward: ForcedUnknown, backward: ForcedUnknown, target: FloatArray, slip: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
-        assert forward.multiplier is not None and forward.at_nodes is not None
-        assert backward.multiplier is not None and backward.at_nodes is not None
+        assert forward.multiplier is not None
+        assert forward.at_nodes is not None
+        assert backward.multiplier is not None
+        assert backward.at_nodes is not None
         return directions_of_exact(
             forward.multiplier,
             forward.at_nodes,

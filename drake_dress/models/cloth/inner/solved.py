@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.interface import directions_of_exact
@@ -129,7 +129,8 @@ class FilteredSystem(ABC):
         self, forward: Solved, backward: Solved, target: FloatArray, slip: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `StepSystem`."""
-        assert forward.multiplier is not None and backward.multiplier is not None
+        assert forward.multiplier is not None
+        assert backward.multiplier is not None
         z, back_z = forward.z[self._nodes], backward.z[self._nodes]
         return directions_of_exact(forward.multiplier, z, backward.multiplier, back_z, target, slip)
 

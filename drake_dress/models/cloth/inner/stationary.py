@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.one_step import OneStep, OneStepSystem
 from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved

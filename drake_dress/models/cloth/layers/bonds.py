@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
 # Pull of pairs, by the push of the others, from which a step is solved again.
 _PULLING = 0.2
@@ -114,8 +114,6 @@ class ActingBonds:
         Far: pairs that pull do so with a share of what the others push with, or pairs that did not
         act come much too close.
         """
-        if not len(self):
-            return False
         lacking = self._bonds.lacking(velocity)
         acting = lacking > 0.0
         if np.array_equal(acting, self._acted):

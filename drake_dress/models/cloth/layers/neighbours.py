@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.layers.closest import EDGE_EDGE, NODE_TRIANGLE, closest, offset
 from drake_dress.models.cloth.layers.meetings import Meetings, squared
 from drake_dress.models.cloth.layers.motion import Motion

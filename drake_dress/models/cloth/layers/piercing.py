@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 
 
 def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArray:

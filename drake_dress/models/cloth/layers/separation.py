@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.layers.motion import Motion, relative_motion
 from drake_dress.models.cloth.layers.neighbours import PairFinder, Pairs, Passing
 from drake_dress.models.cloth.layers.passes import (

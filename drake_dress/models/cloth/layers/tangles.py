@@ -24,7 +24,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from drake_dress.models.cloth.elements import BoolArray, Elements, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.layers.closest import NODE_TRIANGLE
 from drake_dress.models.cloth.layers.neighbours import Pairs, Passing
 from drake_dress.models.cloth.layers.passes import MOST_LEVER

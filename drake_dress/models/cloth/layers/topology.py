@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, IntArray
+from drake_dress.models.arrays import IntArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.layers.piercing import within_rings
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 # Weight of a node whose motion is prescribed, by the zone's free mass.
 _PRESCRIBED = 1e8

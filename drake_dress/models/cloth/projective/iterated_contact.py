@@ -27,9 +27,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK
 from drake_dress.models.cloth.projective import active_set
 

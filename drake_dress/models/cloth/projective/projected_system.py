@@ -15,7 +15,7 @@ import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
-from drake_dress.models.cloth.elements import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.matrices import Csr

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.vectors import dot
 
 # A pair is kept if s·y is at least this share of ‖s‖ ‖y‖: without curvature it has no inverse.

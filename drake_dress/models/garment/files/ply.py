@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import IndexArray
 from drake_dress.models.garment.files.ply_rows import (
     Element,
     Rows,
@@ -15,7 +16,7 @@ from drake_dress.models.garment.files.ply_rows import (
     read_text,
 )
 from drake_dress.models.garment.files.polygons import triangulated
-from drake_dress.models.garment.files.raw import IndexArray, RawMesh, too_many
+from drake_dress.models.garment.files.raw import RawMesh, too_many
 
 _LIST_NAMES = ("vertex_indices", "vertex_index")
 _END = re.compile(rb"^end_header[ \t]*(\r\n|\n|\r)", re.MULTILINE)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IndexArray = npt.NDArray[np.int64]
+from drake_dress.models.arrays import FloatArray, IndexArray
+
 MaskArray = npt.NDArray[np.bool_]
 
 # Sine of a corner's angle, below which it counts as straight.

@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IndexArray
 
-FloatArray = npt.NDArray[np.float64]
-IndexArray = npt.NDArray[np.int64]
 MaskArray = npt.NDArray[np.bool_]
 
 

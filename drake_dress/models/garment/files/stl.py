@@ -36,7 +36,7 @@ def read_stl(data: bytes, source: str, most_faces: int) -> RawMesh:
         if len(data) == start + _TRIANGLE * count:
             return _binary(data, source)
     text = data[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if text[:5].lower() == b"solid" and b"\0" not in text or 0 in data[1:4]:
+    if (text[:5].lower() == b"solid" and b"\0" not in text) or 0 in data[1:4]:
         return _text(decoded(data, source), source, most_faces)
     if len(data) < start:
         raise UserError(source, "", f"{len(data)} bytes are too few for an STL file")

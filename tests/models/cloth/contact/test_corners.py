@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.corners import held_off_corners
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.distance import nearest_other
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import sheet_elements
@@ -65,7 +65,8 @@ def test_the_nearest_other_body_is_the_second_of_all(seed: int) -> None:
     near = find_proximity(x, bodies, 0.0)
     distance, other = np.empty(20), np.empty(20, dtype=np.int32)
     nearest_other(x, bodies.packed, near.owner, distance, other)
-    assert (other != near.owner).all() and (distance >= near.gap).all()
+    assert (other != near.owner).all()
+    assert (distance >= near.gap).all()
     for i in range(20):
         rest = [k for k in range(4) if k != near.owner[i]]
         keep = Obstacles.resting(bodies.a[rest], bodies.b[rest], bodies.radius[rest])
@@ -81,7 +82,8 @@ def test_apart_from_hollows_nothing_changes() -> None:
     near = find_proximity(x, bodies, MARGIN)
     after = held_off_corners(near, x, bodies, MARGIN)
     changed = after.gap != near.gap
-    assert changed.any() and not changed.all()
+    assert changed.any()
+    assert not changed.all()
     # what is outside, or deep in one body and far from the other
     distance, other = np.empty(500), np.empty(500, dtype=np.int32)
     nearest_other(x, bodies.packed, near.owner, distance, other)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.elements import FloatArray
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import NO_NODES, sheet_elements

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.distance import normal_derivative
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
-from drake_dress.models.cloth.elements import FloatArray
 
 RADIUS = 0.08
 

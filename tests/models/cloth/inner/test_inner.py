@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray
+from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
 from drake_dress.models.cloth.material import Material

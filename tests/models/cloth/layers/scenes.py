@@ -6,7 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray, make_elements
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.layers.piercing import within_rings
 from tests.models.cloth.sheets import sheet
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drake_dress.models.cloth.elements import FloatArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.layers.closest import closest, offset, separation
 from drake_dress.models.cloth.layers.motion import relative_motion
 from drake_dress.models.cloth.layers.neighbours import PairFinder

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.elements import Elements, FloatArray, IntArray, make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.cloth.layers import LayerSeparation, SeparationRecord, piercing_edges
@@ -93,7 +94,7 @@ class _Run:
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "explicit"])
-@pytest.mark.parametrize("h, duration", [(2e-3, 0.3), (1e-2, 1.2)])
+@pytest.mark.parametrize(("h", "duration"), [(2e-3, 0.3), (1e-2, 1.2)])
 def test_sheet_falls_onto_a_sheet_and_stays_there(scheme: str, h: float, duration: float) -> None:
     x, e, rim, upper = two_sheets(9, 0.03, 0.02)
     run = _Run(scheme, h, x, e, rim)
@@ -197,7 +198,8 @@ def test_rigid_motion_changes_nothing() -> None:
         dx = x @ _turn((1.0, 2.0, -1.0), 0.4).T - x + [0.3, -20.0, 0.1]
         after, record = separation.correct(x, dx, w)
         np.testing.assert_array_equal(after, dx)
-        assert record.impulse_count == 0 and record.zones == 0
+        assert record.impulse_count == 0
+        assert record.zones == 0
 
 
 def test_motion_seen_from_another_frame_is_corrected_alike() -> None:
@@ -218,7 +220,8 @@ def test_garment_without_contact_comes_back_bit_for_bit() -> None:
     dx = 0.01 * np.sin(9.0 * x[:, [1, 2, 0]]) - 0.0
     after, record = LayerSeparation(e).correct(x, dx, np.ones(len(x)))
     np.testing.assert_array_equal(after.view(np.int64), dx.view(np.int64))
-    assert record.pairs == 0 and not record.rate_change.any()
+    assert record.pairs == 0
+    assert not record.rate_change.any()
 
 
 def test_impulses_between_free_nodes_keep_momentum() -> None:
@@ -324,7 +327,8 @@ def test_nodes_that_can_hardly_be_moved_are_not_thrown() -> None:
     barred = np.zeros_like(x)
     barred[::2] = [1e-5, 0.0, 1.0]
     after, record = LayerSeparation(e).correct(x, dx, w, barred)
-    assert record.impulse_count > 0 and record.crossing > 0
+    assert record.impulse_count > 0
+    assert record.crossing > 0
     assert np.abs(after - dx).max() < 0.05
 
 
@@ -345,7 +349,9 @@ def test_zones_alone_prevent_crossing(monkeypatch: pytest.MonkeyPatch) -> None:
     dx = rng.normal(scale=4e-3, size=x.shape)
     assert len(piercing_edges(x + dx, e, rings=1)) > 0
     after, record = LayerSeparation(e).correct(x, dx, 1.0 / mass)
-    assert record.impulse_count == 0 and record.zones > 0 and record.crossing == 0
+    assert record.impulse_count == 0
+    assert record.zones > 0
+    assert record.crossing == 0
     assert len(piercing_edges(x + after, e, rings=1)) == 0
     assert np.sum(mass[:, None] * after**2) <= np.sum(mass[:, None] * dx**2)
     np.testing.assert_allclose((mass[:, None] * (after - dx)).sum(axis=0), 0.0, atol=1e-14)
@@ -388,7 +394,7 @@ def _replay(record: SeparationRecord, dx: FloatArray) -> tuple[FloatArray, Float
     return total @ record.frame.T, rate @ record.frame.T
 
 
-@pytest.mark.parametrize("size, passes", [(2e-3, 60), (2e-2, 60), (4e-3, 0)])
+@pytest.mark.parametrize(("size", "passes"), [(2e-3, 60), (2e-2, 60), (4e-3, 0)])
 def test_transpose_belongs_to_the_correction_with_pairs_held(
     size: float, passes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

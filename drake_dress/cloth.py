@@ -1,0 +1,72 @@
+"""Garments without Drake: make one, step it, roll it out, and go backward through it.
+
+    from drake_dress import cloth
+
+    coat = cloth.make_coat(cloth.CoatParameters(), spacing=0.03)
+    elements = cloth.make_elements(coat.rest_position, coat.faces)
+    plant = cloth.ImplicitCloth(elements, cloth.Material(), 0.01, coat.held)
+    state, _ = plant.step(cloth.ClothState.at_rest(coat.rest_position), ...)
+
+`ImplicitCloth` is the accurate scheme, `LayeredCloth` keeps its layers apart,
+`ExplicitBiasCloth` is the one with derivatives, and `cloth_step` is its step for torch (the `torch`
+extra). What stands in `__all__` is public.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from drake_dress.models.cloth.adjoint import Gradient
+from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
+from drake_dress.models.cloth.elements import Elements, make_elements
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.influences import Influences
+from drake_dress.models.cloth.layered import LayeredCloth
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.rollout import Rollout, RolloutGradient, roll_back, roll_out
+from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
+from drake_dress.models.garment.load import load_garment
+from drake_dress.models.garment.mesh import GarmentMesh
+
+if TYPE_CHECKING:
+    from drake_dress.models.cloth.torch_step import MATERIAL, cloth_step, material_tensor
+
+__all__ = [
+    "COATS",
+    "MATERIAL",
+    "ClothState",
+    "CoatParameters",
+    "Elements",
+    "ExplicitBiasCloth",
+    "GarmentMesh",
+    "Gradient",
+    "HalfSpaces",
+    "ImplicitCloth",
+    "Influences",
+    "LayeredCloth",
+    "Material",
+    "Obstacles",
+    "ProjectiveDynamicsCloth",
+    "Rollout",
+    "RolloutGradient",
+    "cloth_step",
+    "load_garment",
+    "make_coat",
+    "make_elements",
+    "material_tensor",
+    "roll_back",
+    "roll_out",
+]
+
+_OF_TORCH = ("MATERIAL", "cloth_step", "material_tensor")
+
+
+def __getattr__(name: str) -> Any:
+    """Imports torch with the first name that needs it."""
+    if name in _OF_TORCH:
+        from drake_dress.models.cloth import torch_step
+
+        return getattr(torch_step, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

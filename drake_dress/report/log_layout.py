@@ -1,0 +1,213 @@
+"""What a log is begun with: the constants of a run, and an empty series for each signal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.models.control.safety import Verdict
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.log_schema import (
+    ARM_SERIES,
+    CLEARANCES,
+    COMPLETE,
+    JOINT_NAMES,
+    LOOPS,
+    SCHEMA,
+    STAGE_NAMES,
+)
+
+_SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+_BULKY = 100  # numbers in a sample above which each sample is a compressed chunk of its own
+
+
+@dataclass(frozen=True)
+class LogContent:
+    """What a log says about a run as a whole; it decides which series the log has.
+
+    Attributes:
+        garment: the plant's.
+        scenario_text: the resolved scenario, YAML.
+        version: of drake_dress.
+        seed: of the run.
+        radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
+        joint_names: names of these six.
+        capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
+        estimate_garment: the controller's garment; None: its positions are not logged.
+        bases: X_WB (4,4) of each arm, where samples have arms.
+        estimated: whether garment and person are estimates because the truth is not known; there
+            is no contact then.
+    """
+
+    garment: GarmentMesh
+    scenario_text: str
+    version: str
+    seed: int
+    radius: npt.ArrayLike
+    joint_names: Sequence[str] = JOINT_NAMES
+    capsule_radius: npt.ArrayLike | None = None
+    estimate_garment: GarmentMesh | None = None
+    bases: Mapping[Side, npt.ArrayLike] | None = None
+    estimated: bool = False
+
+
+def begin_log(file: h5py.File, content: LogContent) -> dict[str, h5py.Dataset]:
+    """Writes the constants of a run to an empty file and creates its series.
+
+    Args:
+        file: open for writing.
+        content: what the log says about the run.
+
+    Returns:
+        The series by name, without samples; the first axis is that of the samples.
+    """
+    _write_attributes(file, content)
+    layout = _Layout(file)
+    layout.garment("/garment", content.garment)
+    layout.constant("/human/radius", np.asarray(content.radius, dtype=np.float64).reshape(6), "m")
+    _add_garment_and_person(layout, content)
+    _add_dressing(layout)
+    _add_control(layout)
+    layout.joints("/estimate/human/joint_position", content.joint_names)
+    if content.bases is not None:
+        _add_arms(layout, content.bases)
+    if content.estimate_garment is not None:
+        _add_estimated_garment(layout, content.estimate_garment)
+    if content.capsule_radius is not None:
+        _add_capsules(layout, content.capsule_radius)
+    return layout.series
+
+
+def label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:
+    """Writes unit and frame as attributes of a dataset, where they are given."""
+    if unit is not None:
+        dataset.attrs["unit"] = unit
+    if frame is not None:
+        dataset.attrs["frame"] = frame
+
+
+class _Layout:
+    """Creates the datasets of a log.
+
+    Attributes:
+        series: those with a row for each sample, by name.
+    """
+
+    def __init__(self, file: h5py.File) -> None:
+        self.series: dict[str, h5py.Dataset] = {}
+        self._file = file
+
+    def constant(
+        self, name: str, value: npt.NDArray[Any], unit: str | None = None, frame: str | None = None
+    ) -> None:
+        """Writes a dataset that does not change during the run."""
+        label(self._file.create_dataset(name, data=value), unit, frame)
+
+    def garment(self, group: str, garment: GarmentMesh) -> None:
+        """Writes a garment's mesh and its openings."""
+        self.constant(f"{group}/faces", np.asarray(garment.faces, dtype=np.int32))
+        rest = np.asarray(garment.rest_position, dtype=np.float64)
+        self.constant(f"{group}/rest_position", rest, "m", "garment")
+        for name in LOOPS:
+            self.constant(f"{group}/loops/{name}", np.asarray(garment.loops[name], dtype=np.int32))
+
+    def add(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        unit: str,
+        frame: str | None = None,
+        dtype: str = "f4",
+    ) -> h5py.Dataset:
+        """Returns a new series whose samples have this shape."""
+        bulky = int(np.prod(shape, dtype=int)) > _BULKY
+        # Compressed rows are a chunk each: a chunk that grew would move, and a killed process
+        # could leave the file pointing at its old place.
+        options: dict[str, Any] = (
+            {"compression": "gzip", "compression_opts": 1, "shuffle": True} if bulky else {}
+        )
+        dataset = self._file.create_dataset(
+            name,
+            shape=(0, *shape),
+            maxshape=(None, *shape),
+            chunks=(1 if bulky else _SMALL_CHUNK, *shape),
+            dtype=dtype,
+            **options,
+        )
+        label(dataset, unit, frame)
+        self.series[name] = dataset
+        return dataset
+
+    def joints(self, name: str, joint_names: Sequence[str]) -> None:
+        """Adds a series of the person's six joints."""
+        self.add(name, (6, 3), "m", "world", dtype="f8").attrs["names"] = list(joint_names)
+
+
+def _write_attributes(file: h5py.File, content: LogContent) -> None:
+    attributes = file.attrs
+    attributes["schema"] = SCHEMA
+    attributes["scenario"] = content.scenario_text
+    attributes["version"] = content.version
+    attributes["seed"] = content.seed
+    attributes[COMPLETE] = False
+    if content.estimated:
+        attributes["source"] = "estimate"
+
+
+def _add_garment_and_person(layout: _Layout, content: LogContent) -> None:
+    n = len(content.garment.rest_position)
+    layout.add("/time", (), "s", dtype="f8")
+    layout.add("/garment/position", (n, 3), "m", "world")
+    if not content.estimated:
+        layout.add("/garment/contact", (n,), "1", dtype="i1")
+        layout.add("/garment/contact_force", (n, 3), "N", "world")
+    layout.joints("/human/joint_position", content.joint_names)
+
+
+def _add_dressing(layout: _Layout) -> None:
+    """Adds grippers and dressing coordinates of both sides."""
+    for side in SIDES:
+        layout.add(f"/gripper/{side}/position", (3,), "m", "world", dtype="f8")
+        layout.add(f"/gripper/{side}/force", (3,), "N", "world", dtype="f8")
+        for name, unit in (("s", "1"), ("l", "m"), ("theta", "rad")):
+            layout.add(f"/dressing/{side}/{name}", (), unit, dtype="f8")
+
+
+def _add_control(layout: _Layout) -> None:
+    """Adds stages, what safety cut, and the controllers' solves."""
+    stage = layout.add("/control/stage", (2,), "1", dtype="i1")
+    stage.attrs["names"] = list(SIDES)
+    stage.attrs["values"] = list(STAGE_NAMES)
+    safety = layout.add("/control/safety", (2,), "1", dtype="i2")
+    safety.attrs["names"] = list(SIDES)
+    safety.attrs["flags"] = [f"{v.value} {v.name}" for v in Verdict]
+    for name in ("global", "local"):
+        layout.add(f"/control/{name}/solve_time", (), "s", dtype="f8")
+        layout.add(f"/control/{name}/solves", (), "1", dtype="i2")
+
+
+def _add_arms(layout: _Layout, bases: Mapping[Side, npt.ArrayLike]) -> None:
+    for side in SIDES:
+        layout.constant(f"/arm/{side}/base", np.asarray(bases[side], dtype=np.float64), "m")
+        for name, unit in ARM_SERIES:
+            layout.add(f"/arm/{side}/{name}", (7,), unit, dtype="f8")
+    layout.add("/arm/clearance", (3,), "m", dtype="f8").attrs["names"] = list(CLEARANCES)
+
+
+def _add_estimated_garment(layout: _Layout, garment: GarmentMesh) -> None:
+    layout.garment("/estimate/garment", garment)
+    m = len(garment.rest_position)
+    layout.add("/estimate/garment/position", (m, 3), "m", "world")
+
+
+def _add_capsules(layout: _Layout, radius: npt.ArrayLike) -> None:
+    capsules = np.asarray(radius, dtype=np.float64).ravel()
+    layout.constant("/human/capsule_radius", capsules, "m")
+    for end in "ab":
+        layout.add(f"/human/capsule_{end}", (len(capsules), 3), "m", "world", dtype="f8")
