@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.caches import user_cache
 from drake_dress.file_output import write_text
+from drake_dress.models.arrays import FloatArray
 
 # Share of the plans that are there within the time that is kept.
 SHARE = 0.95
@@ -18,7 +18,7 @@ _FILE = "plan_delay.json"
 LEAST = 40
 
 
-def keep_plan_delay(solve_time: npt.NDArray[np.float64]) -> tuple[float, Path]:
+def keep_plan_delay(solve_time: FloatArray) -> tuple[float, Path]:
     """Keeps within which time `SHARE` of the solves ended, s; returns it, and where it is kept.
 
     Args:

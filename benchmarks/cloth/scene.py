@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
@@ -67,7 +66,7 @@ class Scene:
         """Returns (n,3) velocities at the start, m/s."""
         return np.zeros_like(self.position) if self.velocity is None else self.velocity
 
-    def touching(self, x: FloatArray) -> npt.NDArray[np.bool_]:
+    def touching(self, x: FloatArray) -> BoolArray:
         """Returns (n,) which nodes of `x` lie on an obstacle, to a millimetre beyond the margin."""
         if not self.obstacles.count:
             return np.zeros(len(x), dtype=np.bool_)

@@ -19,6 +19,7 @@ from benchmarks.inputs.trials import Expect, Trial, place
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.models.arrays import BoolArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
@@ -47,7 +48,7 @@ class _Log:
 
     data: Data
     noise: dict[str, Any] = field(default_factory=dict)
-    spoilt: npt.NDArray[np.bool_] | None = None
+    spoilt: BoolArray | None = None
     units: dict[str, str] = field(default_factory=dict)
 
 

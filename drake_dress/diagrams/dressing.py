@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -255,9 +256,7 @@ def _add_local_inputs(
     w.connect(w.station, "estimate.joint_position", soon, "joint_position")
     w.connect(w.station, "estimate.garment_position", controller, "garment_position")
     w.connect(soon, "predicted_joint_position", controller, "predicted_joint_position")
-    for side in SIDES:
-        measured = f"{side}_gripper.position_measured"
-        w.connect(w.station, measured, controller, f"{side}_gripper_position")
+    _show_grippers(w, controller, "position")
 
 
 def _wire_governor(
@@ -266,11 +265,17 @@ def _wire_governor(
     w.connect(asking, "request_time", governor, "request_time")
     w.connect(w.station, "permission", governor, "permission")
     w.connect(w.station, "estimate.joint_position", governor, "joint_position")
+    _show_grippers(w, governor, "position", "force")
     for side in SIDES:
-        for quantity in ("position", "force"):
-            measured = f"{side}_gripper.{quantity}_measured"
-            w.connect(w.station, measured, governor, f"{side}_gripper_{quantity}")
         w.connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
+
+
+def _show_grippers(w: Wiring, system: Any, *quantities: str) -> None:
+    """Connects what the station measures of both grippers."""
+    for side in SIDES:
+        for quantity in quantities:
+            measured = f"{side}_gripper.{quantity}_measured"
+            w.connect(w.station, measured, system, f"{side}_gripper_{quantity}")
 
 
 def _add_arms(
@@ -343,10 +348,7 @@ def _add_recorder(
     w.connect(controllers.mpc, "stage", recorder, "stage")
     w.connect(controllers.mpc, "solve_time", recorder, "solve_time")
     w.connect(controllers.governor, "verdict", recorder, "verdict")
-    for side in SIDES:
-        for quantity in ("position", "force"):
-            measured = f"{side}_gripper.{quantity}_measured"
-            w.connect(w.station, measured, recorder, f"{side}_gripper_{quantity}")
+    _show_grippers(w, recorder, "position", "force")
 
 
 def _add_visualizer(w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, mpc: GlobalMpc) -> None:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.candidates import NEED_CONTACT
@@ -26,7 +25,7 @@ from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.discrepancy.workers import Workers
 from drake_dress.machine import worker_count
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.transfer import barycentric_transfer
 
@@ -69,7 +68,7 @@ class Window:
         marker: (W,m,3) m; disturbed: started a little off; None where that was not asked for.
     """
 
-    sample: npt.NDArray[np.int64]
+    sample: IndexArray
     time: FloatArray
     marker: FloatArray
     disturbed: FloatArray | None
@@ -277,7 +276,7 @@ def _replay(
     index: int,
     start: FloatArray,
     effects: tuple[Effect, ...],
-    samples: npt.NDArray[np.int64],
+    samples: IndexArray,
 ) -> Told:
     replayer = replayers[level, index]
     replayer.start_from(start)
@@ -330,7 +329,7 @@ def _run_free(
     return FreeRun(tuple(found), length, replayer.run(effects, 0.0).marker_position)
 
 
-def _samples(recording: Recording, period: float) -> npt.NDArray[np.int64]:
+def _samples(recording: Recording, period: float) -> IndexArray:
     """Returns the indices of samples at least `period` apart."""
     slots = np.floor((recording.time - recording.time[0]) / period + 1e-6)
     return np.flatnonzero(np.diff(slots, prepend=-1.0) > 0)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.attribution import (
     Comparison,
@@ -22,7 +21,7 @@ from drake_dress.discrepancy.attribution import (
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.search import Found, Model, Named, Search
 from drake_dress.discrepancy.whitening import Whitening, whiten
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect
 
 DISCRETISATION = "discretisation"
@@ -288,7 +287,7 @@ def _interval(
 ) -> tuple[float, float, float]:
     """Returns 1 − Σ after / Σ before over blocks, with its 90 % bootstrap interval."""
 
-    def gain(rows: npt.NDArray[np.int64]) -> float:
+    def gain(rows: IndexArray) -> float:
         whole = before[rows].sum()
         return float(1.0 - max(after[rows].sum(), 0.0) / whole) if whole > 0.0 else 0.0
 
@@ -298,7 +297,7 @@ def _interval(
     return gain(np.arange(count)), float(low), float(high)
 
 
-def _rms(values: FloatArray, rows: npt.NDArray[np.bool_], dimensions: int = 3) -> float:
+def _rms(values: FloatArray, rows: BoolArray, dimensions: int = 3) -> float:
     """Returns the RMS of vectors whose components are entries."""
     chosen = values[rows]
     return float(np.sqrt(dimensions * np.mean(chosen**2))) if len(chosen) else 0.0

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.candidates import bounded, shifted
 from drake_dress.discrepancy.experiment import Experiment, Level, level_of
@@ -17,7 +16,7 @@ from drake_dress.discrepancy.regression import (
     solve_pooled,
 )
 from drake_dress.discrepancy.whitening import NUMERICS_SHARE, Whitening
-from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect, Parameter
 
 # Levels of the recordings, effects.
@@ -291,9 +290,7 @@ def _trust(w: Whitening, residual: FloatArray, rows: BoolArray) -> FloatArray:
     return root
 
 
-def _robust_std(
-    columns: FloatArray, residual: FloatArray, block: npt.NDArray[np.int64]
-) -> FloatArray:
+def _robust_std(columns: FloatArray, residual: FloatArray, block: IndexArray) -> FloatArray:
     """Returns (k,) standard deviations when residuals within a block hang together.
 
     The sandwich (JᵀJ)⁻¹ Σ_b (J_bᵀ r_b)(J_bᵀ r_b)ᵀ (JᵀJ)⁻¹ of clustered least squares.

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 
 # Sightings that a parabola is fitted to, at least.
 _LEAST_SEEN = 3
@@ -55,7 +54,7 @@ class Recording:
 
 def smoothed(
     time: FloatArray, position: FloatArray, half_window: float = 0.045
-) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Returns position, velocity and where they are known, of points seen with gaps.
 
     A parabola is fitted to what was seen within the window around each time.
@@ -69,7 +68,7 @@ def smoothed(
         (T,m,3) m, (T,m,3) m/s, zero where not known, and (T,m).
     """
     count, markers = position.shape[:2]
-    seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=2))
+    seen: BoolArray = np.asarray(np.isfinite(position).all(axis=2))
     filled = np.where(seen[:, :, None], position, 0.0)
     x, v = np.zeros_like(filled), np.zeros_like(filled)
     known = np.zeros((count, markers), dtype=np.bool_)

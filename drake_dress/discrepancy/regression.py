@@ -13,10 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq, lsq_linear
 
-from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
 # Standard deviation of the factor of what halving the step has changed; exact time would be 1.
 _FACTOR = 1.0
@@ -37,7 +36,7 @@ class Extrapolation:
     """
 
     direction: FloatArray
-    voice: npt.NDArray[np.int64]
+    voice: IndexArray
 
     def without(self, values: FloatArray, rows: BoolArray) -> FloatArray:
         """Returns values (N,) or (N,k) less what the direction explains of them.
@@ -93,7 +92,7 @@ def solve_pooled(
     columns: FloatArray,
     reduced: FloatArray,
     residual: FloatArray,
-    voice: npt.NDArray[np.int64],
+    voice: IndexArray,
     low: FloatArray | float,
     high: FloatArray | float,
 ) -> Solution:
@@ -125,7 +124,7 @@ def misleading(
     columns: FloatArray,
     reduced: FloatArray,
     residual: FloatArray,
-    voice: npt.NDArray[np.int64],
+    voice: IndexArray,
 ) -> FloatArray:
     """Returns (k,) how far a residual moves the coefficients in one voice, in the mean square.
 
@@ -151,7 +150,7 @@ def _equations(
     columns: FloatArray,
     reduced: FloatArray,
     residual: FloatArray,
-    voice: npt.NDArray[np.int64],
+    voice: IndexArray,
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Returns normal matrices (k,k) and right-hand sides (k,) of the voices."""
     normals, rights = [], []

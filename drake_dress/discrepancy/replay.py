@@ -23,7 +23,7 @@ import scipy.sparse.linalg as sparse_linalg
 
 from drake_dress.discrepancy.lab import Lab
 from drake_dress.discrepancy.recording import Recording, smoothed
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import Influences
@@ -276,7 +276,7 @@ class Replayer:
         )
 
     @cached_property
-    def _joint_track(self) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    def _joint_track(self) -> tuple[FloatArray, FloatArray, BoolArray]:
         measured = self.recording.joint_position
         assert measured is not None
         if np.ptp(measured, axis=0).max() < 1e-6:

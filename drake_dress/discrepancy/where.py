@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.lab import PersonShape
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.whitening import Whitening
-from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 
@@ -48,7 +47,7 @@ def spots(
     recordings: Sequence[Recording],
     mesh: GarmentMesh,
     contact: Sequence[FloatArray],
-    samples: Sequence[npt.NDArray[np.int64]],
+    samples: Sequence[IndexArray],
     person: PersonShape,
 ) -> list[Spot]:
     """Returns all parts, worst first.
@@ -93,9 +92,7 @@ def worst(found: Sequence[Spot], most: int = 3) -> list[Spot]:
     return [s for kind in KINDS for s in [s for s in found if s.kind == kind][:most]]
 
 
-def limbs_touched(
-    recording: Recording, samples: npt.NDArray[np.int64], person: PersonShape
-) -> npt.NDArray[np.int64]:
+def limbs_touched(recording: Recording, samples: IndexArray, person: PersonShape) -> IndexArray:
     """Returns (S,m) the limb, of `person.LIMB_NAMES`, that each marker was seen on, or −1.
 
     Args:
@@ -132,7 +129,7 @@ def _parts(
     recordings: Sequence[Recording],
     mesh: GarmentMesh,
     contact: Sequence[FloatArray],
-    samples: Sequence[npt.NDArray[np.int64]],
+    samples: Sequence[IndexArray],
     person: PersonShape,
 ) -> Iterator[_Part]:
     """Yields all parts, one at a time since there are many; arguments as in `spots`."""
@@ -175,7 +172,7 @@ def _places(
 
 
 def _limbs(
-    recording: Recording, markers: BoolArray, limb: npt.NDArray[np.int64], person: PersonShape
+    recording: Recording, markers: BoolArray, limb: IndexArray, person: PersonShape
 ) -> Iterator[_Part]:
     """Yields the person's limbs.
 
@@ -191,7 +188,7 @@ def _limbs(
 
 
 def _phases(
-    recording: Recording, markers: BoolArray, phase: npt.NDArray[np.int64], touching: BoolArray
+    recording: Recording, markers: BoolArray, phase: IndexArray, touching: BoolArray
 ) -> Iterator[_Part]:
     """Yields the phases of the motion, with contact and without.
 
@@ -222,7 +219,7 @@ def _among(rows: BoolArray, chosen: BoolArray) -> BoolArray:
     return narrowed
 
 
-def _phase(recording: Recording, samples: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _phase(recording: Recording, samples: IndexArray) -> IndexArray:
     """Returns (S,) at rest (0), slow (1) or fast (2), by the grippers' speed at these samples."""
     speed = _speed(recording)[samples]
     return np.where(speed < _STILL, 0, np.where(speed < _FAST, 1, 2))
@@ -235,7 +232,7 @@ def _speed(recording: Recording) -> FloatArray:
     return speed
 
 
-def _regions(mesh: GarmentMesh, points: FloatArray) -> npt.NDArray[np.int64]:
+def _regions(mesh: GarmentMesh, points: FloatArray) -> IndexArray:
     """Returns (m,) the region of the node nearest to each point (m,3) of the rest shape."""
     distance = np.linalg.norm(points[:, None] - mesh.rest_position[None], axis=2)
     return mesh.region[distance.argmin(axis=1)].astype(np.int64)

@@ -23,7 +23,7 @@ from scipy.ndimage import uniform_filter1d
 
 from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.recording import Recording
-from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
 # Share of the difference between scenario and refined replay that the refined one may still be off.
 NUMERICS_SHARE = 0.45
@@ -51,16 +51,16 @@ class Whitening:
     """
 
     data: FloatArray
-    block: npt.NDArray[np.int64]
-    recording: npt.NDArray[np.int64]
+    block: IndexArray
+    recording: IndexArray
     time: FloatArray
     is_force: BoolArray
-    marker: npt.NDArray[np.int64]
+    marker: IndexArray
     sensor: FloatArray
     filters: tuple[NoiseFilter, ...]
 
     @property
-    def voice(self) -> npt.NDArray[np.int64]:
+    def voice(self) -> IndexArray:
         """(N,) number of the recording and the kind of signal that an entry is of."""
         return 2 * self.recording + self.is_force
 
@@ -135,7 +135,7 @@ class NoiseFilter:
 
 def whiten(
     recordings: Sequence[Recording],
-    samples: Sequence[npt.NDArray[np.int64]],
+    samples: Sequence[IndexArray],
     scenario: Sequence[Told],
     refined: Sequence[Told],
     share: float = NUMERICS_SHARE,
@@ -186,7 +186,7 @@ def whiten(
 
 def _numerics(
     recordings: Sequence[Recording],
-    samples: Sequence[npt.NDArray[np.int64]],
+    samples: Sequence[IndexArray],
     scenario: Sequence[Told],
     refined: Sequence[Told],
     share: float,

@@ -12,12 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.experiment import Experiment, FreeRun, Level
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.recording import Recording
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect
 
 # An error that has grown to so many times its size at the start is past the horizon.
@@ -113,7 +112,7 @@ def _horizon(growth: FloatArray, since: FloatArray, length: float) -> float:
 
 def _binned(
     runs: Sequence[FreeRun], recordings: Sequence[Recording], since: FloatArray
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+) -> tuple[FloatArray, IndexArray]:
     """Returns squared residuals and their count by recording and time since a restart, (R,K)."""
     total = np.zeros((len(runs), len(since)))
     count = np.zeros((len(runs), len(since)), dtype=np.int64)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from drake_dress.models.arm.clearance import Capsules, clearance
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log import RunLog
 
@@ -38,7 +38,7 @@ class ArmMeasures:
     to_person: FloatArray
 
     @property
-    def kept(self) -> npt.NDArray[np.bool_]:
+    def kept(self) -> BoolArray:
         """(T,) whether no joint was beyond a limit."""
         torque = np.nan_to_num(self.torque_share)
         inside = (self.speed_share <= 1.0) & (torque <= 1.0) & (self.margin >= 0.0)
@@ -123,5 +123,5 @@ def measure_arms(log: RunLog) -> ArmMeasures | None:
     return ArmMeasures(speed, torque, margin, off, apart, near)
 
 
-def _pairs(first: npt.NDArray[np.int64], second: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _pairs(first: IndexArray, second: IndexArray) -> IndexArray:
     return np.stack([np.repeat(first, len(second)), np.tile(second, len(first))], axis=1)

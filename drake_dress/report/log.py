@@ -16,7 +16,7 @@ import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.hdf5_state import Hdf5State, look_at
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
 
@@ -162,7 +162,7 @@ class RunLog:
         return int(self.file.attrs.get("seed", 0))
 
     @cached_property
-    def faces(self) -> npt.NDArray[np.int32]:
+    def faces(self) -> IntArray:
         """(F,3) node indices."""
         return np.asarray(self.file["/garment/faces"], dtype=np.int32)
 
@@ -172,7 +172,7 @@ class RunLog:
         return self._read("/garment/rest_position")
 
     @cached_property
-    def loops(self) -> dict[str, npt.NDArray[np.int64]]:
+    def loops(self) -> dict[str, IndexArray]:
         """Name of an opening to the node indices around it."""
         return {n: np.asarray(self.file[f"/garment/loops/{n}"], dtype=np.int64) for n in LOOPS}
 
@@ -237,12 +237,12 @@ class RunLog:
         }
 
     @cached_property
-    def stage(self) -> npt.NDArray[np.int64]:
+    def stage(self) -> IndexArray:
         """(T,2) 0 prepare, 1 dress, 2 done; left, right."""
         return np.asarray(self.file["/control/stage"], dtype=np.int64)
 
     @cached_property
-    def safety(self) -> npt.NDArray[np.int64] | None:
+    def safety(self) -> IndexArray | None:
         """(T,2) flags of `models.control.safety.Verdict`; left, right; None where not logged."""
         if "/control/safety" not in self.file:
             return None
@@ -262,7 +262,7 @@ class RunLog:
         except (yaml.YAMLError, KeyError, TypeError, ValueError):
             return None
 
-    def solves(self, controller: str) -> npt.NDArray[np.int64]:
+    def solves(self, controller: str) -> IndexArray:
         """Returns (T,) how many solves of it ended since the sample before.
 
         A log of before they were counted says one where there is a time.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.dressing.linking import arm_linking_number
@@ -37,9 +36,9 @@ class Measures:
         total_contact_force: (T,) sum of the nodes' magnitudes, N.
     """
 
-    finite: npt.NDArray[np.bool_]
-    linking: npt.NDArray[np.int64]
-    cuff_linking: npt.NDArray[np.int64]
+    finite: BoolArray
+    linking: IndexArray
+    cuff_linking: IndexArray
     edge_strain: FloatArray
     edge_strain_max: FloatArray
     penetration: FloatArray
@@ -98,7 +97,7 @@ def measure(log: RunLog) -> Measures:
     )
 
 
-def unique_edges(faces: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:
+def unique_edges(faces: IntArray) -> IndexArray:
     """Returns (E,2) the edges of triangles (F,3), each once."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     return np.unique(np.sort(pairs.astype(np.int64), axis=1), axis=0)
@@ -106,8 +105,8 @@ def unique_edges(faces: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:
 
 def penetration_depth(
     position: FloatArray,
-    faces: npt.NDArray[np.int32],
-    edges: npt.NDArray[np.int64],
+    faces: IntArray,
+    edges: IndexArray,
     a: FloatArray,
     b: FloatArray,
     radius: FloatArray,
@@ -132,7 +131,7 @@ def penetration_depth(
     return float(max(0.0, -distance.min(initial=0.0)))
 
 
-def first_lasting(holds: npt.NDArray[np.bool_]) -> int | None:
+def first_lasting(holds: BoolArray) -> int | None:
     """Returns the first index from which `holds` (T,) is true to the end; None if it is not."""
     if not len(holds) or not holds[-1]:
         return None

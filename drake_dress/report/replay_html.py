@@ -14,10 +14,10 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_bytes
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_capsules
 from drake_dress.report.log import RunLog
@@ -116,7 +116,7 @@ def _page(log: RunLog, fps: float) -> bytes:
     return page.encode("utf-8")
 
 
-def _frames(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
+def _frames(time: FloatArray, fps: float) -> IndexArray:
     """Returns the samples nearest to a regular grid, first and last among them."""
     count = max(1, round((time[-1] - time[0]) * fps)) + 1
     wanted = np.linspace(time[0], time[-1], count)
@@ -127,7 +127,7 @@ def _frames(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
     return np.unique(nearest).astype(np.int64)
 
 
-def _encode(steps: npt.NDArray[np.int64]) -> str:
+def _encode(steps: IndexArray) -> str:
     """Returns differences in time of (frames, n, 3) modulo 2^16, byte planes apart, deflated."""
     difference = np.diff(steps, axis=0, prepend=0).astype(np.uint16)
     # x, y and z of a frame apart as well: neighbours then resemble each other.

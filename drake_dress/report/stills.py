@@ -30,7 +30,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 
 _Color = tuple[float, float, float]
 
@@ -62,7 +62,7 @@ class CameraPose:
 
 
 def render_still(
-    faces: npt.NDArray[np.int32],
+    faces: IntArray,
     position: FloatArray,
     capsule_a: FloatArray,
     capsule_b: FloatArray,
@@ -112,7 +112,7 @@ def floor_height(
     return low - 0.005
 
 
-def node_normals(faces: npt.NDArray[np.int32], position: FloatArray) -> FloatArray:
+def node_normals(faces: IntArray, position: FloatArray) -> FloatArray:
     """Returns (n,3) unit normals at the nodes, the area-weighted mean of the triangles'."""
     p = position[faces]
     face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -141,7 +141,7 @@ class _Scene:
         instance.set_perception_properties(properties)
         self._graph.RegisterAnchoredGeometry(self._source, instance)
 
-    def add_garment(self, faces: npt.NDArray[np.int32], position: FloatArray) -> None:
+    def add_garment(self, faces: IntArray, position: FloatArray) -> None:
         """Adds a garment (n,3), m: its outside, and the lining behind it."""
         normals = node_normals(faces, position)
         self.add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
@@ -168,7 +168,7 @@ class _Scene:
         return np.array(image.data[:, :, :3])
 
 
-def _mesh(faces: npt.NDArray[np.int32], position: FloatArray, normals: FloatArray) -> Mesh:
+def _mesh(faces: IntArray, position: FloatArray, normals: FloatArray) -> Mesh:
     lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in position]
     lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in normals]
     lines += [f"f {i}//{i} {j}//{j} {k}//{k}" for i, j, k in faces + 1]

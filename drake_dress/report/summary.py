@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.control.safety import Verdict
@@ -317,6 +317,6 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _largest(values: npt.NDArray[np.float64]) -> float | None:
+def _largest(values: FloatArray) -> float | None:
     values = values[np.isfinite(values)]
     return float(values.max()) if values.size else None

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from drake_dress.drawing import new_figure, pixels, plain_settings
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.sides import SIDES
 
 STAGE_NAMES = ("prepare", "dress", "done")
@@ -50,7 +51,7 @@ class GarmentVisualizer(LeafSystem):
     def __init__(
         self,
         meshcat: Meshcat,
-        faces: npt.NDArray[np.int32],
+        faces: IntArray,
         node_count: int,
         period: float = 1.0 / 15.0,
         path: str = "dressing",
@@ -88,17 +89,17 @@ class DressingScene:
         label: the stages as they are written.
     """
 
-    def __init__(self, meshcat: Meshcat, faces: npt.NDArray[np.int32], path: str) -> None:
+    def __init__(self, meshcat: Meshcat, faces: IntArray, path: str) -> None:
         self._meshcat = meshcat
         self._faces = faces
         self._path = path
         self._drawn: set[str] = set()
-        self._label_at: npt.NDArray[np.float64] | None = None
+        self._label_at: FloatArray | None = None
         self.label = ""
         # what draws text is imported, and finds its fonts, now and not while arms move
         _text_mesh("left", _TEXT_HEIGHT)
 
-    def show_garment(self, position: npt.NDArray[np.float64]) -> None:
+    def show_garment(self, position: FloatArray) -> None:
         """Draws the nodes (n,3), m: outside and lining in a colour each."""
         vertices = np.asfortranarray(position.T)
         if self._label_at is None and np.isfinite(position).all():
@@ -113,12 +114,12 @@ class DressingScene:
                 f"{self._path}/garment/{name}", vertices, self._faces, color, side=side
             )
 
-    def show_grippers(self, position: npt.NDArray[np.float64]) -> None:
+    def show_grippers(self, position: FloatArray) -> None:
         """Draws the grippers (2,3), m."""
         for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/gripper/{side}", Box(0.05, 0.05, 0.05), _GRIPPER, p)
 
-    def show_targets(self, position: npt.NDArray[np.float64]) -> None:
+    def show_targets(self, position: FloatArray) -> None:
         """Draws where the armholes should go (2,3), m; NaN hides one."""
         for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
@@ -142,9 +143,7 @@ class DressingScene:
             path = f"{self._path}/stage/{name}"
             self._meshcat.SetTriangleMesh(path, vertices, triangles, _TEXT, side=side)
 
-    def _place(
-        self, path: str, shape: Box | Sphere, color: Rgba, p: npt.NDArray[np.float64]
-    ) -> None:
+    def _place(self, path: str, shape: Box | Sphere, color: Rgba, p: FloatArray) -> None:
         visible = bool(np.isfinite(p).all())
         if path not in self._drawn:
             self._meshcat.SetObject(path, shape, color)
@@ -155,7 +154,7 @@ class DressingScene:
 
 
 @plain_settings()
-def _text_mesh(text: str, height: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+def _text_mesh(text: str, height: float) -> tuple[FloatArray, IntArray]:
     """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
     figure = new_figure(0.18 * len(text) + 0.4, 0.6, dpi=72)
     figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")

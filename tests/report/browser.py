@@ -10,9 +10,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from matplotlib import image
+
+from drake_dress.models.arrays import FloatArray
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
@@ -23,9 +24,7 @@ needs_chromium = pytest.mark.skipif(
 _TIME_LIMIT = 60.0  # s
 
 
-def live_screenshot(
-    url: str, folder: Path, name: str, wait: float = 4.0
-) -> npt.NDArray[np.float64]:
+def live_screenshot(url: str, folder: Path, name: str, wait: float = 4.0) -> FloatArray:
     """Returns (600, 900, 3) what a live page shows some seconds of real time after its opening.
 
     Chromium takes its picture when a page has loaded, which a live page has before it got what
@@ -56,9 +55,7 @@ def live_screenshot(
             server.shutdown()
 
 
-def screenshot(
-    url: str, folder: Path, name: str, virtual_time: float | None = 4.0
-) -> npt.NDArray[np.float64]:
+def screenshot(url: str, folder: Path, name: str, virtual_time: float | None = 4.0) -> FloatArray:
     """Returns (600, 900, 3) what a page shows, 0 to 1.
 
     Args:

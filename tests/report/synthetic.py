@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -111,6 +112,11 @@ def stretched(sample: Sample, garment: GarmentMesh, factor: float) -> Sample:
     position = np.asarray(sample.garment_position)
     middle = position.mean(axis=0)
     return replace(sample, garment_position=middle + factor * (position - middle))
+
+
+def content(garment: GarmentMesh, **fields: Any) -> LogContent:
+    """Returns what a log says about a run of which it says little else than `fields`."""
+    return LogContent(garment, "", "", 0, np.ones(6), **fields)
 
 
 def write(

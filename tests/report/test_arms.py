@@ -13,7 +13,6 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.arms import arm_capsules, measure_arms
 from drake_dress.report.log import RunLog
-from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import SuccessRules, summarize
@@ -38,12 +37,8 @@ def summary(
     samples = synthetic.dressing(garment)
     with RunLogWriter(
         path / "run.h5",
-        LogContent(
-            garment=garment,
-            scenario_text="",
-            version="",
-            seed=0,
-            radius=np.ones(6),
+        synthetic.content(
+            garment,
             capsule_radius=synthetic.capsules(samples[0].joint_position)[2],
             bases=bases(spread),
         ),

@@ -17,7 +17,6 @@ from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 from drake_dress.report import disk, log_writer
 from drake_dress.report.log import RunLog
-from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_schema import JOINT_NAMES
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
@@ -42,14 +41,7 @@ def eager_writer(path, garment):
     """Returns one that flushes every sample."""
     return RunLogWriter(
         path,
-        LogContent(
-            garment=garment,
-            scenario_text="",
-            version="",
-            seed=0,
-            radius=np.ones(6),
-            capsule_radius=np.ones(6),
-        ),
+        synthetic.content(garment, capsule_radius=np.ones(6)),
         flush_period=0.0,
     )
 
@@ -146,7 +138,7 @@ def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):
     with pytest.raises(KeyboardInterrupt):
         with RunLogWriter(
             path,
-            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+            synthetic.content(garment),
         ) as writer:
             for sample in samples[:3]:
                 writer.append(sample)
@@ -170,13 +162,12 @@ import time
 import numpy as np
 from dataclasses import replace
 from drake_dress.report import log_writer
-from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 log_writer._MOST_OPEN = 50
 garment = synthetic.coat(0.06)
 sample = synthetic.dressing(garment, count=2)[0]
-content = LogContent(garment, "", "", 0, np.ones(6), capsule_radius=np.ones(6))
+content = synthetic.content(garment, capsule_radius=np.ones(6))
 writer = RunLogWriter({str(path)!r}, content, flush_period=0.05)
 for i in range(10**6):
     writer.append(replace(sample, time=0.01 * i))
@@ -262,21 +253,14 @@ def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
             RunLog.open(path)
         return opened(*words)
 
-    words = {
-        "garment": garment,
-        "scenario_text": "",
-        "version": "",
-        "seed": 0,
-        "radius": np.ones(6),
-        "capsule_radius": np.ones(6),
-    }
-    with RunLogWriter(path, LogContent(**words), flush_period=0.0) as writer:
+    content = synthetic.content(garment, capsule_radius=np.ones(6))
+    with RunLogWriter(path, content, flush_period=0.0) as writer:
         monkeypatch.setattr(log_writer, "_open", refused)
         for sample in samples[:3]:
             writer.append(sample)
             writer._drain()
         with pytest.raises(UserError, match="cannot be written"):
-            RunLogWriter(path, LogContent(**words), flush_period=0.0)
+            RunLogWriter(path, content, flush_period=0.0)
     with RunLog.open(path) as log:
         assert len(log) == 3
 
@@ -284,7 +268,7 @@ def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
 def test_time_must_increase(tmp_path, garment, samples):
     with RunLogWriter(
         tmp_path / "run.h5",
-        LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+        synthetic.content(garment),
     ) as writer:
         writer.append(samples[1])
         with pytest.raises(ValueError, match="not later"):
@@ -295,7 +279,7 @@ def test_wrong_shape_is_told(tmp_path, garment, samples):
     bad = replace(samples[0], joint_position=np.zeros((5, 3)))
     with RunLogWriter(
         tmp_path / "run.h5",
-        LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+        synthetic.content(garment),
     ) as writer:
         with pytest.raises(ValueError, match="joint_position"):
             writer.append(bad)
@@ -420,7 +404,6 @@ from pathlib import Path
 import numpy as np
 from benchmarks.hardware.two_processes import fill
 from drake_dress.report.log import RunLog
-from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 from tests.report import synthetic
 
@@ -434,7 +417,7 @@ def fill_later(after):
     fill(filler)
 
 for after in np.random.default_rng(0).uniform(0.1, 0.5, 6):
-    content = LogContent(garment, "", "", 0, np.ones(6), capsule_radius=np.ones(6))
+    content = synthetic.content(garment, capsule_radius=np.ones(6))
     writer = RunLogWriter(path, content, flush_period=0.02)
     filling = threading.Thread(target=fill_later, args=[after])
     filling.start()
@@ -489,7 +472,7 @@ def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
     with pytest.raises(UserError, match="no room on the disk"):
         RunLogWriter(
             tmp_path / "run.h5",
-            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+            synthetic.content(garment),
         )
     assert not list(tmp_path.iterdir())
 
@@ -507,7 +490,7 @@ def test_a_run_for_which_there_is_no_room_costs_nothing_of_the_one_before(
     with pytest.raises(UserError, match="no room on the disk"):
         RunLogWriter(
             tmp_path / "run.h5",
-            LogContent(garment=garment, scenario_text="", version="", seed=0, radius=np.ones(6)),
+            synthetic.content(garment),
             results=["summary.json"],
         )
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before

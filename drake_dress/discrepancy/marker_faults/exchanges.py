@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.discrepancy.marker_faults.tracks import Jump
-from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
 # A marker takes another's place if it is so much nearer to that than to its own.
 _NEARER = 0.4
@@ -89,9 +88,7 @@ def _fits_exchanged(marker: FloatArray, places: FloatArray, i: int, j: int) -> b
     return same > _OFF and other < _FITS * same
 
 
-def _off(
-    marker: FloatArray, places: FloatArray, k: int, place: int, others: npt.NDArray[np.int64]
-) -> float:
+def _off(marker: FloatArray, places: FloatArray, k: int, place: int, others: IndexArray) -> float:
     """Returns how far a marker's distances to others are off those of a place at rest, mean, m."""
     seen = np.flatnonzero(np.isfinite(marker[:, k]).all(axis=1))
     if not len(seen):

@@ -19,6 +19,7 @@ from drake_dress.discrepancy.reading.raw import (
     unused_note,
 )
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
 
@@ -37,7 +38,7 @@ def read_csv(path: Path) -> list[RawRecording]:
     arrays: dict[str, npt.NDArray[Any]] = {}
     labels: dict[str, tuple[str, ...]] = {}
 
-    def take(names: list[str]) -> npt.NDArray[np.float64]:
+    def take(names: list[str]) -> FloatArray:
         used.update(names)
         there = [header.index(n) for n in names if n in header]
         found = numbers(source, header, rows, lines, there)
@@ -92,7 +93,7 @@ def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
     return points
 
 
-def _places(path: Path, wanted: tuple[str, ...]) -> npt.NDArray[np.float64]:
+def _places(path: Path, wanted: tuple[str, ...]) -> FloatArray:
     """Returns (m,3) where the markers sit, in the order of the labels wanted, m."""
     source = str(path)
     header, rows, lines = read_table(path)

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import daqp
 import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.models.arm.chain import (
     SerialArm,
@@ -34,7 +33,7 @@ from drake_dress.models.arm.clearance import (
     place_capsules,
 )
 from drake_dress.models.arm.joint_bounds import find_rate_bounds
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.vector3 import length
 
 # DAQP's kinds of rows.
@@ -181,7 +180,7 @@ class _Arm(NamedTuple):
     first: FloatArray
     second: FloatArray
     radius: FloatArray
-    owner: npt.NDArray[np.int64]
+    owner: IndexArray
 
 
 def _compiled(arm: SerialArm, shape: ArmShape) -> _Arm:

@@ -259,9 +259,11 @@ class ImplicitCloth:
             ValueError: something is not finite; the message names it.
         """
         p = self._problem(state, obstacles, held_velocity, influences)
-        mode, memory = p.contact.mode, state.solver[0]
+        mode = p.contact.mode
         p.velocity = self._start(p, held_velocity, guess)
-        factor, refactored, memory = self._renewed_factor(memory, mode, p.contact.resistance)
+        factor, refactored, memory = self._renewed_factor(
+            state.solver[0], mode, p.contact.resistance
+        )
         self._solve(p, factor)
 
         h, v = self.time_step, state.v
@@ -293,7 +295,7 @@ class ImplicitCloth:
         held_velocity: FloatArray,
         influences: Influences,
     ) -> _Problem:
-        """Returns what a step has to solve, and readies the system's matrix for it."""
+        """Returns what a step has to solve, made ready for its first pass."""
         m, h, x, v = self.material, self.time_step, state.x, state.v
         e = influences.stiffened(self.elements)
         mu, adhesion = influences.contact_law(m.friction, len(x))
@@ -305,7 +307,6 @@ class ImplicitCloth:
         if influences.force is not None:
             force += influences.force
         bonds = ActingBonds(influences.bonds or NO_BONDS, len(x), h)
-        self._system.set_bonds(bonds.now)
         facing, light = normal_response(e, block, self._scale, self._inertia + self._bending)
 
         if cannot_land(x, v, held_velocity, obstacles, h):
@@ -317,11 +318,12 @@ class ImplicitCloth:
             near, v, state.mode, state.reaction, self.held, h, self.gravity, mu, adhesion
         )
         p = _Problem(state, obstacles, h * force, block, facing, light, near, contact, bonds)
-        self._push(p)
+        self._make_ready(p)
         return p
 
-    def _push(self, p: _Problem) -> None:
-        """Finds the momentum that modes and pairs of layers, as they are now, leave to a step."""
+    def _make_ready(self, p: _Problem) -> None:
+        """Makes matrix and momentum those of modes and pairs of layers as they are now."""
+        self._system.set_bonds(p.bonds.now)
         p.inertia = self._bound_inertia(p.contact.mode)
         p.pushed = p.inertia[:, None] * p.state.v + p.driven + p.bonds.drive
 
@@ -331,11 +333,12 @@ class ImplicitCloth:
         contact = p.contact
         several = contact.is_near or len(p.bonds) > 0
         while True:
+            if p.passes > 0:
+                self._make_ready(p)
             last = p.passes + 1 >= (self._max_passes if several else 1)
             self._pass(p, factor, self._tolerance if last else _COARSER * self._tolerance)
             # Layers push and do not pull.
             glued = (not last or partings > 0) and p.bonds.update(p.velocity)
-            self._system.set_bonds(p.bonds.now)
             if not last:
                 changed = contact.update(p.velocity, p.impulse)
                 few = changed <= _TOLERATED_CHANGES * np.count_nonzero(contact.mode)
@@ -355,7 +358,6 @@ class ImplicitCloth:
 
     def _pass(self, p: _Problem, factor: Factor, tolerance: float) -> None:
         """Solves for modes and pairs of layers as they are now."""
-        self._push(p)
         contact = p.contact
         contact.prescribe(p.velocity)
         iterations, p.residual = self._system.solve(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from drake_dress.models.arrays import FloatArray
 
 # Rows are forward, left and up of the garment in the file's axes. A garment with z up faces +x, one
 # with y up faces +z (as garment programs write it), one with x up faces +y; a minus sign turns it
 # upside down about the way it faces.
-AXES: dict[str, npt.NDArray[np.float64]] = {
+AXES: dict[str, FloatArray] = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
     "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -18,7 +19,7 @@ AXES: dict[str, npt.NDArray[np.float64]] = {
 }
 
 
-def turned(position: npt.NDArray[np.float64], up: str) -> npt.NDArray[np.float64]:
+def turned(position: FloatArray, up: str) -> FloatArray:
     """Returns (n,3) positions with +x forward, +y left and +z up.
 
     Args:

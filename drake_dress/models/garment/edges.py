@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import IntArray
+from drake_dress.models.arrays import IndexArray, IntArray
 
 
 def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
@@ -19,7 +19,7 @@ def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
     return np.stack([key // n, key % n], axis=1).astype(np.int32)
 
 
-def border_edges(faces: npt.NDArray[np.integer], n: int) -> npt.NDArray[np.int64]:
+def border_edges(faces: npt.NDArray[np.integer], n: int) -> IndexArray:
     """Returns (b,2) half-edges of faces that no half-edge of another face runs against.
 
     Args:

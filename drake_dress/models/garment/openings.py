@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import loop_length
 
@@ -99,7 +99,7 @@ def ordered(position: FloatArray, loop: npt.NDArray[np.integer]) -> IntArray:
 
 def beyond(
     faces: IntArray, n: int, loop: npt.NDArray[np.integer], cuff: npt.NDArray[np.integer]
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     """Returns (n,) which nodes a loop cuts off on the side of a cuff, without the loop itself."""
     return _reached(unique_edges(faces), n, loop, cuff)
 
@@ -110,7 +110,7 @@ def _last_tube_cut(
     faces: IntArray,
     edges: IntArray,
     cuff: npt.NDArray[np.integer],
-) -> tuple[float, npt.NDArray[np.int64]] | None:
+) -> tuple[float, IndexArray] | None:
     """The innermost plane that cuts the sleeve alone, and the nodes beside its cut."""
     border = np.unique(np.concatenate(boundary_loops(faces)))
     foreign = np.setdiff1d(border, cuff)
@@ -136,8 +136,8 @@ def _cut_girth(
     x: FloatArray,
     out: FloatArray,
     faces: IntArray,
-    part: npt.NDArray[np.bool_],
-    outside: npt.NDArray[np.bool_],
+    part: BoolArray,
+    outside: BoolArray,
     at: float,
 ) -> float:
     count = outside[faces].sum(axis=1)
@@ -154,7 +154,7 @@ def _cut_girth(
 
 
 def _loop_near(
-    x: FloatArray, out: FloatArray, edges: IntArray, cut: tuple[float, npt.NDArray[np.int64]]
+    x: FloatArray, out: FloatArray, edges: IntArray, cut: tuple[float, IndexArray]
 ) -> IntArray | None:
     at, nodes = cut
     low = nodes[np.argmin(x[nodes, 2])]
@@ -191,7 +191,7 @@ def _cuts_off(edges: IntArray, n: int, loop: IntArray, cuff: npt.NDArray[np.inte
 
 def _reached(
     edges: IntArray, n: int, loop: npt.NDArray[np.integer], cuff: npt.NDArray[np.integer]
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     blocked = np.zeros(n, dtype=bool)
     blocked[loop] = True
     free = cuff[~blocked[cuff]]
@@ -200,7 +200,7 @@ def _reached(
     return _component(edges[~blocked[edges].any(axis=1)], n, free[0]) & ~blocked
 
 
-def _component(edges: IntArray, n: int, node: int) -> npt.NDArray[np.bool_]:
+def _component(edges: IntArray, n: int, node: int) -> BoolArray:
     graph = csr_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     return np.asarray(label == label[node])

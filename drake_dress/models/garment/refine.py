@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.edges import half_edges
 
 MOST_NODES = 200_000  # of a refined mesh
@@ -67,14 +67,14 @@ def refine(
         kept = [_through(loop, key, middle, n) for loop in kept]
 
 
-def _cut(faces: IntArray, middle: npt.NDArray[np.int64], length: FloatArray) -> IntArray:
+def _cut(faces: IntArray, middle: IndexArray, length: FloatArray) -> IntArray:
     """Returns faces cut by the nodes on their sides, -1 for none; in the order of the old ones."""
     rows = np.arange(len(faces))
     first = np.argmax(length, axis=1)  # each face is turned so that its longest side comes first
     a, b, c = (faces[rows, (first + k) % 3] for k in range(3))
     m, p, q = (middle[rows, (first + k) % 3] for k in range(3))
     on_ab, on_bc, on_ca = m >= 0, p >= 0, q >= 0
-    pieces: list[tuple[npt.NDArray[np.bool_], Sequence[npt.NDArray[np.integer]]]] = [
+    pieces: list[tuple[BoolArray, Sequence[npt.NDArray[np.integer]]]] = [
         (~on_ab, (faces[:, 0], faces[:, 1], faces[:, 2])),
         (on_ab & ~on_ca, (a, m, c)),
         (on_ab & on_ca, (a, m, q)),
@@ -90,9 +90,7 @@ def _cut(faces: IntArray, middle: npt.NDArray[np.int64], length: FloatArray) -> 
     return np.asarray(cut[np.argsort(owner, kind="stable")], dtype=np.int32)
 
 
-def _through(
-    loop: IntArray, key: npt.NDArray[np.int64], middle: npt.NDArray[np.int64], n: int
-) -> IntArray:
+def _through(loop: IntArray, key: IndexArray, middle: IndexArray, n: int) -> IntArray:
     pair = np.sort(np.stack([loop, np.roll(loop, -1)], axis=1).astype(np.int64), axis=1)
     between = middle[np.searchsorted(key, pair @ np.array([n, 1]))]
     chain = np.stack([loop, between], axis=1).ravel()

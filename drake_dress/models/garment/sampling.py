@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 
 
-def spread_out(points: FloatArray, count: int, first: int) -> npt.NDArray[np.int64]:
+def spread_out(points: FloatArray, count: int, first: int) -> IndexArray:
     """Returns indices of `count` points (n,3), all if fewer: each the farthest from those before.
 
     Args:

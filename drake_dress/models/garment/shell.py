@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 
 # Of a face's normal along that of its corners, below which it gets corners of its own.
 _LEAST_COSINE = 0.1
@@ -87,7 +86,7 @@ def _node_normals(position: FloatArray, faces: IntArray) -> FloatArray:
     return normals
 
 
-def _tetrahedra(faces: npt.NDArray[np.int64], count: int) -> IntArray:
+def _tetrahedra(faces: IndexArray, count: int) -> IntArray:
     """Returns three tetrahedra of each triangle's prism.
 
     A prism's sides are cut from the lower end of its edges with the smaller index, so that

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import trimesh
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.mesh import GarmentMesh
 
 
@@ -62,7 +61,7 @@ def attach(mesh: GarmentMesh, points: FloatArray) -> csr_array:
 
 def _closest_on_triangles(
     triangles: FloatArray, points: FloatArray
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
+) -> tuple[IndexArray, FloatArray]:
     """Exact: candidates are the nearest centroids, more until none farther can be closer."""
     centroid = triangles.mean(axis=1)
     reach = float(np.linalg.norm(triangles - centroid[:, None], axis=2).max())
@@ -88,9 +87,7 @@ def _closest_on_triangles(
     return face, closest
 
 
-def _closest_on_edges(
-    edges: FloatArray, points: FloatArray
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _closest_on_edges(edges: FloatArray, points: FloatArray) -> tuple[IndexArray, FloatArray]:
     """Returns for (m,3) points the closest of (k,2,3) segments and the fraction along it."""
     start, chord = edges[:, 0], edges[:, 1] - edges[:, 0]
     offset = points[:, None] - start[None]

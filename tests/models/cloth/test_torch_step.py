@@ -20,7 +20,7 @@ def test_torch_gradient_is_that_of_the_adjoint() -> None:
     """Through two steps, by state, grippers, bodies and material."""
     cloth, x, v, motion = _scene()
     bodies = torch.zeros((2, 4, 3), dtype=torch.float64)
-    material = torch.tensor([getattr(MATERIAL, n) for n in NAMES], dtype=torch.float64)
+    material = material_tensor(MATERIAL)
     inputs = [x, v, motion, bodies, material]
     for t in inputs:
         t.requires_grad_(True)
@@ -84,7 +84,7 @@ def _leaves() -> tuple[ExplicitBiasCloth, list[torch.Tensor]]:
     """x, v, motion, bodies, material."""
     cloth, x, v, motion = _scene()
     bodies = torch.zeros((2, 4, 3), dtype=torch.float64)
-    material = torch.tensor([getattr(MATERIAL, n) for n in NAMES], dtype=torch.float64)
+    material = material_tensor(MATERIAL)
     return cloth, [t.requires_grad_() for t in (x, v, motion, bodies, material)]
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.dressing.sleeve import (
     Center,
     loop_orientation,
@@ -140,7 +139,7 @@ def test_unusable_sides_and_openings_are_told(coat: GarmentMesh) -> None:
     mesh = GarmentMesh(
         np.vstack([flat, flat + [5.0, 0.0, 0.0]]),
         np.zeros((0, 3), np.int32),
-        {"left_armhole": nodes, "left_cuff": cast("npt.NDArray[np.int32]", nodes + 12)},
+        {"left_armhole": nodes, "left_cuff": cast("IntArray", nodes + 12)},
         {},
         np.zeros(24, np.int8),
     )

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-MaskArray = npt.NDArray[np.bool_]
+MaskArray = BoolArray
 
 # Sine of a corner's angle, below which it counts as straight.
 _STRAIGHT = 1e-6

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-MaskArray = npt.NDArray[np.bool_]
+MaskArray = BoolArray
 
 
 def too_many(source: str, most: int) -> UserError:
