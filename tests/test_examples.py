@@ -11,6 +11,7 @@ FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "solve_own_problem": r"converged: True[^$]*largest force 2\.000 N[^$]*to the wall 0\.200 m",
 }
 
 

@@ -22,7 +22,8 @@ from benchmarks.local.recorded import read_problems
 from benchmarks.parser import OneLineParser, at_least_one, output_file, seed_number
 from drake_dress.discrepancy.results import write_json
 from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.solution import Solution
 from drake_dress.solvers.cone_programme import solve_cone_programme
 
 # Room that it leaves within the bounds for the way foreseen, m.
@@ -138,7 +139,7 @@ def _trials(
         )
 
 
-def _above(problem: LocalProblem, found: LocalSolution, exact: LocalSolution) -> float:
+def _above(problem: LocalProblem, found: Solution, exact: Solution) -> float:
     """Returns by how much a solution costs more than the exact one, relative."""
     costs = [s.cost + problem.price * problem.spilled(s.v) for s in (found, exact)]
     return (costs[0] - costs[1]) / max(abs(costs[1]), 1e-12)

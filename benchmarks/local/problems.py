@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.local_problem import LocalProblem, NormBounds
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.norm_bounds import NormBounds
 
 HORIZON, TIME_STEP = 20, 0.05
 # Usual bounds on: sleeve to far gripper, twice; sleeve to sleeve; sleeve beside its arm, twice; m.

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.errors import UserError
-from drake_dress.models.control.local_problem import LocalProblem, NormBounds
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.norm_bounds import NormBounds
 
 _PLAIN = tuple(f.name for f in dataclasses.fields(LocalProblem) if not f.name.endswith("_bounds"))
 _PARTS = tuple(f.name for f in dataclasses.fields(NormBounds))

@@ -28,7 +28,8 @@ from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
-from drake_dress.models.control.local_control import LocalController, constrained_ddp
+from drake_dress.models.control.constrained_ddp import solve
+from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
@@ -298,7 +299,7 @@ def local_setup(scenario: schema.Scenario, policy: DressingPolicy) -> LocalSetup
             if f.name in vars(values)
         }
     )
-    solvers = {"constrained_ddp": constrained_ddp, "cone": cone_programme}
+    solvers = {"constrained_ddp": solve, "cone": cone_programme}
     return LocalSetup(
         LocalController(policy.planner, parameters, solvers[values.solver]),
         values.period,

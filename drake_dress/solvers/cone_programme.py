@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
 
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution, NormBounds
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.norm_bounds import NormBounds
+from drake_dress.models.control.solution import Solution
 
 
 def solve_cone_programme(
     problem: LocalProblem, tolerance: float = 1e-8, spills: bool = False
-) -> tuple[LocalSolution, float]:
+) -> tuple[Solution, float]:
     """Returns the optimum of a local problem, without multipliers, and Clarabel's own time, s.
 
     Args:
@@ -45,7 +47,7 @@ def solve_cone_programme(
     result = ClarabelSolver().Solve(program, None, options)
     inputs = result.GetSolution(v)
     details = result.get_solver_details()
-    solution = LocalSolution(
+    solution = Solution(
         v=inputs,
         x=p.states(inputs),
         state_multiplier=np.zeros(p.state_bounds.radius.shape),
@@ -59,7 +61,7 @@ def solve_cone_programme(
     return solution, float(details.solve_time)
 
 
-def cone_programme(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
+def cone_programme(problem: LocalProblem, before: Solution | None) -> Solution:
     """Solves a local problem as a cone programme; Clarabel starts anew each time."""
     return solve_cone_programme(problem, spills=True)[0]
 

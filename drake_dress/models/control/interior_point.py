@@ -25,6 +25,8 @@ _FLATTEST = 1e-3
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def interior_point(  # type: ignore[no-untyped-def]
+    a,
+    b,
     w,
     w_x,
     r,
@@ -43,20 +45,22 @@ def interior_point(  # type: ignore[no-untyped-def]
 ):
     """Fills inputs, states and multipliers near the optimum.
 
-    The dynamics are x_{t+1} = x_t + v_t with x_0 = 0, all of m.
+    The dynamics are x_{t+1} = a_t x_t + b_t v_t with x_0 = 0.
 
     Args:
-        w: (N+1,m,m) Hessians of the cost of states.
-        w_x: (N+1,m) its slopes at zero.
+        a: (N,n,n), or None with `b`: then x_{t+1} = x_t + v_t and n = m.
+        b: (N,n,m), or None.
+        w: (N+1,n,n) Hessians of the cost of states.
+        w_x: (N+1,n) its slopes at zero.
         r: (N,m) diagonal Hessians of the cost of inputs.
         r_v: (N,m) its slopes at zero.
-        matrix: (N,K+L,3,m) of the K bounds on the state that a step leads to, then of the L bounds
-            on its input.
+        matrix: (N,K+L,3,max(n,m)) of the K bounds on the state that a step leads to, then of the
+            L bounds on its input, whose first n and m columns count.
         offset: (N,K+L,3) of them.
         radius: (N,K+L); infinite where there is no bound.
         n_x: K.
         v: (N,m) inputs to start from, and on return.
-        x: (N+1,m) on return.
+        x: (N+1,n) on return.
         multiplier: (N,K+L) on return, of the norms; zero where not active.
         excess: (N,K+L) t on return, of bounds that nothing keeps; zero elsewhere.
         price: of the sum of excesses.
@@ -66,11 +70,11 @@ def interior_point(  # type: ignore[no-untyped-def]
     Returns:
         The iterations, and whether they sufficed.
     """
-    steps, m = v.shape
+    (steps, m), n = v.shape, x.shape[1]
     each = radius.shape[1]
     bounded = radius < np.inf
     count = max(bounded.sum(), 1)
-    slope, value = np.zeros((steps, each, m)), np.zeros((steps, each))
+    slope, value = np.zeros((steps, each, max(n, m))), np.zeros((steps, each))
     slack, spare = np.ones((steps, each)), np.ones((steps, each))
     multiplier[:] = 0.0
     excess[:] = 0.0
@@ -78,18 +82,18 @@ def interior_point(  # type: ignore[no-untyped-def]
     left, left_spare = np.zeros((steps, each)), np.zeros((steps, each))
     d_slack, d_excess = np.zeros((steps, each)), np.zeros((steps, each))
     d_multiplier = np.zeros((steps, each))
-    factor, gain = np.empty((steps, m, m)), np.empty((steps, m, m))
-    dx, dv = np.zeros((steps + 1, m)), np.zeros((steps, m))
+    factor, gain = np.empty((steps, m, m)), np.empty((steps, m, n))
+    dx, dv = np.zeros((steps + 1, n)), np.zeros((steps, m))
 
-    _roll(v, x)
+    _roll(a, b, v, x)
     _values(matrix, offset, radius, n_x, v, x, slope, value)
     steepness = 0.0
     for t in range(steps):
-        for a in range(m):
-            s = w_x[t + 1, a]
-            for e in range(m):
-                s += w[t + 1, a, e] * x[t + 1, e]
-            steepness += abs(s) + _FLATTEST * w[t + 1, a, a]
+        for d in range(n):
+            s = w_x[t + 1, d]
+            for e in range(n):
+                s += w[t + 1, d, e] * x[t + 1, e]
+            steepness += abs(s) + _FLATTEST * w[t + 1, d, d]
     mu = 0.0
     for t in range(steps):
         for k in range(each):
@@ -105,14 +109,16 @@ def interior_point(  # type: ignore[no-untyped-def]
     done, iteration = False, 0
     while iteration < max_iterations and not done:
         iteration += 1
-        _factor(w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain)
+        _factor(
+            a, b, w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain
+        )
         left[:] = 0.0
         left_spare[:] = 0.0
         target = 0.0
         for phase in range(2):
             _newton(
-                w, w_x, r, r_v, n_x, v, x, slope, value, slack, excess, multiplier, spare, bounded,
-                left, left_spare, target, factor, gain, dx, dv,
+                a, b, w, w_x, r, r_v, n_x, v, x, slope, value, slack, excess, multiplier, spare,
+                bounded, left, left_spare, target, factor, gain, dx, dv,
             )  # fmt: skip
             primal, dual = _step_lengths(
                 n_x, slope, value, slack, excess, multiplier, spare, bounded, left, left_spare,
@@ -143,7 +149,7 @@ def interior_point(  # type: ignore[no-untyped-def]
                     excess[t, k] += primal * d_excess[t, k]
                     multiplier[t, k] += dual * d_multiplier[t, k]
                     spare[t, k] -= dual * d_multiplier[t, k]
-        _roll(v, x)
+        _roll(a, b, v, x)
         _values(matrix, offset, radius, n_x, v, x, slope, value)
         mu, mismatch = 0.0, 0.0
         for t in range(steps):
@@ -164,50 +170,66 @@ def interior_point(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _roll(v, x):  # type: ignore[no-untyped-def]
+def _roll(a, b, v, x):  # type: ignore[no-untyped-def]
     x[0] = 0.0
     for t in range(v.shape[0]):
-        for c in range(v.shape[1]):
-            x[t + 1, c] = x[t, c] + v[t, c]
+        _advance(a, b, t, x[t], v[t], x[t + 1])
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _advance(a, b, t, x, v, after):  # type: ignore[no-untyped-def]
+    """Fills the state `after` step `t` from `x` (n,) with input `v` (m,)."""
+    for d in range(x.shape[0]):
+        if a is None:
+            s = x[d] + v[d]
+        else:
+            s = 0.0
+            for e in range(x.shape[0]):
+                s += a[t, d, e] * x[e]
+            for c in range(v.shape[0]):
+                s += b[t, d, c] * v[c]
+        after[d] = s
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _values(matrix, offset, radius, n_x, v, x, slope, value):  # type: ignore[no-untyped-def]
-    """Fills c (N,K+L) and −∂c/∂z (N,K+L,m) of all bounds."""
+    """Fills c (N,K+L) and −∂c/∂z (N,K+L,max(n,m)) of all bounds."""
     steps, each = radius.shape
-    m = v.shape[1]
     for t in range(steps):
         for k in range(each):
             if radius[t, k] == np.inf:
                 continue
             z = x[t + 1] if k < n_x else v[t]
             length2 = 0.0
-            for c in range(m):
+            for c in range(len(z)):
                 slope[t, k, c] = 0.0
-            for a in range(3):
-                y = offset[t, k, a]
-                for c in range(m):
-                    y += matrix[t, k, a, c] * z[c]
-                for c in range(m):
-                    slope[t, k, c] += matrix[t, k, a, c] * y / radius[t, k]
+            for d in range(3):
+                y = offset[t, k, d]
+                for c in range(len(z)):
+                    y += matrix[t, k, d, c] * z[c]
+                for c in range(len(z)):
+                    slope[t, k, c] += matrix[t, k, d, c] * y / radius[t, k]
                 length2 += y * y
             value[t, k] = 0.5 * (radius[t, k] - length2 / radius[t, k])
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _factor(  # type: ignore[no-untyped-def]
-    w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain
+    a, b, w, r, matrix, radius, n_x, slope, slack, excess, multiplier, spare, factor, gain
 ):
-    """Backward pass of the Hessians: with q_vv = L Lᵀ, fills L and gain = L⁻¹p."""
+    """Backward pass of the Hessians: with q_vv = L Lᵀ, fills L and gain = L⁻¹ q_vx."""
     steps, each = radius.shape
-    m = r.shape[1]
-    p, of_input = np.zeros((m, m)), np.empty((m, m))
+    m, n = gain.shape[1], gain.shape[2]
+    p, of_input = np.zeros((n, n)), np.empty((m, m))
+    q_vv, q_vx = np.empty((m, m)), np.empty((m, n))
     for t in range(steps - 1, -1, -1):
-        for a in range(m):
-            for e in range(a + 1):
-                p[a, e] += w[t + 1, a, e]
-                of_input[a, e] = 0.0
-            of_input[a, a] = r[t, a]
+        for c in range(n):
+            for e in range(c + 1):
+                p[c, e] += w[t + 1, c, e]
+        for c in range(m):
+            for e in range(c + 1):
+                of_input[c, e] = 0.0
+            of_input[c, c] = r[t, c]
         for k in range(each):
             if radius[t, k] == np.inf:
                 continue
@@ -215,36 +237,67 @@ def _factor(  # type: ignore[no-untyped-def]
             curved = multiplier[t, k] / radius[t, k]
             barrier = 1.0 / (slack[t, k] / multiplier[t, k] + excess[t, k] / spare[t, k])
             c0, c1, c2 = matrix[t, k, 0], matrix[t, k, 1], matrix[t, k, 2]
-            for a in range(m):
-                for e in range(a + 1):
-                    hessian[a, e] += barrier * slope[t, k, a] * slope[t, k, e] + curved * (
-                        c0[a] * c0[e] + c1[a] * c1[e] + c2[a] * c2[e]
+            for c in range(hessian.shape[0]):
+                for e in range(c + 1):
+                    hessian[c, e] += barrier * slope[t, k, c] * slope[t, k, e] + curved * (
+                        c0[c] * c0[e] + c1[c] * c1[e] + c2[c] * c2[e]
                     )
-        for a in range(m):
-            for e in range(a):
-                p[e, a] = p[a, e]
-        for a in range(m):
-            for e in range(a + 1):
-                s = of_input[a, e] + p[a, e]
-                for c in range(e):
-                    s -= factor[t, a, c] * factor[t, e, c]
-                factor[t, a, e] = np.sqrt(max(s, 1e-300)) if a == e else s / factor[t, e, e]
-        for e in range(m):
-            for a in range(m):
-                s = p[a, e]
-                for c in range(a):
-                    s -= factor[t, a, c] * gain[t, c, e]
-                gain[t, a, e] = s / factor[t, a, a]
-        for a in range(m):
-            for e in range(a + 1):
-                s = p[a, e]
-                for c in range(m):
-                    s -= gain[t, c, a] * gain[t, c, e]
-                p[a, e] = s
+        for c in range(n):
+            for e in range(c):
+                p[e, c] = p[c, e]
+        _through_dynamics(a, b, t, p, q_vv, q_vx)
+        for c in range(m):
+            for e in range(c + 1):
+                s = of_input[c, e] + q_vv[c, e]
+                for d in range(e):
+                    s -= factor[t, c, d] * factor[t, e, d]
+                factor[t, c, e] = np.sqrt(max(s, 1e-300)) if c == e else s / factor[t, e, e]
+        for e in range(n):
+            for c in range(m):
+                s = q_vx[c, e]
+                for d in range(c):
+                    s -= factor[t, c, d] * gain[t, d, e]
+                gain[t, c, e] = s / factor[t, c, c]
+        for c in range(n):
+            for e in range(c + 1):
+                s = p[c, e]
+                for d in range(m):
+                    s -= gain[t, d, c] * gain[t, d, e]
+                p[c, e] = s
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _through_dynamics(a, b, t, p, q_vv, q_vx):  # type: ignore[no-untyped-def]
+    """Fills q_vv = bᵀ p b and q_vx = bᵀ p a, and turns the Hessian p (n,n) into aᵀ p a."""
+    m, n = q_vx.shape
+    if a is None:
+        q_vv[:] = p
+        q_vx[:] = p
+    else:
+        pa, pb = p @ a[t], p @ b[t]
+        for c in range(m):
+            for e in range(m):
+                s = 0.0
+                for d in range(n):
+                    s += b[t, d, c] * pb[d, e]
+                q_vv[c, e] = s
+            for e in range(n):
+                s = 0.0
+                for d in range(n):
+                    s += b[t, d, c] * pa[d, e]
+                q_vx[c, e] = s
+        for c in range(n):
+            for e in range(n):
+                s = 0.0
+                for d in range(n):
+                    s += a[t, d, c] * pa[d, e]
+                p[c, e] = s
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _newton(  # type: ignore[no-untyped-def]
+    a,
+    b,
     w,
     w_x,
     r,
@@ -269,16 +322,17 @@ def _newton(  # type: ignore[no-untyped-def]
 ):
     """Fills the Newton step of states and inputs: slopes backward, then the law forward."""
     steps, each = bounded.shape
-    m = v.shape[1]
-    p, work = np.zeros(m), np.empty(m)
+    m, n = v.shape[1], x.shape[1]
+    p, work, into_v = np.zeros(n), np.empty(m), np.empty(m)
     half = np.empty((steps, m))
     for t in range(steps - 1, -1, -1):
-        for a in range(m):
-            s = w_x[t + 1, a]
-            for e in range(m):
-                s += w[t + 1, a, e] * x[t + 1, e]
-            p[a] += s
-            work[a] = r_v[t, a] + r[t, a] * v[t, a]
+        for d in range(n):
+            s = w_x[t + 1, d]
+            for e in range(n):
+                s += w[t + 1, d, e] * x[t + 1, e]
+            p[d] += s
+        for c in range(m):
+            work[c] = r_v[t, c] + r[t, c] * v[t, c]
         for k in range(each):
             if bounded[t, k]:
                 push = multiplier[t, k] + (
@@ -287,33 +341,56 @@ def _newton(  # type: ignore[no-untyped-def]
                     - value[t, k]
                 ) / (slack[t, k] / multiplier[t, k] + excess[t, k] / spare[t, k])
                 into = p if k < n_x else work
-                for a in range(m):
-                    into[a] += push * slope[t, k, a]
-        for a in range(m):
-            s = work[a] + p[a]
-            for c in range(a):
-                s -= factor[t, a, c] * half[t, c]
-            half[t, a] = s / factor[t, a, a]
-        for a in range(m):
-            s = p[a]
+                for c in range(into.shape[0]):
+                    into[c] += push * slope[t, k, c]
+        _slope_through_dynamics(a, b, t, p, into_v)
+        for c in range(m):
+            s = work[c] + into_v[c]
+            for d in range(c):
+                s -= factor[t, c, d] * half[t, d]
+            half[t, c] = s / factor[t, c, c]
+        for e in range(n):
+            s = p[e]
             for c in range(m):
-                s -= gain[t, c, a] * half[t, c]
-            p[a] = s
+                s -= gain[t, c, e] * half[t, c]
+            p[e] = s
     dx[0] = 0.0
     for t in range(steps):
-        for a in range(m):
-            s = half[t, a]
-            for c in range(m):
-                s += gain[t, a, c] * dx[t, c]
-            work[a] = s
-        for a in range(m - 1, -1, -1):
-            s = work[a]
-            for c in range(a + 1, m):
-                s -= factor[t, c, a] * work[c]
-            work[a] = s / factor[t, a, a]
-        for a in range(m):
-            dv[t, a] = -work[a]
-            dx[t + 1, a] = dx[t, a] - work[a]
+        for c in range(m):
+            s = half[t, c]
+            for e in range(n):
+                s += gain[t, c, e] * dx[t, e]
+            work[c] = s
+        for c in range(m - 1, -1, -1):
+            s = work[c]
+            for d in range(c + 1, m):
+                s -= factor[t, d, c] * work[d]
+            work[c] = s / factor[t, c, c]
+        for c in range(m):
+            dv[t, c] = -work[c]
+        _advance(a, b, t, dx[t], dv[t], dx[t + 1])
+
+
+@nb.njit(nogil=True, error_model="numpy", forceinline=True)
+def _slope_through_dynamics(a, b, t, p, into_v):  # type: ignore[no-untyped-def]
+    """Fills `into_v` with bᵀ p, and turns the slope p (n,) into aᵀ p."""
+    if a is None:
+        into_v[:] = p
+    else:
+        n = p.shape[0]
+        for c in range(into_v.shape[0]):
+            s = 0.0
+            for d in range(n):
+                s += b[t, d, c] * p[d]
+            into_v[c] = s
+        before = np.empty(n)
+        for e in range(n):
+            s = 0.0
+            for d in range(n):
+                s += a[t, d, e] * p[d]
+            before[e] = s
+        for e in range(n):
+            p[e] = before[e]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -344,8 +421,8 @@ def _step_lengths(  # type: ignore[no-untyped-def]
                 continue
             dz = dx[t + 1] if k < n_x else dv[t]
             along = 0.0
-            for a in range(len(dz)):
-                along += slope[t, k, a] * dz[a]
+            for c in range(len(dz)):
+                along += slope[t, k, c] * dz[c]
             of_slack = (target - left[t, k]) / multiplier[t, k]
             of_excess = (target - left_spare[t, k]) / spare[t, k]
             ratio = slack[t, k] / multiplier[t, k]

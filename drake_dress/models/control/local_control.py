@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
+from drake_dress.models.control.constrained_ddp import feedback_gains, solve
 from drake_dress.models.control.local_model import (
     LocalParameters,
     Nominal,
@@ -22,14 +22,15 @@ from drake_dress.models.control.local_model import (
     is_coupled,
     local_problem,
 )
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.solution import Solution
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts, Task
 from drake_dress.models.garment.geodesics import Reach, reach
 from drake_dress.models.immutable import Immutable
 
-Solver = Callable[[LocalProblem, LocalSolution | None], LocalSolution]
+Solver = Callable[[LocalProblem, Solution | None], Solution]
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class LocalPlan(Immutable):
 class LocalState(Immutable):
     """What is carried from one solve to the next: the solution, and whether sleeves are coupled."""
 
-    solution: LocalSolution | None = None
+    solution: Solution | None = None
     start: float = 0.0
     coupled: bool = False
 
@@ -145,7 +146,7 @@ class LocalController:
 
     planner: TaskPlanner
     parameters: LocalParameters
-    solver: Solver = field(default_factory=lambda: constrained_ddp)
+    solver: Solver = field(default_factory=lambda: solve)
     reach: Reach = field(init=False)
 
     def __post_init__(self) -> None:
@@ -321,22 +322,13 @@ def _of_plan(plan: GlobalPlan, rows: FloatArray, times: FloatArray) -> FloatArra
     return found
 
 
-def constrained_ddp(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
-    """Solves by constrained DDP, from the solution before if there is one."""
-    if before is None:
-        return solve_constrained_ddp(problem)
-    return solve_constrained_ddp(
-        problem, before.v, before.state_multiplier, before.input_multiplier
-    )
-
-
 def _is_on_arm(fact: SleeveFacts, task: Task) -> bool:
     """Returns whether a sleeve is on its arm, and to be moved along it or kept there."""
     return fact.linked and task in (Task.DRESS, Task.WAIT)
 
 
 def _local_plan(
-    nominal: Nominal, problem: LocalProblem, found: LocalSolution, time: float, p: LocalParameters
+    nominal: Nominal, problem: LocalProblem, found: Solution, time: float, p: LocalParameters
 ) -> LocalPlan:
     """Returns the plan of a solution, which begins at `time`, s."""
     base = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
@@ -400,7 +392,7 @@ def _resampled(rows: FloatArray, step: float, p: LocalParameters) -> FloatArray:
     return between
 
 
-def _shifted(state: LocalState, time: float, p: LocalParameters) -> LocalSolution | None:
+def _shifted(state: LocalState, time: float, p: LocalParameters) -> Solution | None:
     """Returns the solution before as it goes on from now; None if it is too old or none at all."""
     if state.solution is None or not state.solution.converged:
         return None
@@ -414,7 +406,7 @@ def _shifted(state: LocalState, time: float, p: LocalParameters) -> LocalSolutio
     def moved(rows: FloatArray) -> FloatArray:
         return np.concatenate([rows[steps:], np.repeat(rows[-1:], steps, axis=0)])
 
-    return LocalSolution(
+    return Solution(
         moved(s.v),
         moved(s.x),
         moved(s.state_multiplier),

@@ -20,7 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.local_problem import LocalProblem, NormBounds
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.norm_bounds import NormBounds
 from drake_dress.models.garment.geodesics import Reach
 
 _EYE, _NONE = np.eye(3), np.zeros((3, 3))

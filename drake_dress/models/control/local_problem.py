@@ -16,37 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class NormBounds:
-    """Bounds on the norms of affine functions, a row of them for each step.
-
-    Attributes:
-        matrix: (T,K,3,n). offset: (T,K,3).
-        radius: (T,K), positive; infinite where there is no bound.
-    """
-
-    matrix: FloatArray
-    offset: FloatArray
-    radius: FloatArray
-
-    def norms(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) the norms at `z` (T,n)."""
-        y = np.einsum("tkab,tb->tka", self.matrix, z) + self.offset
-        length: FloatArray = np.linalg.norm(y, axis=2)
-        return length
-
-    def excess(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) by how much the norms at `z` (T,n) exceed their bounds; negative within."""
-        return self.norms(z) - self.radius
-
-    def spilled(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) the least t with ‖·‖² ≤ φ² + 2 φ t at `z` (T,n); 0 where there is none."""
-        bounded = np.isfinite(self.radius)
-        phi = np.where(bounded, self.radius, 1.0)
-        t = np.maximum(0.0, 0.5 * (self.norms(z) ** 2 / phi - phi))
-        return np.where(bounded, t, 0.0)
+from drake_dress.models.control.norm_bounds import NormBounds
+from drake_dress.models.control.reduced_problem import ReducedProblem
 
 
 @dataclass(frozen=True)
@@ -102,27 +73,34 @@ class LocalProblem:
         over = self.state_bounds.excess(self.states(v))[1:].max(initial=0.0)
         return float(max(0.0, over, self.input_bounds.excess(v).max(initial=0.0)))
 
+    def reduced(self) -> ReducedProblem:
+        """Returns it in the sums of inputs, u: x = x_0 + B u has m coordinates in place of n."""
+        b, w, r = self.input_matrix, 2.0 * self.state_weight, 2.0 * self.input_weight
+        of_x, of_v = self.state_bounds, self.input_bounds
+        return ReducedProblem(
+            None,
+            None,
+            np.einsum("tn,na,nb->tab", w, b, b),
+            (w * (self.start - self.state_target)) @ b,
+            r,
+            -r * self.input_target,
+            NormBounds(of_x.matrix @ b, of_x.offset + of_x.matrix @ self.start, of_x.radius),
+            of_v,
+        )
 
-@dataclass(frozen=True)
-class LocalSolution:
-    """What a solver returns.
-
-    Attributes:
-        v: (N,m) inputs; x: (N+1,n) states.
-        state_multiplier: (N+1,K), input_multiplier: (N,L) of the norm bounds, zero or more.
-        cost: reached.
-        violation: of the worst bound.
-        sweeps: backward and forward passes with an active set.
-        interior_steps: with barriers instead.
-        converged: the conditions of optimality hold; never where a solver gave up.
-    """
-
-    v: FloatArray
-    x: FloatArray
-    state_multiplier: FloatArray
-    input_multiplier: FloatArray
-    cost: float
-    violation: float
-    sweeps: int
-    interior_steps: int
-    converged: bool
+    def about_start(self) -> ReducedProblem:
+        """Returns it in all n states, as they differ from the start."""
+        (steps, _), n = self.input_weight.shape, len(self.start)
+        w, r = np.zeros((steps + 1, n, n)), 2.0 * self.input_weight
+        w[:, range(n), range(n)] = 2.0 * self.state_weight
+        of_x = self.state_bounds
+        return ReducedProblem(
+            None,
+            np.tile(self.input_matrix, (steps, 1, 1)),
+            w,
+            2.0 * self.state_weight * (self.start - self.state_target),
+            r,
+            -r * self.input_target,
+            NormBounds(of_x.matrix, of_x.offset + of_x.matrix @ self.start, of_x.radius),
+            self.input_bounds,
+        )

@@ -11,12 +11,13 @@ from benchmarks.local.problems import random_problem
 from drake_dress.models.control.constrained_ddp import (
     Settings,
     _at,
-    _backward,
-    _room,
     feedback_gains,
     solve_constrained_ddp,
 )
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution, NormBounds
+from drake_dress.models.control.ddp_passes import backward, room
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.norm_bounds import NormBounds
+from drake_dress.models.control.solution import Solution
 from drake_dress.solvers.cone_programme import solve_cone_programme
 
 seeds = st.integers(0, 2**31)
@@ -68,7 +69,7 @@ def without(bounds: NormBounds, which: np.ndarray | np.bool_) -> NormBounds:
     return replace(bounds, radius=np.where(which, np.inf, bounds.radius))
 
 
-def slope(p: LocalProblem, s: LocalSolution) -> np.ndarray:
+def slope(p: LocalProblem, s: Solution) -> np.ndarray:
     """Returns (N,m) the derivative of the Lagrangian by the inputs."""
     by_state = 2.0 * p.state_weight * (s.x - p.state_target)
     by_input = 2.0 * p.input_weight * (s.v - p.input_target)
@@ -83,7 +84,7 @@ def slope(p: LocalProblem, s: LocalSolution) -> np.ndarray:
     return by_input + later @ p.input_matrix
 
 
-def assert_optimal(p: LocalProblem, s: LocalSolution) -> None:
+def assert_optimal(p: LocalProblem, s: Solution) -> None:
     assert s.converged
     assert s.violation < 1e-6
     assert s.state_multiplier.min() >= 0.0
@@ -106,7 +107,7 @@ def test_the_conditions_of_optimality_hold(seed: int) -> None:
     assert_optimal(p, solve_constrained_ddp(p))
 
 
-def replace_multipliers(s: LocalSolution) -> LocalSolution:
+def replace_multipliers(s: Solution) -> Solution:
     return replace(
         s, state_multiplier=0.0 * s.state_multiplier, input_multiplier=0.0 * s.input_multiplier
     )
@@ -141,9 +142,10 @@ def test_rows_without_room_are_told_and_none_is_left_out() -> None:
     on_v = _at(p.input_bounds, s.v, np.ones_like(s.input_multiplier))
 
     def passed(rows: int) -> tuple[int, np.ndarray]:
-        law = _room(steps, n, m, rows)
-        arguments = (p.input_matrix, hessian, 2.0 * p.input_weight, x_slope, v_slope, on_x, on_v)
-        return _backward(*arguments, law), law.number
+        law = room(steps, n, m, rows)
+        b = np.tile(p.input_matrix, (steps, 1, 1))
+        arguments = (None, b, hessian, 2.0 * p.input_weight, x_slope, v_slope, on_x, on_v)
+        return backward(*arguments, law), law.number
 
     of_a_step = on_x.radius.shape[1] + on_v.radius.shape[1]
     dropped, number = passed(of_a_step + n)
@@ -214,7 +216,7 @@ def test_the_optimum_does_not_depend_on_the_start(seed: int, size: float) -> Non
     assert s.cost == pytest.approx(best.cost, rel=1e-4)
 
 
-def strict(p: LocalProblem) -> tuple[LocalProblem, LocalSolution]:
+def strict(p: LocalProblem) -> tuple[LocalProblem, Solution]:
     """Returns the problem without the bounds that are just about to become active, or to let go.
 
     About its optimum the active bounds stay the same, so that there is a derivative.
@@ -347,7 +349,7 @@ def test_they_hold_whatever_the_numbers_of_steps_states_and_inputs(
     assert again.cost == pytest.approx(s.cost, rel=1e-6)
 
 
-def assert_gains_lead_to_the_optimum(p: LocalProblem, s: LocalSolution, seed: int) -> None:
+def assert_gains_lead_to_the_optimum(p: LocalProblem, s: Solution, seed: int) -> None:
     """The law v + K δx, from a start that is a little off, is the optimum from there."""
     gain = feedback_gains(p, s)
     assert gain.shape == (p.horizon, p.input_matrix.shape[1], len(p.start))

@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.control import constrained_ddp
 from drake_dress.models.control.local_control import (
     GlobalPlan,
     LocalController,
     LocalState,
-    constrained_ddp,
     continued,
 )
 from drake_dress.models.control.local_model import LocalParameters
-from drake_dress.models.control.local_problem import LocalProblem, LocalSolution
+from drake_dress.models.control.local_problem import LocalProblem
+from drake_dress.models.control.solution import Solution
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.stages import SleeveFacts, Task
@@ -175,9 +176,9 @@ def test_a_garment_drawn_wider_than_asked_is_let_together(
 
 
 def test_gains_ask_for_no_more_than_to_be_back_in_a_step(controller: LocalController) -> None:
-    def opposed(problem: LocalProblem, before: LocalSolution | None) -> LocalSolution:
+    def opposed(problem: LocalProblem, before: Solution | None) -> Solution:
         # the bound on one gripper's speed as active as that on where it is
-        found = constrained_ddp(problem, before)
+        found = constrained_ddp.solve(problem, before)
         both = np.full_like(found.state_multiplier, 1e3), np.full_like(found.input_multiplier, 1e3)
         return replace(found, state_multiplier=both[0], input_multiplier=both[1])
 
