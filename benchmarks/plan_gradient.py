@@ -24,9 +24,10 @@ from benchmarks.logged import logged_policy
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.control.global_mpc import GlobalController, Situation, SleeveTarget
+from drake_dress.models.control.global_mpc import GlobalController
 from drake_dress.models.control.person_model import person_obstacles
 from drake_dress.models.control.policy import DressingPolicy
+from drake_dress.models.control.situation import Situation, SleeveTarget
 from drake_dress.models.dressing.stages import Stage, StageState
 from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
@@ -165,7 +166,7 @@ def _held_against(controller: GlobalController, m: Moment) -> Found:
     cosine, ratio, descent = {}, {}, {}
     for name, frozen in _KINDS.items():
         controller.frozen_contact = frozen
-        gradient = controller._gradient(rollout, m.start, situation)
+        gradient = controller._gradient(rollout, m.start)
         size, wanted = (np.linalg.norm(g, axis=(1, 2)) for g in (gradient, slope))
         cosine[name] = np.sum(gradient * slope, axis=(1, 2)) / np.maximum(size * wanted, 1e-300)
         ratio[name] = size / np.maximum(wanted, 1e-300)

@@ -332,17 +332,16 @@ def _sim_station(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from drake_dress.diagrams.run import run_scenario
+    from drake_dress.diagrams.run import RunOptions, run_scenario
     from drake_dress.diagrams.scenario import load_scenario
 
     source = scenario_file(options.scenario)
     scenario = load_scenario(source, options.set, options.seed)
     default = Path("out") / f"{source.stem}-seed{scenario.seed}"
     out = _directory(options.out, default, RUN_FILES, [source])
-    beside = not options.one_process and worker_count() > 1
-    return run_scenario(
-        scenario, source, out, options.meshcat, options.realtime_rate, beside, options.report
-    )
+    in_workers = not options.one_process and worker_count() > 1
+    how = RunOptions(options.meshcat, options.realtime_rate, in_workers, options.report)
+    return run_scenario(scenario, source, out, how)
 
 
 def _scenarios(_: argparse.Namespace) -> int:

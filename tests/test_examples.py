@@ -10,8 +10,11 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
+    "add_cost": r"without .* are at 1\.19 m after 3 s\nwith .* are at 1\.[01]\d m after 3 s",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "own_controller": r"the left gripper rose by \d\.\d cm\n$",
     "solve_own_problem": r"converged: True[^$]*largest force 2\.000 N[^$]*to the wall 0\.200 m",
+    "swap_predictor": r"asked [1-9]\d* times in 2\.0 s\n$",
 }
 
 

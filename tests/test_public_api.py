@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-MODULES = ("cloth", "control")
+MODULES = ("cloth", "control", "dressing")
 # Those that need neither Drake nor torch.
 PLAIN = ("cloth", "control")
 

@@ -28,6 +28,7 @@ from drake_dress.diagrams.hardware_station import (
     make_hardware_station,
     open_bus,
 )
+from drake_dress.diagrams.own_parts import NOTHING, OwnParts, own_controller
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.station import Station, start_grippers
 from drake_dress.errors import UserError
@@ -57,6 +58,7 @@ class Parts:
     limits: SafetyLimits
     page: Meshcat | None
     beside: bool = False
+    own: OwnParts = NOTHING
 
 
 def garments(scenario: Scenario, source: Path) -> tuple[Garments, SafetyLimits]:
@@ -84,6 +86,7 @@ def parts(
     limits: SafetyLimits,
     page: Meshcat | None = None,
     beside: bool = False,
+    own: OwnParts = NOTHING,
 ) -> Parts:
     """Returns the parts of a scenario's diagram.
 
@@ -94,10 +97,11 @@ def parts(
         page: where the run is shown, if it is.
         beside: whether the true garment is stepped, and the global controller solves, in
             processes of their own.
+        own: parts of a user's own.
     """
     station = plant_station(scenario, meshes.plant, page, meshes.belief, beside)
-    policy = controller_policy(scenario, meshes.belief, station.person)
-    return Parts(scenario, meshes, station, policy, limits, page, beside)
+    policy = controller_policy(scenario, meshes.belief, station.person, own.costs)
+    return Parts(scenario, meshes, station, policy, limits, page, beside, own)
 
 
 def hardware_parts(
@@ -107,6 +111,7 @@ def hardware_parts(
     page: Meshcat | None = None,
     told: Callable[[str], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
+    own: OwnParts = NOTHING,
 ) -> Parts:
     """Returns the parts of a scenario's diagram whose station is behind messages.
 
@@ -117,6 +122,7 @@ def hardware_parts(
         page: where the run is shown, if it is.
         told: is called with each source that is heard.
         stopped: whether to give up waiting.
+        own: parts of a user's own.
 
     Raises:
         ArmReachError: the arms do not reach where the run begins.
@@ -127,7 +133,7 @@ def hardware_parts(
     at = station_parameters(scenario, meshes.belief)
     person = described_person(at)
     planned = planned_arms(at, person)
-    policy = controller_policy(scenario, meshes.belief, person)
+    policy = controller_policy(scenario, meshes.belief, person, own.costs)
     p = hardware_parameters(scenario, meshes.belief)
     # subscriptions in Python end with their bus: a run has none
     heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
@@ -135,7 +141,7 @@ def hardware_parts(
     lcm = open_bus(p.links.lcm_url)
     station = make_hardware_station(p, lcm, person, robots, heard)
     believed = Garments(meshes.belief, meshes.belief)
-    return Parts(scenario, believed, station, policy, limits, page)
+    return Parts(scenario, believed, station, policy, limits, page, own=own)
 
 
 def wired(
@@ -148,10 +154,16 @@ def wired(
         writer: open log, if one is kept.
         record: takes the local problems that are solved, if given.
     """
-    local = local_setup(p.scenario, p.policy)
+    local = None if p.own.controller is not None else local_setup(p.scenario, p.policy)
     if local is not None and record is not None:
         local = replace(local, record=record)
     control = ControlSetup(
-        p.policy, rates(p.scenario), p.limits, predictor(p.scenario), local, p.beside
+        p.policy,
+        rates(p.scenario),
+        p.limits,
+        p.own.predictor or predictor(p.scenario),
+        local,
+        p.beside,
+        None if p.own.controller is None else own_controller(p.own.controller),
     )
     return make_dressing(p.station, p.garments.plant, control, writer, p.page)

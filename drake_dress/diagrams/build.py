@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -29,6 +30,7 @@ from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.constrained_ddp import solve
+from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_model import LocalParameters
 from drake_dress.models.control.person_model import PersonModel
@@ -245,9 +247,12 @@ def placement(scenario: schema.Scenario) -> ArmPlacement | None:
 
 
 def controller_policy(
-    scenario: schema.Scenario, mesh: GarmentMesh, person: Person
+    scenario: schema.Scenario,
+    mesh: GarmentMesh,
+    person: Person,
+    costs: Sequence[GarmentCost] = (),
 ) -> DressingPolicy:
-    """Returns the global controller's policy on its own garment `mesh`."""
+    """Returns the global controller's policy on its own garment `mesh`; `costs` are a user's."""
     c, m = scenario.controller, measures(scenario.person)
     g = c.global_mpc
     shape = PersonModel(
@@ -272,7 +277,7 @@ def controller_policy(
             stages=model_of(c.stages, waiting_progress=g.waiting_progress),
         ),
     )
-    return DressingPolicy(mesh, material(c.material), shape, parameters)
+    return DressingPolicy(mesh, material(c.material), shape, parameters, costs)
 
 
 def solve_budget(scenario: schema.Scenario) -> Budget:

@@ -131,6 +131,7 @@ class ControlSetup:
         predictor: of the person's arms; by default they are believed to stay.
         local: the local controller between plan and governor; the plan is followed when None.
         beside: whether controllers solve in the background, the global one in a worker process.
+        own: the user's system that requests velocities in place of all of these; see `OwnParts`.
     """
 
     policy: DressingPolicy
@@ -139,6 +140,7 @@ class ControlSetup:
     predictor: MotionPredictor = field(default_factory=StillPredictor)
     local: LocalSetup | None = None
     beside: bool = False
+    own: Any = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ class _Controllers:
     """
 
     mpc: GlobalMpc
-    asking: PlanFollower | LocalCompensation
+    asking: PlanFollower | LocalCompensation | Any
     governor: SafetyGovernor
     arms: ArmController | None
 
@@ -199,7 +201,7 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
             beside=control.beside,
         ),
     )
-    asking = w.add(*_plan_to_request(control.local, control.beside))
+    asking = w.add(*_plan_to_request(control))
     governor = w.add(
         "safety_governor",
         SafetyGovernor(
@@ -214,9 +216,12 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
     for quantity in MOTION:
         w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
     w.connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
+    if control.own is not None:
+        _add_own_inputs(w, mpc, control.own)
+    else:
+        w.connect(mpc, "plan", asking, "plan")
     if control.local is not None:
         _add_local_inputs(w, control.local, control.predictor, asking)
-    w.connect(mpc, "plan", asking, "plan")
     _wire_governor(w, asking, governor)
     return _Controllers(mpc, asking, governor, _command_grippers(w, control, governor))
 
@@ -237,13 +242,29 @@ def _command_grippers(
     return None
 
 
-def _plan_to_request(
-    local: LocalSetup | None, beside: bool
-) -> tuple[str, PlanFollower | LocalCompensation]:
+def _plan_to_request(control: ControlSetup) -> tuple[str, Any]:
     """Returns name and system of what turns plans into requested velocities."""
-    if local is None:
+    if control.own is not None:
+        return "own_controller", control.own
+    if control.local is None:
         return "plan_follower", PlanFollower()
-    return "local_controller", local.system(beside)
+    return "local_controller", control.local.system(control.beside)
+
+
+def _add_own_inputs(w: Wiring, mpc: GlobalMpc, controller: Any) -> None:
+    """Connects those of its input ports that a user's controller has."""
+    sources = {
+        "plan": mpc.GetOutputPort("plan"),
+        "garment_position": w.station.GetOutputPort("estimate.garment_position"),
+        "joint_position": w.station.GetOutputPort("estimate.joint_position"),
+    }
+    for side in SIDES:
+        for quantity in ("position", "force"):
+            measured = w.station.GetOutputPort(f"{side}_gripper.{quantity}_measured")
+            sources[f"{side}_gripper_{quantity}"] = measured
+    for name, source in sources.items():
+        if controller.HasInputPort(name):
+            w.builder.Connect(source, controller.GetInputPort(name))
 
 
 def _add_local_inputs(
@@ -259,9 +280,7 @@ def _add_local_inputs(
     _show_grippers(w, controller, "position")
 
 
-def _wire_governor(
-    w: Wiring, asking: PlanFollower | LocalCompensation, governor: SafetyGovernor
-) -> None:
+def _wire_governor(w: Wiring, asking: Any, governor: SafetyGovernor) -> None:
     w.connect(asking, "request_time", governor, "request_time")
     w.connect(w.station, "permission", governor, "permission")
     w.connect(w.station, "estimate.joint_position", governor, "joint_position")

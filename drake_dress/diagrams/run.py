@@ -23,6 +23,7 @@ from drake_dress.diagrams.hardware_station import (
     NotAtStartError,
     StationSilentError,
 )
+from drake_dress.diagrams.own_parts import NOTHING, OwnParts
 from drake_dress.diagrams.pace import SteadyPace
 from drake_dress.diagrams.run_log import open_run_log
 from drake_dress.diagrams.scenario import Scenario, apply_variation
@@ -43,14 +44,33 @@ _CHUNK = 0.1
 _STAY = 1.0
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How a scenario is run.
+
+    Attributes:
+        meshcat: whether to show the run live.
+        realtime_rate: at most this many simulated seconds per second; 0 for no limit, which is 1
+            for hardware.
+        in_workers: whether the simulated garment is stepped, and the global controller solves, in
+            worker processes.
+        report: whether report and replay are written beside log and summary.
+        told: takes the lines that say where the run is shown and how it ended.
+    """
+
+    meshcat: bool = True
+    realtime_rate: float = 0.0
+    in_workers: bool = False
+    report: bool = True
+    told: Callable[[str], None] = partial(print, flush=True)
+
+
 def run_scenario(
     scenario: Scenario,
     source: Path,
     out: Path,
-    meshcat: bool = True,
-    realtime_rate: float = 0.0,
-    beside: bool = False,
-    report: bool = True,
+    options: RunOptions = RunOptions(),
+    own: OwnParts = NOTHING,
 ) -> int:
     """Runs a scenario and writes log, summary, report and replay; returns the exit status.
 
@@ -60,12 +80,8 @@ def run_scenario(
         scenario: loaded and validated; its variation is drawn here from its seed.
         source: the scenario's file, for messages and paths relative to it.
         out: directory to write to; made when all input has proved usable.
-        meshcat: whether to show the run live.
-        realtime_rate: at most this many simulated seconds per second; 0 for no limit, which is 1
-            for hardware.
-        beside: whether the simulated garment is stepped, and the global controller solves, in
-            processes of their own.
-        report: whether report and replay are written beside log and summary.
+        options: how it is run.
+        own: parts of a user's own.
 
     Raises:
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
@@ -73,10 +89,11 @@ def run_scenario(
     """
     scenario = apply_variation(scenario)
     meshes, limits = garments(scenario, source)
-    page = _open_meshcat() if meshcat else None
-    p = _parts(scenario, source, meshes, limits, page, beside)
+    page = _open_meshcat(options.told) if options.meshcat else None
+    p = _parts(scenario, source, meshes, limits, page, options.in_workers, own)
+    rate = options.realtime_rate
     if p.station.in_real_time:
-        realtime_rate = realtime_rate or 1.0
+        rate = rate or 1.0
 
     with claimed("--out", out):
         begin = clock.perf_counter()
@@ -87,14 +104,15 @@ def run_scenario(
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
             with left_out_of_garbage():
-                ending = _simulate(dressing, simulator, scenario.duration, realtime_rate, interrupt)
+                ending = _simulate(dressing, simulator, scenario.duration, rate, interrupt)
             p.station.note(simulator.get_context(), writer)
             if p.station.in_real_time:
                 writer.note("behind", ending.behind)
             if ending.fault is not None:
                 writer.note("ended_by", ending.fault)
         wall_time = clock.perf_counter() - begin
-        return concluded(out, wall_time, report, interrupt if ending.interrupted else None)
+        by = interrupt if ending.interrupted else None
+        return concluded(out, wall_time, options.report, by, options.told)
 
 
 def _parts(
@@ -104,12 +122,13 @@ def _parts(
     limits: SafetyLimits,
     page: Meshcat | None,
     beside: bool,
+    own: OwnParts,
 ) -> Parts:
     """Returns the parts of the diagram; a problem with arms or hardware is the user's to know."""
     arms, hardware = "station.arms", "station.hardware"
     try:
         if scenario.station.kind == "simulated":
-            return parts(scenario, meshes, limits, page, beside)
+            return parts(scenario, meshes, limits, page, beside, own)
         with caught_interrupt() as interrupt:
             print(f"listening: {scenario.station.hardware.lcm_url}", flush=True)
             p = hardware_parts(
@@ -119,6 +138,7 @@ def _parts(
                 page,
                 lambda name: print(f"heard: {name.replace('_', ' ')}", flush=True),
                 interrupt.is_set,
+                own,
             )
         if interrupt.is_set():
             raise interrupt.error()
@@ -133,14 +153,14 @@ def _parts(
         raise UserError(str(source), hardware, str(error)) from error
 
 
-def _open_meshcat() -> Meshcat | None:
+def _open_meshcat(told: Callable[[str], None]) -> Meshcat | None:
     """Returns a page that listens on localhost only, and says where; None where none can be."""
     try:
         page = open_page()
     except UserError as error:
         print(f"no live page: {error.message}; the run goes on without", file=sys.stderr)
         return None
-    print(f"live: {page.web_url()}", flush=True)
+    told(f"live: {page.web_url()}")
     return page
 
 
@@ -210,7 +230,13 @@ def _simulate(
         return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
 
 
-def concluded(out: Path, wall_time: float, report: bool, interrupt: Interrupt | None) -> int:
+def concluded(
+    out: Path,
+    wall_time: float,
+    report: bool,
+    interrupt: Interrupt | None,
+    told: Callable[[str], None] = print,
+) -> int:
     """Writes what `conclude` does, tells how the run ended; returns the exit status.
 
     Args:
@@ -218,16 +244,19 @@ def concluded(out: Path, wall_time: float, report: bool, interrupt: Interrupt | 
         wall_time: that it took, s.
         report: whether report and replay are written.
         interrupt: the signal that ended it, if one did.
+        told: takes the lines that say so.
     """
-    success, reason = conclude(out, wall_time, report)
+    success, reason = conclude(out, wall_time, report, told)
     if interrupt is not None:
-        print(f"{interrupt.word}: what had run is in the log")
+        told(f"{interrupt.word}: what had run is in the log")
         return interrupt.status
-    print("both sleeves on" if success else f"not dressed: {reason}")
+    told("both sleeves on" if success else f"not dressed: {reason}")
     return DONE if success else NOT_DRESSED
 
 
-def conclude(out: Path, wall_time: float, report: bool = True) -> tuple[bool, str | None]:
+def conclude(
+    out: Path, wall_time: float, report: bool = True, told: Callable[[str], None] = print
+) -> tuple[bool, str | None]:
     """Writes the summary of the log in `out`, and report and replay if they are wanted.
 
     Each is written by itself: one that fails is told in a line and takes nothing else with it.
@@ -244,9 +273,9 @@ def conclude(out: Path, wall_time: float, report: bool = True) -> tuple[bool, st
             written.append(_written(report_file, lambda: _write_report(out, measures)))
             written.append(_written(replay_file, lambda: write_replay_html(log, replay_file)))
     if all(written):
-        print(f"{'log, report and replay' if report else 'log and summary'}: {out}")
+        told(f"{'log, report and replay' if report else 'log and summary'}: {out}")
     else:
-        print(f"log: {log_file}")
+        told(f"log: {log_file}")
     return bool(summary["success"]), summary["reason"]
 
 

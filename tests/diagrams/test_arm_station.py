@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drake_dress.diagrams.arms import ArmPlacement, ArmReachError, set_up_arms
-from drake_dress.diagrams.run import run_scenario
+from drake_dress.diagrams.run import RunOptions, run_scenario
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.errors import UserError
 from drake_dress.models.arm.clearance import Capsules
@@ -51,14 +51,14 @@ def test_a_run_that_cannot_succeed_writes_nothing(
 ) -> None:
     scenario = load_scenario(SCENARIO, [*COARSE, f"station.arms.distance_behind={behind}"])
     with pytest.raises(UserError, match=f"station.arms: the left arm does not reach {where}"):
-        run_scenario(scenario, SCENARIO, tmp_path / "out", meshcat=False)
+        run_scenario(scenario, SCENARIO, tmp_path / "out", RunOptions(meshcat=False))
     assert not (tmp_path / "out").exists()
 
 
 def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
     # steps so short that most of them are between samples
     scenario = load_scenario(SCENARIO, [*COARSE, "duration=2.0", "plant.body_time_step=0.004"])
-    run_scenario(scenario, SCENARIO, tmp_path, meshcat=False)
+    run_scenario(scenario, SCENARIO, tmp_path, RunOptions(meshcat=False))
     with h5py.File(tmp_path / "run.h5") as log:
         for side in SIDES:
             q, asked = log[f"arm/{side}/q"][:], log[f"arm/{side}/q_commanded"][:]

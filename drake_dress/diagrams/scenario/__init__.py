@@ -1,8 +1,14 @@
 """Scenarios: what a YAML file may say, and how it is read."""
 
-from drake_dress.diagrams.scenario.loading import load_scenario
+from drake_dress.diagrams.scenario.loading import checked_scenario, load_scenario
 from drake_dress.diagrams.scenario.schema import Scenario
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.scenario.variation import apply_variation
 
-__all__ = ["Scenario", "apply_variation", "load_scenario", "resolved_yaml"]
+__all__ = [
+    "Scenario",
+    "apply_variation",
+    "checked_scenario",
+    "load_scenario",
+    "resolved_yaml",
+]

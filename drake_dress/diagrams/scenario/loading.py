@@ -20,6 +20,7 @@ from drake_dress.diagrams.scenario.checks import (
 )
 from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
 from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario
+from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
 from drake_dress.plan_delay import kept_plan_delay
@@ -46,6 +47,24 @@ def load_scenario(
         _override(content, key, text)
     if seed is not None:
         content["seed"] = seed
+    return _checked(source, content)
+
+
+def checked_scenario(scenario: Scenario, source: str = "scenario") -> Scenario:
+    """Returns a copy of a scenario that was made or changed in Python, held against all rules.
+
+    Args:
+        scenario: as it is to be run.
+        source: named in messages.
+
+    Raises:
+        UserError: a value cannot be used.
+    """
+    return _checked(source, read_yaml(source, resolved_yaml(scenario)))
+
+
+def _checked(source: str, content: dict[str, Any]) -> Scenario:
+    """Returns the scenario that the content of a file describes."""
     _resolve_delay(source, content)
     fill_in_fidelity(content)
     content = typed(source, "", content, Scenario)

@@ -14,7 +14,7 @@ from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth import material
-from drake_dress.models.control import global_mpc, local_model, policy, safety, task_parameters
+from drake_dress.models.control import costs, local_model, policy, safety, task_parameters
 from drake_dress.models.dressing import stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
@@ -231,9 +231,9 @@ class Plant:
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
 
-@mirror_of(global_mpc.Weights)
+@mirror_of(costs.Weights)
 class Weights(Mirror):
-    """Of the global controller's costs; see models/control/global_mpc.py."""
+    """Of the global controller's costs; see models/control/costs.py."""
 
 
 @mirror_of(task_parameters.Approach)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,14 +12,10 @@ from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
-from drake_dress.models.control.global_mpc import (
-    GlobalController,
-    HeldGarment,
-    Plan,
-    Situation,
-    Weights,
-)
+from drake_dress.models.control.costs import GarmentCost, Weights
+from drake_dress.models.control.global_mpc import GlobalController, Plan
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
+from drake_dress.models.control.situation import HeldGarment, Situation
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.sleeve import find_entry
@@ -82,6 +79,7 @@ class DressingPolicy:
         material: what the controller believes of the fabric.
         person: what it knows of the person's shape.
         parameters: settings.
+        costs: of a user's own, added to those of the dressing.
     """
 
     def __init__(
@@ -90,6 +88,7 @@ class DressingPolicy:
         material: Material,
         person: PersonModel,
         parameters: PolicyParameters,
+        costs: Sequence[GarmentCost] = (),
     ) -> None:
         self.mesh = mesh
         self.parameters = parameters
@@ -122,6 +121,7 @@ class DressingPolicy:
             parameters.weights,
             parameters.max_speed,
             parameters.max_iterations,
+            costs=costs,
         )
 
     def initial_state(self) -> PolicyState:

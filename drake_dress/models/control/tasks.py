@@ -10,13 +10,13 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.corridor import Corridor
-from drake_dress.models.control.global_mpc import SleeveTarget
 from drake_dress.models.control.preparing import (
     Preparation,
     choose_approach,
     distance_aside,
     opening,
 )
+from drake_dress.models.control.situation import SleeveTarget
 from drake_dress.models.control.task_parameters import Approach, TaskParameters, unit
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior

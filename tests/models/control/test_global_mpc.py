@@ -13,14 +13,9 @@ from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.corridor import Corridor
-from drake_dress.models.control.global_mpc import (
-    GlobalController,
-    HeldGarment,
-    Plan,
-    Situation,
-    SleeveTarget,
-    Weights,
-)
+from drake_dress.models.control.costs import Weights
+from drake_dress.models.control.global_mpc import GlobalController, Plan
+from drake_dress.models.control.situation import HeldGarment, Situation, SleeveTarget
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -98,23 +93,22 @@ def test_gradient_of_the_plan_matches_finite_differences(
 ) -> None:
     """Grippers beyond their span, closer than a garment that is entered wants them, on edge."""
     controller, x, targets = setting
-    monkeypatch.setattr(controller, "_span", span)
+    monkeypatch.setattr(controller, "grip", replace(controller.grip, span=span))
     rng = np.random.default_rng(0)
     velocity = 0.03 * rng.normal(size=(HORIZON, 2, 3))
-    grip = x[controller.cloth.held[controller._split[0]]].mean(axis=0)
+    grip = x[controller.grip.nodes[controller.grip.of_side[0]]].mean(axis=0)
     person = [_beside(grip) if beside else Obstacles.none()] * HORIZON
     left = np.tile([0.6, 0.8, 0.0], (HORIZON, 1))
     situation = Situation(x, np.zeros_like(x), targets, person, left)
     rollout = controller._rollout(situation, velocity)
-    assert (controller._level_error(controller._apart(x), left, 0) > 0.0) == (span == 1.0)
-    assert targets[1].corridor is not None
-    assert controller._corridor(x, targets[1].corridor, 0)[0] > 0.0
-    assert targets[0].passage is not None
-    sleeve = rollout.sleeves[0][0]
-    assert controller._passage(rollout.states[0], sleeve.p_c, targets[0].passage[0])[0] > 0.0
-    if beside:
-        assert controller._clearance(x, person[0])[0] > 0.0
-    gradient = controller._gradient(rollout, velocity, situation)
+    first, costs = rollout.steps[0], controller.costs
+    _, level, clearance = costs.of_garment
+    assert (level.value(first) > 0.0) == (span == 1.0)
+    assert (clearance.value(first) > 0.0) == beside
+    _, _, corridor, passage, _ = costs.of_sleeves
+    assert corridor.value(first, 1) > 0.0
+    assert passage.value(first, 0) > 0.0
+    gradient = controller._gradient(rollout, velocity)
     for _ in range(5):
         d = rng.normal(size=velocity.shape)
         step = 1e-6
@@ -186,7 +180,8 @@ def test_plan_turns_a_garment_back_that_is_on_edge(
 ) -> None:
     """The left gripper goes to the person's left of the right one, whatever sleeves are asked."""
     controller, x, targets = setting
-    across = controller._apart(x) / np.linalg.norm(controller._apart(x))
+    across = controller.grip.left_from_right(x)
+    across = across / np.linalg.norm(across)
     left = np.tile(np.cross(across, [0.0, 0.0, 1.0]), (HORIZON, 1))
     idle = tuple(replace(t, position_weight=0.0, direction_weight=0.0) for t in targets)
     start = np.zeros((HORIZON, 2, 3))
@@ -261,7 +256,7 @@ def test_gradient_with_frozen_contact_tells_what_motions_of_a_centimetre_do(
     cosine, ratio = {}, {}
     for frozen in (True, False):
         controller.frozen_contact = frozen
-        gradient = controller._gradient(rollout, start, situation)[1:]
+        gradient = controller._gradient(rollout, start)[1:]
         size, wanted = (np.linalg.norm(g, axis=(1, 2)) for g in (gradient, slope[1:]))
         cosine[frozen] = np.sum(gradient * slope[1:], axis=(1, 2)) / (size * wanted)
         ratio[frozen] = size / wanted

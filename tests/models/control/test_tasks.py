@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
-from drake_dress.models.control.global_mpc import SleeveTarget
+from drake_dress.models.control.situation import SleeveTarget
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState

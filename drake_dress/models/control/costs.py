@@ -1,0 +1,460 @@
+"""What a step of a plan costs: each cost an object with its value and its slope.
+
+A cost of a sleeve looks at one side at a time, a cost of the garment at the whole. Slopes are added
+to those of the step: by nodes, by what the grippers hold, by forces, and by the sleeves' centres
+and directions, which `StageCosts` passes on to the nodes of the armholes. A new cost is a class
+with `value` and `add_slope`; `tests/models/control/test_costs.py` holds all of them against finite
+differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
+from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.control.corridor import corridor_cost
+from drake_dress.models.control.situation import HeldGarment, Situation, SleeveTarget
+from drake_dress.models.dressing.sleeve import (
+    Entry,
+    SleeveState,
+    entry_direction,
+    entry_direction_vjp,
+    sleeve_state_vjp,
+)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Diagonal weights of the stage costs.
+
+    Attributes:
+        position: W, 1/m².
+        direction: Q, dimensionless.
+        speed: R on the gripper displacement of a step, 1/m².
+        safety: w_s on the gripper force beyond `free_force`, 1/N².
+        free_force: gripper force that costs nothing, N.
+        separation: on the distance of the grippers beyond what the garment between them spans at
+            rest, 1/m²; it is what the force would say too late for a descent to hear. Also on
+            what it is short of `least_spread` of that, where the garment collapses.
+        entering_spread: takes the place of `least_spread` while a sleeve is entered: an armhole is
+            held open and turned toward the hand by the garment between the grippers, if it is
+            stretched out; a slack one hangs, and is pushed away by the hand.
+        level: on what the left gripper is short of being `least_level` of the grippers' distance at
+            rest further left than the right one, as the person sees it, 1/m². A garment on edge
+            has its openings turned away from both hands, and no way back on its own.
+        clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
+        free_clearance: distance of a gripper to the person's skin that costs nothing, m.
+        corridor: on what hangs ahead of a hand that is to go in, 1/m²; see corridor.py.
+        corridor_radius, corridor_length: of the cylinder ahead of it, m.
+        passage: on what would cross the forearm if the hand were in the armhole now, 1/m².
+        passage_radius, passage_length: of the cylinder that stands for the forearm, m.
+    """
+
+    position: float = 1.0
+    direction: float = 0.05
+    speed: float = 0.125
+    safety: float = 3e-4
+    free_force: float = 5.0
+    separation: float = 1.0
+    least_spread: float = 0.5
+    entering_spread: float = 0.85
+    level: float = 20.0
+    least_level: float = 0.5
+    clearance: float = 10.0
+    free_clearance: float = 0.05
+    corridor: float = 3.0
+    corridor_radius: float = 0.06
+    corridor_length: float = 0.12
+    passage: float = 3.0
+    passage_radius: float = 0.06
+    passage_length: float = 0.25
+
+
+@dataclass(frozen=True)
+class Grip:
+    """The nodes that the grippers hold.
+
+    Attributes:
+        nodes: (k,) of the garment: those of left, then right gripper.
+        of_side: indices into `nodes` of the left and of the right gripper.
+        span: distance of the grippers at rest, m.
+    """
+
+    nodes: IndexArray
+    of_side: tuple[IndexArray, IndexArray]
+    span: float
+
+    def left_from_right(self, x: FloatArray) -> FloatArray:
+        """Returns the vector (3,) from the right to the left grasp of nodes `x` (n,3), m."""
+        left, right = (x[self.nodes[of]].mean(axis=0) for of in self.of_side)
+        between: FloatArray = left - right
+        return between
+
+
+@dataclass(frozen=True)
+class PlannedStep:
+    """One step of a plan, as costs see it.
+
+    Attributes:
+        index: of the step, from 0.
+        x: (n,3) nodes at its end, m.
+        reaction: (k,3) force of the garment on what holds its held nodes, N.
+        sleeves: states of left and right sleeve.
+        situation: what the plan was asked for.
+        grip: what the grippers hold.
+    """
+
+    index: int
+    x: FloatArray
+    reaction: FloatArray
+    sleeves: tuple[SleeveState, SleeveState]
+    situation: Situation
+    grip: Grip
+
+    def target(self, side: int) -> SleeveTarget:
+        """Returns the target of a sleeve."""
+        return self.situation.targets[side]
+
+    def force(self, side: int) -> FloatArray:
+        """Returns the force (3,) of the garment on a gripper, N."""
+        total: FloatArray = self.reaction[self.grip.of_side[side]].sum(axis=0)
+        return total
+
+
+@dataclass
+class Slope:
+    """Derivatives of the costs of one step; costs add to them.
+
+    Attributes:
+        x: (n,3) by the nodes.
+        held: (k,3) by the held nodes, beside those in `x`.
+        grippers: (2,3) by the mean of the nodes that left and right gripper hold.
+        reaction: (k,3) by the forces.
+        p_c, v_c: (2,3) by the centres and directions of the sleeves.
+    """
+
+    x: FloatArray
+    held: FloatArray
+    grippers: FloatArray
+    reaction: FloatArray
+    p_c: FloatArray
+    v_c: FloatArray
+
+    @classmethod
+    def onto(cls, x: FloatArray, held_count: int) -> Slope:
+        """Returns one that adds to `x` (n,3) in place, and is zero otherwise."""
+        held, pair = (held_count, 3), (2, 3)
+        zeros = [np.zeros(shape) for shape in (held, pair, held, pair, pair)]
+        return cls(x, *zeros)
+
+
+class GarmentCost(Protocol):
+    """A cost of the whole garment at one step."""
+
+    def value(self, step: PlannedStep) -> float:
+        """Returns the cost, zero or more."""
+
+    def add_slope(self, step: PlannedStep, slope: Slope) -> None:
+        """Adds the derivative of `value`."""
+
+
+class SleeveCost(Protocol):
+    """A cost of one sleeve at one step."""
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """Returns the cost of a side, zero or more."""
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """Adds the derivative of `value`."""
+
+
+@dataclass(frozen=True)
+class SleevePosition:
+    """w ‖p_c − p̄‖²: the armhole's centre is to be at its target."""
+
+    weight: float
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """See `SleeveCost`."""
+        target = step.target(side)
+        off = step.sleeves[side].p_c - target.position[step.index]
+        return self.weight * target.position_weight * float(np.sum(off**2))
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """See `SleeveCost`."""
+        target = step.target(side)
+        off = step.sleeves[side].p_c - target.position[step.index]
+        slope.p_c[side] += 2.0 * self.weight * target.position_weight * off
+
+
+@dataclass(frozen=True)
+class SleeveDirection:
+    """w ‖d − d̄‖²: the armhole's direction, or that to the garment's entry, is to be its target."""
+
+    weight: float
+    entry: Entry
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """See `SleeveCost`."""
+        off = self._off(step, side)
+        return self.weight * step.target(side).direction_weight * float(np.sum(off**2))
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """See `SleeveCost`."""
+        target = step.target(side)
+        by_direction = 2.0 * self.weight * target.direction_weight * self._off(step, side)
+        if not target.entering:
+            slope.v_c[side] += by_direction
+            return
+        by_entry, by_center = entry_direction_vjp(
+            step.x, step.sleeves[side].p_c, self.entry, by_direction
+        )
+        slope.x[self.entry.nodes] += by_entry
+        slope.p_c[side] += by_center
+
+    def _off(self, step: PlannedStep, side: int) -> FloatArray:
+        target, sleeve = step.target(side), step.sleeves[side]
+        way = sleeve.v_c
+        if target.entering:
+            way = entry_direction(step.x, sleeve.p_c, self.entry)
+        return way - target.direction[step.index]
+
+
+@dataclass(frozen=True)
+class HandCorridor:
+    """What hangs ahead of a hand that is to go in; see corridor.py. Lengths in m."""
+
+    weight: float
+    radius: float
+    length: float
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """See `SleeveCost`."""
+        return self.weight * self._found(step, side)[0] if self._counts(step, side) else 0.0
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """See `SleeveCost`."""
+        if self._counts(step, side):
+            slope.x += self.weight * self._found(step, side)[1]
+
+    def _counts(self, step: PlannedStep, side: int) -> bool:
+        return step.target(side).corridor is not None
+
+    def _found(self, step: PlannedStep, side: int) -> tuple[float, FloatArray]:
+        way, j = step.target(side).corridor, step.index
+        assert way is not None
+        return corridor_cost(step.x, way.hand[j], way.into[j], self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class ForearmPassage:
+    """What would cross the forearm if the hand were in the armhole now. Lengths in m."""
+
+    weight: float
+    radius: float
+    length: float
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """See `SleeveCost`."""
+        return self.weight * self._found(step, side)[0] if self._counts(step, side) else 0.0
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """See `SleeveCost`."""
+        if not self._counts(step, side):
+            return
+        crossing = self._found(step, side)[1]
+        slope.x += self.weight * crossing
+        slope.p_c[side] -= self.weight * crossing.sum(axis=0)
+
+    def _counts(self, step: PlannedStep, side: int) -> bool:
+        return step.target(side).passage is not None and self.weight > 0.0
+
+    def _found(self, step: PlannedStep, side: int) -> tuple[float, FloatArray]:
+        into = step.target(side).passage
+        assert into is not None
+        center = step.sleeves[side].p_c
+        return corridor_cost(step.x, center, -into[step.index], self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class GripperForce:
+    """w max(0, ‖f‖ − free)²: a gripper pulls no harder than `free`, N."""
+
+    weight: float
+    free: float
+
+    def value(self, step: PlannedStep, side: int) -> float:
+        """See `SleeveCost`."""
+        force = float(np.linalg.norm(step.force(side)))
+        return self.weight * max(0.0, force - self.free) ** 2
+
+    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
+        """See `SleeveCost`."""
+        total = step.force(side)
+        force = float(np.linalg.norm(total))
+        excess = force - self.free
+        if excess > 0.0:
+            mine = step.grip.of_side[side]
+            slope.reaction[mine] += 2.0 * self.weight * excess * total / force
+
+
+@dataclass(frozen=True)
+class GripperSpread:
+    """w e²: e, m, is by how much the grippers are too far apart, or too close to each other.
+
+    `least` and `entering` are shares of their distance at rest; the latter takes the place of
+    `least` while a sleeve is entered.
+    """
+
+    weight: float
+    least: float
+    entering: float
+
+    def value(self, step: PlannedStep) -> float:
+        """See `GarmentCost`."""
+        distance = float(np.linalg.norm(step.grip.left_from_right(step.x)))
+        return self.weight * self._error(step, distance) ** 2
+
+    def add_slope(self, step: PlannedStep, slope: Slope) -> None:
+        """See `GarmentCost`."""
+        between = step.grip.left_from_right(step.x)
+        distance = float(np.linalg.norm(between))
+        error = self._error(step, distance)
+        if error != 0.0:
+            pull = 2.0 * self.weight * error * between / distance
+            slope.grippers[0] += pull
+            slope.grippers[1] -= pull
+
+    def _error(self, step: PlannedStep, distance: float) -> float:
+        """Returns how far, m, grippers are too far apart (positive) or too close (negative)."""
+        span = step.grip.span
+        entering = any(t.entering and t.position_weight > 0.0 for t in step.situation.targets)
+        short = distance - (self.entering if entering else self.least) * span
+        return max(0.0, distance - span) + min(0.0, short)
+
+
+@dataclass(frozen=True)
+class GripperLevel:
+    """w e²: e, m, is what the left gripper is short of being left of the right one.
+
+    `least` is the share of the grippers' distance at rest that it is to be.
+    """
+
+    weight: float
+    least: float
+
+    def value(self, step: PlannedStep) -> float:
+        """See `GarmentCost`."""
+        return self.weight * self._error(step) ** 2
+
+    def add_slope(self, step: PlannedStep, slope: Slope) -> None:
+        """See `GarmentCost`."""
+        leftward, error = step.situation.leftward, self._error(step)
+        if leftward is not None and error != 0.0:
+            push = 2.0 * self.weight * error * leftward[step.index]
+            slope.grippers[0] -= push
+            slope.grippers[1] += push
+
+    def _error(self, step: PlannedStep) -> float:
+        leftward = step.situation.leftward
+        if leftward is None:
+            return 0.0
+        between = step.grip.left_from_right(step.x)
+        return max(0.0, self.least * step.grip.span - float(between @ leftward[step.index]))
+
+
+@dataclass(frozen=True)
+class PersonClearance:
+    """w e², mean over what a gripper holds: e is by how much it is closer to the skin than `free`.
+
+    `free` is in m.
+    """
+
+    weight: float
+    free: float
+
+    def value(self, step: PlannedStep) -> float:
+        """See `GarmentCost`."""
+        return self._found(step)[0]
+
+    def add_slope(self, step: PlannedStep, slope: Slope) -> None:
+        """See `GarmentCost`."""
+        slope.held += self._found(step)[1]
+
+    def _found(self, step: PlannedStep) -> tuple[float, FloatArray]:
+        """Returns the cost, and its derivative by the held nodes (k,3)."""
+        grip, obstacles = step.grip, step.situation.obstacles[step.index]
+        if not obstacles.count:
+            return 0.0, np.zeros((len(grip.nodes), 3))
+        count = np.empty(len(grip.nodes))
+        for of in grip.of_side:
+            count[of] = len(of)
+        near = find_proximity(step.x[grip.nodes], obstacles, self.free)
+        short = np.maximum(0.0, -near.gap)
+        cost = self.weight * float(np.sum(short**2 / count))
+        return cost, (-2.0 * self.weight * short / count * near.slope)[:, None] * near.normal
+
+
+@dataclass(frozen=True)
+class StageCosts:
+    """All costs of a step.
+
+    Attributes:
+        of_sleeves, of_garment: the costs.
+        armholes: loop nodes of left and right armhole. signs: of their orientation.
+    """
+
+    of_sleeves: Sequence[SleeveCost]
+    of_garment: Sequence[GarmentCost]
+    armholes: tuple[IntArray, IntArray]
+    signs: tuple[float, float]
+
+    def values(self, step: PlannedStep) -> list[float]:
+        """Returns each cost of the step: of the left sleeve, of the right one, of the garment."""
+        of_sleeves = [cost.value(step, side) for side in (0, 1) for cost in self.of_sleeves]
+        return of_sleeves + [cost.value(step) for cost in self.of_garment]
+
+    def add_slope(self, step: PlannedStep, x_bar: FloatArray) -> FloatArray:
+        """Adds the derivative by the nodes to `x_bar` (n,3); returns that by the forces (k,3)."""
+        slope = Slope.onto(x_bar, len(step.grip.nodes))
+        for side in (0, 1):
+            for of_sleeve in self.of_sleeves:
+                of_sleeve.add_slope(step, side, slope)
+            loop, sign = self.armholes[side], self.signs[side]
+            of_loop = sleeve_state_vjp(step.x, loop, sign, slope.p_c[side], slope.v_c[side])
+            np.add.at(x_bar, loop, of_loop)
+        for of_garment in self.of_garment:
+            of_garment.add_slope(step, slope)
+        for side, of in enumerate(step.grip.of_side):
+            x_bar[step.grip.nodes[of]] += slope.grippers[side] / len(of)
+        x_bar[step.grip.nodes] += slope.held
+        return slope.reaction
+
+
+def dressing_costs(
+    weights: Weights, garment: HeldGarment, more: Sequence[GarmentCost] = ()
+) -> StageCosts:
+    """Returns the costs of the dressing; `more` are added to those of the garment."""
+    w = weights
+    return StageCosts(
+        (
+            SleevePosition(w.position),
+            SleeveDirection(w.direction, garment.entry),
+            HandCorridor(w.corridor, w.corridor_radius, w.corridor_length),
+            ForearmPassage(w.passage, w.passage_radius, w.passage_length),
+            GripperForce(w.safety, w.free_force),
+        ),
+        (
+            GripperSpread(w.separation, w.least_spread, w.entering_spread),
+            GripperLevel(w.level, w.least_level),
+            PersonClearance(w.clearance, w.free_clearance),
+            *more,
+        ),
+        garment.armholes,
+        garment.signs,
+    )

@@ -1,0 +1,72 @@
+"""What the global controller is asked, and what it plans with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.control.corridor import Corridor
+from drake_dress.models.dressing.sleeve import Entry
+
+
+@dataclass(frozen=True)
+class SleeveTarget:
+    """Where one sleeve shall be at each of the N steps.
+
+    Attributes:
+        position: (N,3) m; direction: (N,3) unit vectors.
+        position_weight, direction_weight: factors on W and Q; 0 leaves the sleeve alone.
+        entering: the direction asked for is that from the armhole to the garment's entry, not the
+            armhole's own.
+        corridor: ahead of the hand that is to go in, if it is near.
+        passage: (N,3) unit vectors from elbow to hand of the arm that is to go in.
+    """
+
+    position: FloatArray
+    direction: FloatArray
+    position_weight: float = 1.0
+    direction_weight: float = 1.0
+    entering: bool = False
+    corridor: Corridor | None = None
+    passage: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The garment now, its targets, and the predicted person.
+
+    Attributes:
+        x: (n,3) garment now, m.
+        v: (n,3) its velocity, m/s.
+        targets: of left and right sleeve.
+        obstacles: the predicted person at the start of each of the N steps.
+        leftward: (N,3) horizontal unit vectors to the person's left; if None, the grippers' level
+            costs nothing.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    targets: tuple[SleeveTarget, SleeveTarget]
+    obstacles: Sequence[Obstacles]
+    leftward: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class HeldGarment:
+    """How the controller's garment is held, and where its openings are.
+
+    Attributes:
+        held_count: number of nodes held by left and by right gripper.
+        armholes: loop nodes of left and right armhole.
+        signs: orientation signs of the loops (see `loop_orientation`).
+        span: distance of the grippers at rest, m.
+        entry: where arms come into the garment.
+    """
+
+    held_count: tuple[int, int]
+    armholes: tuple[IntArray, IntArray]
+    signs: tuple[float, float]
+    span: float
+    entry: Entry
