@@ -114,7 +114,7 @@ def explain(
 ) -> Explained:
     """Returns what a scenario's simulation gets wrong about recordings, and why.
 
-    It takes minutes: about a thousand replays of each recording, side by side on all cores.
+    It takes minutes, on all cores; `docs/explain.md` has measured times.
 
     Args:
         recordings: one or more; files are read as `drake-dress explain` reads them.

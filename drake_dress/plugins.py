@@ -99,7 +99,8 @@ def _imported(source: str, module: str) -> ModuleType:
         where = ": ".join(part for part in (error.source, error.key) if part)
         raise UserError(source, where, error.message) from error
     except Exception as error:
-        if isinstance(error, ModuleNotFoundError) and source.startswith(str(error.name)):
+        absent = error.name if isinstance(error, ModuleNotFoundError) else None
+        if absent is not None and source == module and f"{module}.".startswith(f"{absent}."):
             raise UserError(
                 "--plugin", source, "no such module, expected a Python file or a module"
             ) from error

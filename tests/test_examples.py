@@ -10,6 +10,8 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
+    "explain_own_effect": r"lacks is a chain in the hem \(mass 0\.(09|10)\d* ± .* kg\)\.\n$",
+    "explain_recording": r"cameras that are displaced(.*\n)*markers off by 35, now [3-8] mm\n$",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
 }
 

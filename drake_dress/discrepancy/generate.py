@@ -18,7 +18,7 @@ from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
-from drake_dress.discrepancy.workers import submit
+from drake_dress.discrepancy.workers import answers, submit
 from drake_dress.errors import UserError
 from drake_dress.machine import worker_count
 from drake_dress.models.arrays import FloatArray, IntArray
@@ -243,15 +243,13 @@ def record_all(
         motions: of `MOTIONS`.
     """
     lab = truth(scenario, base, effects)
-    recordings = []
+    names = iter(motions)
     with WorkerPool(min(len(motions), workers or worker_count())) as pool:
         futures = [
             submit(pool, record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
             for k, name in enumerate(motions)
         ]
-        for name, future in zip(motions, futures, strict=True):
-            recordings.append(future.result())
-            done(name)
+        recordings: list[Recording] = answers(futures, lambda: done(next(names)))
     return recordings
 
 

@@ -49,24 +49,35 @@ class Workers:
         Raises:
             FailedError: a process has ended.
         """
-        results = []
-        try:
-            futures = [submit(self._pool, _call, function, *w) for w in work]
-            for future in futures:
-                results.append(future.result())
-                if progress is not None:
-                    progress()
-        except BrokenProcessPool:
-            raise FailedError(
-                "a process that simulates has ended before its work was done, as where memory "
-                "runs out; with fewer processes less is needed"
-            ) from None
-        return results
+        return answers([submit(self._pool, _call, function, *w) for w in work], progress)
 
     def end(self) -> None:
         """Ends the processes, and what they do."""
         self._pool.kill()
         self._pool.shutdown(cancel_futures=True)
+
+
+def answers(
+    futures: Iterable[Future[Any]], progress: Callable[[], None] | None = None
+) -> list[Any]:
+    """Returns the results of futures, in order; `progress` is called after each.
+
+    Raises:
+        FailedError: a process has ended.
+    """
+    results = []
+    try:
+        for future in futures:
+            results.append(future.result())
+            if progress is not None:
+                progress()
+    except BrokenProcessPool:
+        raise FailedError(
+            "a process that simulates has ended before its work was done, as where memory runs out "
+            "(fewer processes need less), or where a script starts processes outside "
+            'if __name__ == "__main__":'
+        ) from None
+    return results
 
 
 def submit(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:

@@ -1,8 +1,8 @@
 """What a physical effect is: a few numbers in SI units that change one thing about the model.
 
-An effect with all its parameters at their off values changes nothing. Each kind below enters at
-one place; `composition.py` puts them together. `apply` gives the effect itself, `derivative` the
-derivative of what `apply` returns by one parameter, given the same arguments.
+An effect whose sizes are all 0 changes nothing. Each kind below enters at one place;
+`composition.py` puts them together. `apply` gives the effect itself, `derivative` the derivative of
+what `apply` returns by one parameter, given the same arguments. `contract.py` checks all that.
 """
 
 from __future__ import annotations

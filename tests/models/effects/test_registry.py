@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
@@ -36,7 +37,7 @@ def test_registering_returns_the_class_so_that_it_decorates() -> None:
 
 
 def test_a_class_that_is_defined_again_takes_its_own_place() -> None:
-    again = dataclass(frozen=True)(
+    again: Any = dataclass(frozen=True)(
         type("HemChain", (HemChain,), {"__module__": HemChain.__module__})
     )
     with registered():
@@ -46,13 +47,13 @@ def test_a_class_that_is_defined_again_takes_its_own_place() -> None:
 
 @pytest.mark.parametrize("name", ["surface_density", "nothing", "random", "discretisation"])
 def test_names_of_the_package_are_taken(name: str) -> None:
-    kind = dataclass(frozen=True)(type("Heavy", (SurfaceDensity,), {"NAME": name}))
+    kind: Any = dataclass(frozen=True)(type("Heavy", (SurfaceDensity,), {"NAME": name}))
     with pytest.raises(UserError, match=f"effect Heavy: NAME: is '{name}'"):
         register_effect(kind)
 
 
 def test_two_effects_cannot_have_one_name() -> None:
-    other = dataclass(frozen=True)(type("Other", (HemChain,), {}))
+    other: Any = dataclass(frozen=True)(type("Other", (HemChain,), {}))
     with registered(), pytest.raises(UserError, match=r"'hem_chain', which .*own\.HemChain has"):
         register_effect(other)
 
