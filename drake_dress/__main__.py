@@ -59,6 +59,7 @@ _EXAMPLES = """examples:
   drake-dress run my_scenario.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress dataset measured --hide random --seed 1 --out out/lab
   drake-dress explain out/lab/measured.h5 --scenario measured
+  drake-dress explain out/lab/measured.h5 --scenario measured --plugin my_effects.py
   drake-dress sim-station lab
   drake-dress run lab --set station.kind=hardware
   drake-dress replay out/dummy_standing-seed0/run.h5
@@ -116,8 +117,17 @@ def _status(words: list[str]) -> int:
         return _bench(words[1:])
     options = _parser().parse_args(words)
     check_libraries()
+    _load_plugins(getattr(options, "plugin", []))
     status: int = options.command(options)
     return status
+
+
+def _load_plugins(given: Sequence[str]) -> None:
+    if given:
+        from drake_dress.plugins import load_for_children
+
+        for plugin in given:
+            load_for_children(plugin)
 
 
 def _told(line: str, status: int) -> int:
@@ -182,6 +192,7 @@ def _add_run(verbs: _Verbs) -> None:
         help="simulate the garment and solve for plans in this process, too, where other runs use "
         "the other cores; the numbers are the same",
     )
+    _add_plugin(run)
     _add_report(run)
     run.set_defaults(command=_run)
 
@@ -201,6 +212,7 @@ def _add_sim_station(verbs: _Verbs) -> None:
         metavar="R",
         help="at most R simulated seconds per second (default: 1)",
     )
+    _add_plugin(lab)
     _add_report(lab)
     lab.set_defaults(command=_sim_station)
 
@@ -251,6 +263,7 @@ def _add_explain(verbs: _Verbs) -> None:
     explain.add_argument(
         "--workers", type=_count, metavar="N", help="processes; default: all cores"
     )
+    _add_plugin(explain)
     explain.set_defaults(command=_explain)
 
 
@@ -287,7 +300,18 @@ def _add_dataset(verbs: _Verbs) -> None:
         metavar="N",
         help="default 0.05",
     )
+    _add_plugin(hidden)
     hidden.set_defaults(command=_dataset_measured)
+
+
+def _add_plugin(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--plugin",
+        metavar="FILE.py|MODULE",
+        action="append",
+        default=[],
+        help="import code that registers effects of your own; may be given again",
+    )
 
 
 def _add_report(verb: argparse.ArgumentParser) -> None:
@@ -395,6 +419,7 @@ def _bench(words: list[str]) -> int:
         told = "".join(f"  {each:<10}{text}\n" for each, text in BENCHMARKS.items())
         print("usage: drake-dress bench [NAME] [OPTION …]\n\nnames:\n" + told)
         print(f"{name} where none is given; the options of each: drake-dress bench NAME --help")
+        print("each takes --plugin FILE.py|MODULE, too")
         return 0
     if arguments and not arguments[0].startswith("-"):
         name = arguments.pop(0)
@@ -404,9 +429,19 @@ def _bench(words: list[str]) -> int:
     if not (root / "benchmarks" / name).is_dir():
         raise UserError("bench", name, f"{root} has no benchmarks/, expected a checkout")
     sys.path.insert(0, str(root))
+    plugins, arguments = _plugins_of(arguments)
+    _load_plugins(plugins)
     module = importlib.import_module(f"benchmarks.{name}.__main__")
     status: int = module.main(arguments)
     return status
+
+
+def _plugins_of(words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Returns the values of `--plugin` in a benchmark's words, and the other words."""
+    parser = _Parser(add_help=False, allow_abbrev=False)
+    _add_plugin(parser)
+    options, others = parser.parse_known_args(words)
+    return options.plugin, others
 
 
 def _directory(

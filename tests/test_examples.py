@@ -11,6 +11,8 @@ FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
     "add_cost": r"without .* are at 1\.19 m after 3 s\nwith .* are at 1\.[01]\d m after 3 s",
+    "explain_own_effect": r"lacks is a chain in the hem \(mass 0\.(09|10)\d* ± .* kg\)\.\n$",
+    "explain_recording": r"cameras that are displaced(.*\n)*markers off by 35, now [3-8] mm\n$",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
     "own_controller": r"the left gripper rose by \d\.\d cm\n$",
     "solve_own_problem": r"converged: True[^$]*largest force 2\.000 N[^$]*to the wall 0\.200 m",

@@ -13,7 +13,7 @@ import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.generate import Sensors, measured, record_all
-from drake_dress.discrepancy.hidden import NOTHING, SIZES, draw_hidden
+from drake_dress.discrepancy.hidden import NOTHING, draw_hidden, hideable
 from drake_dress.discrepancy.outside import OUTSIDE
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.effects.effect import Effect
@@ -60,13 +60,13 @@ def cases(
 
     for k in range(max(draws.values(), default=0)):
         if "effect" in groups and k < draws["effect"]:
-            for name in SIZES:
+            for name in hideable():
                 add("effect", name, k)
         if "nothing" in groups and k < draws["nothing"]:
             add("nothing", NOTHING, k)
         if "pair" in groups and k < draws["pair"]:
             rng = np.random.default_rng([seed + k, 2])
-            add("pair", "+".join(rng.choice(list(SIZES), 2, replace=False)), k)
+            add("pair", "+".join(rng.choice(list(hideable()), 2, replace=False)), k)
         if "coarse" in groups and k < draws["coarse"]:
             add("coarse", NOTHING, k)
         if "outside" in groups and k < draws["outside"]:
@@ -100,10 +100,11 @@ def study(
     if "effect" in groups:
         settings = [(sizes[0], n) for n in noises[1:]] + [(s, noises[0]) for s in sizes[1:]]
         further = [cases(["effect"], {"effect": beside}, seed, *setting) for setting in settings]
-        mixed = np.random.default_rng(seed).permutation(len(SIZES))
+        count = len(hideable())
+        mixed = np.random.default_rng(seed).permutation(count)
         for k in range(beside):
             for i in mixed:
-                found += [draws_there[k * len(SIZES) + i] for draws_there in further]
+                found += [draws_there[k * count + i] for draws_there in further]
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from drake_dress.diagrams.station import (
     make_simulated_station,
     robots_at_start,
 )
+from drake_dress.errors import UserError
 from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth.material import Material
@@ -37,7 +38,7 @@ from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.effects.effect import Effect
-from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.effects.registry import EFFECTS, HOW_TO_LOAD
 from drake_dress.models.garment.edges import unique_edges
 from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths
 from drake_dress.models.garment.transfer import barycentric_transfer
@@ -354,14 +355,28 @@ def predictor(scenario: schema.Scenario) -> MotionPredictor:
 
 
 def effects(scenario: schema.Scenario) -> tuple[Effect, ...]:
-    """Returns the physical effects that the scenario switches on."""
-    on = []
-    for name, effect in EFFECTS.items():
-        values = getattr(scenario.effects, name)
-        if values is not None:
-            given = {p.name: getattr(values, p.name) for p in effect.parameters()}
-            on.append(effect(**given))
+    """Returns the physical effects that the scenario switches on, in the order of the list.
+
+    Raises:
+        UserError: one is not known.
+    """
+    unknown = next((name for name in scenario.effects if name not in EFFECTS), None)
+    if unknown is not None:
+        raise UserError("scenario", f"effects.{unknown}", f"unknown effect ({HOW_TO_LOAD})")
+    on = [_effect(n, scenario.effects[n]) for n in EFFECTS if n in scenario.effects]
     return tuple(e for e in on if not e.is_off)
+
+
+def _effect(name: str, values: Mapping[str, float]) -> Effect:
+    """Returns an effect with values, which need not come from a file that was checked."""
+    kind = EFFECTS[name]
+    names = [p.name for p in kind.parameters()]
+    for key in values:
+        if key.removesuffix("_std") not in names:
+            raise UserError(
+                "scenario", f"effects.{name}.{key}", f"unknown key, expected {', '.join(names)}"
+            )
+    return kind(**{n: values[n] for n in names if n in values})
 
 
 def rates(scenario: schema.Scenario) -> Rates:

@@ -111,7 +111,7 @@ def probe(
 ) -> list[tuple[Candidate, FloatArray]]:
     """Returns the columns (N,k) of every candidate, each at the level that tells it."""
     lab = experiment.labs["screening"]
-    found = candidates(lab.garment.rest_position, lab.effects)
+    found = candidates(lab.garment.rest_position, lab.effects, experiment.among)
     jobs: list[tuple[Level, Sequence[Effect]]] = [
         (level_of(p.effect), (p.effect,)) for c in found for p in c.probes
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,24 +10,7 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.effect import Effect
-from drake_dress.models.effects.mass import LocalMass
 from drake_dress.models.effects.registry import EFFECTS
-from drake_dress.models.garment.sampling import spread_out
-
-# Effects that show only where the garment touches the person.
-NEED_CONTACT = frozenset(
-    {
-        "friction",
-        "velocity_dependent_friction",
-        "anisotropic_friction",
-        "adhesion",
-        "limb_radius",
-        "limb_compliance",
-    }
-)
-# Places on the garment at which a local mass is tried.
-_PLACES = 8
-_PROBED_WIND = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,13 +43,13 @@ class Candidate:
     def effect(self, coefficients: FloatArray) -> Effect:
         """Returns the effect with its columns' coefficients, within its bounds."""
         first = self.probes[0].effect
-        values = first.values() if self.name == LocalMass.NAME else {}
+        values = {p.name: getattr(first, p.name) for p in first.parameters() if p.shapes}
         for probe, a in zip(self.probes, coefficients, strict=True):
             value = getattr(probe.effect, probe.parameter)
             # the pressure of wind grows with its square
             a = np.sign(a) * np.sqrt(abs(a)) if self.name == Wind.NAME else a
             values[probe.parameter] = float(a * value)
-        return bounded(EFFECTS[self.name], values)
+        return bounded(type(first), values)
 
 
 def bounded(kind: type[Effect], values: dict[str, float]) -> Effect:
@@ -75,41 +58,41 @@ def bounded(kind: type[Effect], values: dict[str, float]) -> Effect:
     return kind(**{n: float(np.clip(v, limits[n].low, limits[n].high)) for n, v in values.items()})
 
 
-def candidates(rest_position: FloatArray, on: Sequence[Effect] = ()) -> list[Candidate]:
+def candidates(
+    rest_position: FloatArray,
+    on: Sequence[Effect] = (),
+    among: Collection[str] | None = None,
+) -> list[Candidate]:
     """Returns all candidates.
 
     Args:
-        rest_position: (n,3) of the garment, m, where local masses are tried.
+        rest_position: (n,3) of the garment, m, where effects with a place are tried.
         on: effects that the scenario has already; these are not tried again.
+        among: names of the effects to try; all that are known by default.
     """
     taken = {e.NAME for e in on}
-    found = []
+    found: list[Candidate] = []
     for name, kind in EFFECTS.items():
-        if name in taken:
-            continue
-        if kind is LocalMass:
-            lowest = int(np.argmin(rest_position[:, 2]))
-            for place in rest_position[spread_out(rest_position, _PLACES, lowest)]:
-                x, y, z = place.tolist()
-                mass = LocalMass(mass=0.05, x=x, y=y, z=z)
-                found.append(Candidate(name, (Probe(mass, "mass", 0.0),)))
-            continue
-        (first, *more) = kind.parameters()
-        if name in NEED_CONTACT and not more and first.low < first.off:
-            # what sticks or slides does not answer to both signs alike
-            for size in (first.typical, -first.typical):
-                probe = Probe(kind(**{first.name: size}), first.name, 0.0)
-                found.append(Candidate(name, (probe,)))
-            continue
-        probes = []
-        for p in (first, *more):
-            if name == "gripper_slip" and p.name == "threshold":
-                continue
-            size = _PROBED_WIND if kind is Wind else p.typical
-            low = -np.inf if p.low < p.off else 0.0
-            probes.append(Probe(kind(**{p.name: size}), p.name, low))
-        found.append(Candidate(name, tuple(probes)))
+        if name not in taken and (among is None or name in among):
+            for start in kind.starts(rest_position):
+                found += _ways(start)
     return found
+
+
+def _ways(start: Effect) -> list[Candidate]:
+    """Returns the ways in which an effect that is shaped like `start` may be there."""
+    name, sizes = start.NAME, start.sizes()
+    if start.NEEDS_CONTACT and len(sizes) == 1 and sizes[0].low < sizes[0].off:
+        # what sticks or slides does not answer to both signs alike
+        (p,) = sizes
+        size = getattr(start, p.name)
+        both = (replace(start, **{p.name: sign * size}) for sign in (1.0, -1.0))
+        return [Candidate(name, (Probe(effect, p.name, p.off),)) for effect in both]
+    probes = []
+    for p in sizes:
+        others = {q.name: q.off for q in sizes if q is not p}
+        probes.append(Probe(replace(start, **others), p.name, -np.inf if p.low < p.off else 0.0))
+    return [Candidate(name, tuple(probes))]
 
 
 def shifted(effect: Effect, parameter: str, by: float) -> Effect:

@@ -11,7 +11,7 @@ nearby (multi-fidelity): p ↦ refined(p₀) + level(p) − level(p₀).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -19,7 +19,6 @@ from typing import Literal
 import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.discrepancy.candidates import NEED_CONTACT
 from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
@@ -95,7 +94,7 @@ def level_of(*effects: Effect) -> Level:
     Coarse cloth bridges what is round: of what friction changes at the refined level, the screening
     level told a quarter (correlation 0.28), the scenario's most (0.85).
     """
-    return "scenario" if any(e.NAME in NEED_CONTACT for e in effects) else "screening"
+    return "scenario" if any(e.NEEDS_CONTACT for e in effects) else "screening"
 
 
 def levels(numerics: Numerics) -> dict[Level, Numerics]:
@@ -132,6 +131,7 @@ class Experiment:
         recordings: at least one.
         period: between compared samples, s.
         workers: processes; by default as many as there are cores.
+        among: names of the effects that may be a cause; all that are known by default.
     """
 
     def __init__(
@@ -141,8 +141,9 @@ class Experiment:
         recordings: Sequence[Recording],
         period: float = 0.02,
         workers: int | None = None,
+        among: Collection[str] | None = None,
     ) -> None:
-        self.recordings = list(recordings)
+        self.recordings, self.among = list(recordings), among
         p = scenario.plant
         self.numerics = levels(
             Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance)
@@ -232,7 +233,7 @@ class Experiment:
         return (
             level,
             index,
-            tuple(e for e in effects if not (apart and e.NAME in NEED_CONTACT)),
+            tuple(e for e in effects if not (apart and e.NEEDS_CONTACT)),
         )
 
     def tell_free(

@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.discrepancy.hidden import NOTHING, draw_hidden
 from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
+from drake_dress.discrepancy.workers import answers, submit
+from drake_dress.errors import UserError
 from drake_dress.machine import worker_count
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.effects.composition import seen_points
@@ -52,6 +55,87 @@ class Sensors:
     marker_noise: float = 1e-3
     force_noise: float = 0.05
     lost: float = 0.03
+
+
+@dataclass(frozen=True)
+class Session:
+    """What is recorded.
+
+    Attributes:
+        motions: what is done with the garment, of `MOTIONS`; a recording each.
+        duration: of each recording, s.
+        sensors: what measures.
+    """
+
+    motions: Sequence[str] = USUAL
+    duration: float = 4.0
+    sensors: Sensors = Sensors()
+
+    def check(self, source: str) -> None:
+        """Raises UserError, which names `source`, where a motion is unknown or named twice."""
+        for name in self.motions:
+            if name not in MOTIONS:
+                named = name or "an empty name"
+                raise UserError(source, named, f"is no motion, expected {', '.join(MOTIONS)}")
+            if self.motions.count(name) > 1:
+                raise UserError(source, name, "stands twice, expected it once")
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Recordings, and what is hidden in them.
+
+    Attributes:
+        recordings: as measured, with noise.
+        hidden: effects of the truth that the scenario does not know.
+    """
+
+    recordings: list[Recording]
+    hidden: tuple[Effect, ...]
+
+
+def make_dataset(
+    scenario: Scenario,
+    base: Path,
+    hide: str | Sequence[Effect],
+    seed: int = 0,
+    size: float = 1.0,
+    session: Session = Session(),
+    workers: int | None = None,
+    stage: Callable[[str], None] = lambda _: None,
+) -> Dataset:
+    """Returns what would be measured of a garment on which effects act.
+
+    Args:
+        scenario: that knows nothing of the effects.
+        base: directory that a mesh file's name is relative to.
+        hide: effects, or names joined by "+" of effects that are drawn, `nothing` or `random`.
+        seed: of all that is drawn.
+        size: of what is drawn, times what matters.
+        session: what is recorded.
+        workers: processes; by default as many as there are cores.
+        stage: told what is being done.
+
+    Raises:
+        UserError: an effect has no such name, or cannot be so large.
+    """
+    name = hide if isinstance(hide, str) else "+".join(e.NAME for e in hide) or NOTHING
+    seeds = [seed, *name.encode()]
+    rng = np.random.default_rng(seeds)
+    hidden = draw_hidden(name, rng, size) if isinstance(hide, str) else list(hide)
+    stage(f"recording {', '.join(session.motions)}")
+    clean = record_all(
+        scenario,
+        base,
+        hidden,
+        seeds,
+        session.duration,
+        session.sensors,
+        workers,
+        lambda motion: stage(f"recorded {motion}"),
+        session.motions,
+    )
+    return Dataset([measured(r, session.sensors, rng) for r in clean], tuple(hidden))
 
 
 def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> Lab:
@@ -159,15 +243,13 @@ def record_all(
         motions: of `MOTIONS`.
     """
     lab = truth(scenario, base, effects)
-    recordings = []
+    names = iter(motions)
     with WorkerPool(min(len(motions), workers or worker_count())) as pool:
         futures = [
-            pool.submit(record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
+            submit(pool, record, lab, name, duration, sensors, np.random.default_rng([*seed, k]))
             for k, name in enumerate(motions)
         ]
-        for name, future in zip(motions, futures, strict=True):
-            recordings.append(future.result())
-            done(name)
+        recordings: list[Recording] = answers(futures, lambda: done(next(names)))
     return recordings
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from drake_dress.discrepancy.outside import OUTSIDE
 from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
-from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.effects.registry import EFFECTS, HOW_TO_LOAD, own_effects
 
 NOTHING, RANDOM = "nothing", "random"
 
@@ -26,7 +26,13 @@ def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effec
         size: factor on how strong it is.
     """
     kind = EFFECTS.get(name) or OUTSIDE[name]
-    return kind(**ALL_SIZES[name](rng, size))
+    draw = kind.draw if name in own_effects() else ALL_SIZES[name]
+    return kind(**draw(rng, size))
+
+
+def hideable() -> tuple[str, ...]:
+    """Returns the names of the effects that `random` chooses from: those of the list, then own."""
+    return (*SIZES, *own_effects())
 
 
 def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[Effect]:
@@ -41,16 +47,18 @@ def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[
         UserError: there is no such effect, or it cannot be so large.
     """
     if what == RANDOM:
-        what = str(rng.choice([NOTHING, *SIZES]))
+        what = str(rng.choice([NOTHING, *hideable()]))
     if what == NOTHING:
         return []
     names = what.split("+")
+    known = [*own_effects(), *ALL_SIZES]
     for name in names:
-        if name not in ALL_SIZES:
-            near = difflib.get_close_matches(name, ALL_SIZES, n=1)
-            listed = f"expected one of {', '.join(ALL_SIZES)}"
-            expected = f"did you mean {near[0]}?" if near else listed
-            raise UserError("--hide", name, f"is no effect that can be hidden, {expected}")
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(known)}"
+            raise UserError(
+                "--hide", name, f"is no effect that can be hidden ({HOW_TO_LOAD}), {expected}"
+            )
         if names.count(name) > 1:
             raise UserError("--hide", name, "stands twice, expected it once")
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.where import Spot, worst
 from drake_dress.discrepancy.windows import Windows
 from drake_dress.file_output import write_text
+from drake_dress.models.effects.registry import EFFECTS, own_effects
 from drake_dress.yaml_text import read_yaml, write_yaml
 
 
@@ -102,7 +103,17 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
     # what is not there is not written: the loader refuses empty groups
     text = write_yaml(_without_none(content))
     head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
-    return head + text
+    return head + _how_to_load(found) + text
+
+
+def _how_to_load(names: Collection[str]) -> str:
+    """Returns a comment that says where the effects are from that are not the package's."""
+    own = [f"{name} of {EFFECTS[name].__module__}" for name in names if name in own_effects()]
+    if not own:
+        return ""
+    return (
+        f"# Effects that --plugin, or register_effect in Python, loads first: {', '.join(own)}.\n"
+    )
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

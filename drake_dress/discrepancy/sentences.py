@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drake_dress.discrepancy.explanation import DISCRETISATION, LEFT, Cause, Explanation
+from drake_dress.models.effects.registry import EFFECTS
 
 _PLAIN = {
     "discretisation": "the simulation's own step and mesh",
@@ -34,7 +35,8 @@ _PLAIN = {
 
 def plain(name: str) -> str:
     """Returns an effect in plain words."""
-    return _PLAIN.get(name, name.replace("_", " "))
+    own = EFFECTS[name].IN_WORDS if name in EFFECTS else ""
+    return _PLAIN.get(name) or own or name.replace("_", " ")
 
 
 def values(cause: Cause) -> str:

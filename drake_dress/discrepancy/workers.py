@@ -1,16 +1,19 @@
 """Processes that run simulations of an experiment.
 
 Each gets what it works with once, as it begins, so that experiments that are open at once have
-processes and data of their own.
+processes and data of their own. What is sent may hold classes that the other process cannot import,
+such as an effect from a notebook's cell: cloudpickle sends those themselves.
 """
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
+
+import cloudpickle
 
 from drake_dress.errors import FailedError
 from drake_dress.worker_pool import WorkerPool
@@ -27,7 +30,7 @@ class Workers:
     """
 
     def __init__(self, common: Any, count: int) -> None:
-        data = pickle.dumps(common, pickle.HIGHEST_PROTOCOL)
+        data = cloudpickle.dumps(common)
         self._pool = WorkerPool(count, initializer=_begin, initargs=(data,))
 
     def map(
@@ -46,24 +49,51 @@ class Workers:
         Raises:
             FailedError: a process has ended.
         """
-        results = []
-        try:
-            futures: list[Future[Any]] = [self._pool.submit(_call, function, *w) for w in work]
-            for future in futures:
-                results.append(future.result())
-                if progress is not None:
-                    progress()
-        except BrokenProcessPool:
-            raise FailedError(
-                "a process that simulates has ended before its work was done, as where memory "
-                "runs out; with fewer processes less is needed"
-            ) from None
-        return results
+        return answers([submit(self._pool, _call, function, *w) for w in work], progress)
 
     def end(self) -> None:
         """Ends the processes, and what they do."""
         self._pool.kill()
         self._pool.shutdown(cancel_futures=True)
+
+
+def answers(
+    futures: Iterable[Future[Any]], progress: Callable[[], None] | None = None
+) -> list[Any]:
+    """Returns the results of futures, in order; `progress` is called after each.
+
+    Raises:
+        FailedError: a process has ended.
+    """
+    results = []
+    try:
+        for future in futures:
+            results.append(future.result())
+            if progress is not None:
+                progress()
+    except BrokenProcessPool:
+        raise FailedError(
+            "a process that simulates has ended before its work was done, as where memory runs out "
+            "(fewer processes need less), or where a script starts processes outside "
+            'if __name__ == "__main__":'
+        ) from None
+    return results
+
+
+def submit(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    """Returns what will be the result of a function in another process.
+
+    Args:
+        pool: of processes.
+        function: that is called.
+        arguments: of it; their classes need not be known to the other process.
+    """
+    return pool.submit(_unpacked, cloudpickle.dumps((function, arguments)))
+
+
+def _unpacked(data: bytes) -> Any:
+    function, arguments = pickle.loads(data)
+    return function(*arguments)
 
 
 def _begin(common: bytes) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
+import cloudpickle
 import numpy as np
 import numpy.typing as npt
 
@@ -133,7 +134,8 @@ class StepsBeside:
         other.close()
         # Of a process that has ended already, the first step tells.
         with contextlib.suppress(OSError):
-            self._pipe.send((cloth, surroundings))
+            # an effect on the garment may be of a class that the process cannot import
+            self._pipe.send_bytes(cloudpickle.dumps((cloth, surroundings)))
         self._under_way = False
         self._place = 0
         self._last: ClothState | None = None

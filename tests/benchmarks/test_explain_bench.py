@@ -16,6 +16,7 @@ from benchmarks.explain.tables import (
 from benchmarks.kept import read_results, write_results
 from drake_dress.discrepancy.hidden import SIZES
 from drake_dress.errors import UserError
+from tests.models.effects.own import registered
 
 
 def result(group="effect", hide="friction", named=("friction",), verdict="named", **changes):
@@ -48,6 +49,12 @@ def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it():
     assert {(c.size, c.marker_noise) for c in beside} == {(2.0, 1e-3), (1.0, 3e-3)}
     assert [c.hide for c in beside[0::2]] == [c.hide for c in beside[1::2]]  # as far as it got
     assert all(c.force_noise == pytest.approx(50.0 * c.marker_noise) for c in found)
+
+
+def test_a_study_hides_registered_effects_too():
+    with registered():
+        found = study(["effect"], {"effect": 1}, 7, [1.0], [1e-3], 1)
+    assert [c.hide for c in found] == [*SIZES, "hem_chain"]
 
 
 def test_only_the_whole_truth_and_nothing_else_is_right():

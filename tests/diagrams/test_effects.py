@@ -6,10 +6,12 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.build import effects, plant_station
 from drake_dress.diagrams.garment import build_garment
-from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
+from drake_dress.diagrams.scenario import Scenario, load_scenario, resolved_yaml
 from drake_dress.errors import UserError
+from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.registry import EFFECTS
 from tests.discrepancy.data import SCENARIO
+from tests.models.effects.own import HemChain, registered
 
 QUICK = ["plant.spacing=0.06", "plant.time_step=0.01", "plant.body_time_step=0.01"]
 
@@ -49,6 +51,38 @@ def test_bad_effects_are_named(setting, words):
         assert word in str(error.value)
 
 
+def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path):
+    setting = "effects.hem_chain.mass=0.1"
+    with registered():
+        scenario = load_scenario(SCENARIO, [setting, "effects.wind.x=1"])
+        assert effects(scenario) == (Wind(x=1.0), HemChain(mass=0.1))
+        copy = tmp_path / "own.yaml"
+        copy.write_text(resolved_yaml(scenario))
+        assert load_scenario(copy) == scenario
+        for bad, words in (
+            ("mass=2", "is 2.0, expected 0 to 1"),
+            ("size=1", "mass, mass_std, height"),
+        ):
+            with pytest.raises(UserError, match=f"effects.hem_chain.*{words}"):
+                load_scenario(SCENARIO, [f"effects.hem_chain.{bad}"])
+    with pytest.raises(UserError, match=r"effects\.hem_chain: unknown effect \(load your own with"):
+        load_scenario(SCENARIO, [setting])
+    with pytest.raises(UserError, match=r"effects\.hem_chain: unknown effect"):
+        effects(scenario)
+
+
+def test_effects_set_in_python_are_held_against_the_list():
+    scenario = Scenario()
+    scenario.effects["wind"] = {"x": 1.0, "x_std": 0.1}
+    assert effects(scenario) == (Wind(x=1.0),)
+    scenario.effects["wind"] = {"speed": 1.0}
+    with pytest.raises(UserError, match=r"effects\.wind\.speed: unknown key, expected x, y, z"):
+        effects(scenario)
+    scenario.effects["wind"] = {"x": 100.0}
+    with pytest.raises(ValueError, match=r"wind\.x is 100\.0 m/s, expected -5 to 5"):
+        effects(scenario)
+
+
 def pulled(settings, seconds=0.5, command=(0.0, 0.0, 0.0)):
     """Returns gripper forces (2,3), N, and the garment (n,3) after a while of hanging."""
     scenario = load_scenario(SCENARIO, [*QUICK, *settings])
@@ -72,6 +106,13 @@ def test_a_heavier_garment_weighs_on_the_station_s_grippers():
     plain, _ = pulled([])
     heavy, _ = pulled(["effects.surface_density.added=0.15"])
     assert heavy[:, 2].sum() / plain[:, 2].sum() == pytest.approx(1.5, rel=0.02)
+
+
+def test_an_effect_of_a_users_own_weighs_on_them_too():
+    plain, _ = pulled([])
+    with registered():
+        heavy, _ = pulled(["effects.hem_chain.mass=0.2"])
+    assert plain[:, 2].sum() - heavy[:, 2].sum() == pytest.approx(0.2 * 9.81, rel=0.02)
 
 
 def test_compliant_grippers_let_the_garment_down():

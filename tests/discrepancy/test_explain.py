@@ -50,7 +50,7 @@ def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
     path.write_text(text)
     again = load_scenario(path)
     assert effects(again) == found.effects
-    assert again.effects.surface_density.added_std > 0.0
+    assert again.effects["surface_density"]["added_std"] > 0.0
     told = found.comparison.told["refined"]
     w = found.comparison.whitening
     off = spots(

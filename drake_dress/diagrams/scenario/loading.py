@@ -4,10 +4,11 @@ The file is held against the schema's types, filled in by Drake, and then held a
 against itself.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from pydrake.common.yaml import yaml_load_typed
 
@@ -19,11 +20,12 @@ from drake_dress.diagrams.scenario.checks import (
     check_safety,
 )
 from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
-from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario
+from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario, effects_schema
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
 from drake_dress.plan_delay import kept_plan_delay
+from drake_dress.plugins import load_installed_plugins
 from drake_dress.text_file import read_text
 from drake_dress.yaml_text import read_yaml, write_yaml
 
@@ -38,6 +40,7 @@ def load_scenario(
     Raises:
         UserError: file, key or value cannot be used.
     """
+    load_installed_plugins()
     source = str(path)
     content = _read(Path(path))
     for item in overrides:
@@ -68,6 +71,7 @@ def _checked(source: str, content: dict[str, Any]) -> Scenario:
     _resolve_delay(source, content)
     fill_in_fidelity(content)
     content = typed(source, "", content, Scenario)
+    _fill_in_effects(content)
     try:
         scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))
     except (RuntimeError, ValueError, TypeError) as error:
@@ -138,6 +142,18 @@ def _resolve_delay(source: str, content: dict[str, Any]) -> None:
     if not isinstance(step, int | float) or isinstance(step, bool) or not 0.0 < step < math.inf:
         return  # told when types and ranges are looked at
     place["delay"] = round(step * max(1, math.ceil(seconds / step - 1e-9)), 9)
+
+
+def _fill_in_effects(content: dict[str, Any]) -> None:
+    """Writes out every parameter of the effects that are given, in the order of the list."""
+    given = content.get("effects")
+    if given is None:
+        return
+    filled = {}
+    for name, schema in get_type_hints(effects_schema()).items():
+        if given.get(name) is not None:
+            filled[name] = dataclasses.asdict(get_args(schema)[0](**given[name]))
+    content["effects"] = filled
 
 
 def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:

@@ -329,16 +329,6 @@ _OF_MEASURES: dict[str, tuple[float, float]] = {
     "forearm_mass": (0.1, 6.0),
 }
 _RANGES |= {f"measures.{name}": bounds for name, bounds in _OF_MEASURES.items()}
-_OF_EFFECTS = {
-    f"effects.{name}.{p.name}": (p.low, p.high)
-    for name, effect in EFFECTS.items()
-    for p in effect.parameters()
-} | {
-    # a parameter that data hardly tell may have a deviation far beyond its own range
-    f"effects.{name}.{p.name}_std": (0.0, 100.0 * (p.high - p.low))
-    for name, effect in EFFECTS.items()
-    for p in effect.parameters()
-}
 
 
 def plain(key: str) -> str:
@@ -348,8 +338,21 @@ def plain(key: str) -> str:
 
 def range_of(key: str) -> tuple[float, float] | None:
     """Returns the range of the number at a dotted key, both ends allowed, if it has one."""
+    group, *rest = key.split(".")
+    if group == "effects":
+        return _range_of_effect(*rest) if len(rest) == 2 else None
     name = "." + plain(key)
     ends = [end for end in _RANGES if name.endswith("." + end)]
-    if ends:
-        return _RANGES[max(ends, key=len)]
-    return _OF_EFFECTS.get(key)
+    return _RANGES[max(ends, key=len)] if ends else None
+
+
+def _range_of_effect(name: str, parameter: str) -> tuple[float, float] | None:
+    """Returns the range of an effect's parameter or, by the name with `_std`, of its deviation."""
+    kind = EFFECTS.get(name)
+    for p in kind.parameters() if kind else ():
+        if parameter == p.name:
+            return p.low, p.high
+        if parameter == f"{p.name}_std":
+            # a parameter that data hardly tell may have a deviation far beyond its own range
+            return 0.0, 100.0 * (p.high - p.low)
+    return None

@@ -526,12 +526,15 @@ def _effect_schema(effect: type[Effect]) -> type:
     return dataclasses.make_dataclass(effect.__name__, entries)
 
 
-EFFECT_SCHEMAS = {name: _effect_schema(effect) for name, effect in EFFECTS.items()}
+def effects_schema() -> type:
+    """Returns a dataclass with every effect that is known now, those that users registered too."""
+    entries = [(n, _effect_schema(e) | None, field(default=None)) for n, e in EFFECTS.items()]
+    return dataclasses.make_dataclass("Effects", entries)
+
+
 # Physical effects by name, each with its parameters in SI units; see models/effects/. One that is
-# not given is off.
-Effects = dataclasses.make_dataclass(
-    "Effects", [(n, t | None, field(default=None)) for n, t in EFFECT_SCHEMAS.items()]
-)
+# not given is off. Which names there may be is `effects_schema` when a scenario is read.
+EffectValues = dict[str, dict[str, float]]
 
 
 @dataclass
@@ -556,4 +559,4 @@ class Scenario:
     lab: Lab = field(default_factory=Lab)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
-    effects: Effects = field(default_factory=Effects)  # type: ignore[valid-type]
+    effects: EffectValues = field(default_factory=dict)

@@ -8,7 +8,9 @@ import typing
 from typing import Any
 
 from drake_dress.diagrams.scenario.ranges import CHOICES, plain, range_of
+from drake_dress.diagrams.scenario.schema import EffectValues, effects_schema
 from drake_dress.errors import UserError
+from drake_dress.models.effects.registry import HOW_TO_LOAD
 
 
 def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
@@ -21,8 +23,9 @@ def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
     if name not in hints:
         near = difflib.get_close_matches(str(name), hints, n=1)
         expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(hints)}"
-        raise UserError(source, dotted, f"unknown key, {expected}")
-    return hints[name]
+        what = f"unknown effect ({HOW_TO_LOAD})" if key == "effects" else "unknown key"
+        raise UserError(source, dotted, f"{what}, {expected}")
+    return effects_schema() if hints[name] == EffectValues else hints[name]
 
 
 def typed(source: str, key: str, value: Any, schema: Any) -> Any:

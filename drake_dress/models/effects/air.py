@@ -8,6 +8,7 @@ across the flow: Hoerner, "Fluid-Dynamic Drag", 1965, ch. 3). Flow along the clo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numba as nb
 import numpy as np
@@ -55,6 +56,11 @@ class Wind(ForceEffect):
     x: float = parameter("m/s", -5.0, 5.0, 0.8)
     y: float = parameter("m/s", -5.0, 5.0, 0.8)
     z: float = parameter("m/s", -5.0, 5.0, 0.8)
+
+    @classmethod
+    def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
+        """Returns 1 m/s in each direction, whose square is 1, since its pressure grows so."""
+        return (cls(x=1.0, y=1.0, z=1.0),)
 
     def apply(self, sheet: Sheet, x: FloatArray, v: FloatArray) -> FloatArray:
         """Returns the force (n,3), N."""

@@ -90,10 +90,10 @@ class GarmentWithEffects:
         added: FloatArray | None = None
         for mass in of_kind(effects, MassEffect):
             added = mass.apply(self.sheet) + (0.0 if added is None else added)
-        fibres = None
-        for fibre in of_kind(effects, FibreEffect):
+        fibres, along = None, of_kind(effects, FibreEffect)
+        if along:
+            stiffness = sum(fibre.apply(self.sheet) for fibre in along)
             fibres = Fibres.along(elements, rest_position, grain, 1.0)
-            stiffness = fibre.apply(self.sheet)
             fibres = replace(fibres, weight=fibres.weight * stiffness)
         inner = make(elements, material, gravity, fibres, added)
         self.elements, self.material, self.time_step = elements, material, inner.time_step

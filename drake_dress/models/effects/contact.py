@@ -31,6 +31,7 @@ class Friction(MaterialEffect):
     """
 
     NAME = "friction"
+    NEEDS_CONTACT = True
     added: float = parameter("1", -2.0, 2.0, 0.2)
 
     def apply(self, material: Material) -> Material:

@@ -1,15 +1,15 @@
 """What a physical effect is: a few numbers in SI units that change one thing about the model.
 
-An effect with all its parameters at their off values changes nothing. Each kind below enters at
-one place; `composition.py` puts them together. `apply` gives the effect itself, `derivative` the
-derivative of what `apply` returns by one parameter, given the same arguments.
+An effect whose sizes are all 0 changes nothing. Each kind below enters at one place;
+`composition.py` puts them together. `apply` gives the effect itself, `derivative` the derivative of
+what `apply` returns by one parameter, given the same arguments. `contract.py` checks all that.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -28,7 +28,9 @@ class Parameter:
         unit: SI.
         low, high: bounds, both allowed.
         typical: a size that matters in a lab, for steps and plots.
-        off: value at which the effect does nothing.
+        off: its value where none is given. With all parameters at it, the effect does nothing.
+        shapes: whether it only says where or how the other parameters act, such as a place or a
+            threshold. It neither switches the effect on nor is screened by itself.
     """
 
     name: str
@@ -37,22 +39,44 @@ class Parameter:
     high: float
     typical: float
     off: float = 0.0
+    shapes: bool = False
 
 
-def parameter(unit: str, low: float, high: float, typical: float) -> Any:
-    """Returns a dataclass field for a parameter whose off value is 0; see `Parameter`."""
-    return field(default=0.0, metadata={"unit": unit, "low": low, "high": high, "typical": typical})
+def parameter(
+    unit: str, low: float, high: float, typical: float, shape: float | None = None
+) -> Any:
+    """Returns a dataclass field for a parameter; see `Parameter`.
+
+    Args:
+        unit: SI; "1" for a pure number.
+        low: least value.
+        high: largest value.
+        typical: a size that matters in a lab.
+        shape: default of a parameter that only shapes the effect. Without it the parameter is a
+            size, whose default is 0, and 0 switches the effect off.
+    """
+    shapes = shape is not None
+    off = 0.0 if shape is None else float(shape)
+    bounds = {"low": low, "high": high, "typical": typical}
+    return field(default=off, metadata={"unit": unit, **bounds, "off": off, "shapes": shapes})
 
 
 @dataclass(frozen=True)
 class Effect:
     """A physical effect; its fields are its parameters.
 
+    Class attributes:
+        NAME: in scenarios and explanations.
+        IN_WORDS: of the effect in a report; by default its name.
+        NEEDS_CONTACT: whether it shows only where the garment touches the person.
+
     Raises:
         ValueError: a parameter is not finite or outside its bounds.
     """
 
     NAME: ClassVar[str]
+    IN_WORDS: ClassVar[str] = ""
+    NEEDS_CONTACT: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         for p in self.parameters():
@@ -67,6 +91,37 @@ class Effect:
         """Returns what its fields mean, in their order."""
         return tuple(Parameter(f.name, **f.metadata) for f in fields(cls) if f.metadata)
 
+    @classmethod
+    def sizes(cls) -> tuple[Parameter, ...]:
+        """Returns the parameters that say how strong it is."""
+        return tuple(p for p in cls.parameters() if not p.shapes)
+
+    @classmethod
+    def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
+        """Returns the effects that a search tries; each differs in what shapes it.
+
+        By default there is one, of typical size.
+
+        Args:
+            rest_position: (n,3) of the garment, m.
+        """
+        return (cls(**{p.name: p.typical for p in cls.sizes()}),)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, size: float) -> dict[str, float]:
+        """Returns parameters at `size` times what matters, for data in which it is hidden.
+
+        By default each size is 1 to 2 times its typical value, of either sign, as the bounds allow,
+        and what shapes the effect has its default.
+        """
+        drawn = {}
+        for p in cls.sizes():
+            value = size * rng.uniform(p.typical, min(2.0 * p.typical, p.high))
+            if p.low <= -value:
+                value *= rng.choice([-1.0, 1.0])
+            drawn[p.name] = float(value)
+        return drawn
+
     def values(self) -> dict[str, float]:
         """Returns the parameters by name."""
         return {p.name: float(getattr(self, p.name)) for p in self.parameters()}
@@ -74,7 +129,7 @@ class Effect:
     @property
     def is_off(self) -> bool:
         """Whether it changes nothing."""
-        return all(getattr(self, p.name) == p.off for p in self.parameters())
+        return all(getattr(self, p.name) == p.off for p in self.sizes())
 
 
 @dataclass(frozen=True)
@@ -196,6 +251,8 @@ class ForceEffect(Effect):
 class FrictionEffect(Effect):
     """Changes the Coulomb coefficient of the nodes in contact."""
 
+    NEEDS_CONTACT = True
+
     def apply(self, friction: float, sliding: Sliding) -> FloatArray:
         """Returns what is added to the fabric's coefficient `friction`, (c,)."""
         raise NotImplementedError
@@ -208,6 +265,8 @@ class FrictionEffect(Effect):
 class AdhesionEffect(Effect):
     """Makes nodes in contact stick to it."""
 
+    NEEDS_CONTACT = True
+
     def apply(self, sheet: Sheet) -> FloatArray:
         """Returns the pull (n,) that each node's contact bears, N."""
         raise NotImplementedError
@@ -219,6 +278,8 @@ class AdhesionEffect(Effect):
 
 class BodyEffect(Effect):
     """Changes the person's sizes."""
+
+    NEEDS_CONTACT = True
 
     def apply(self, measures: BodyMeasures) -> BodyMeasures:
         """Returns the sizes."""

@@ -61,12 +61,7 @@ class GripperSlip(MountEffect):
 
     NAME = "gripper_slip"
     rate: float = parameter("m/(N·s)", 0.0, 0.1, 0.004)
-    threshold: float = parameter("N", 0.0, 50.0, 0.5)
-
-    @property
-    def is_off(self) -> bool:
-        """Whether it changes nothing."""
-        return self.rate == 0.0
+    threshold: float = parameter("N", 0.0, 50.0, 0.5, shape=0.0)
 
     def apply(self, force: FloatArray) -> FloatArray:
         """Returns the speed (…,3), m/s, under forces (…,3), N."""

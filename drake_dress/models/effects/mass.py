@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -15,9 +16,12 @@ from drake_dress.models.effects.effect import (
     Sheet,
     parameter,
 )
+from drake_dress.models.garment.sampling import spread_out
 
 # Radius over which a local mass is spread (standard deviation), m.
 _SPREAD = 0.05
+# Places on the garment at which a local mass is tried, and the mass, kg.
+_PLACES, _TRIED = 8, 0.05
 
 
 @dataclass(frozen=True)
@@ -56,14 +60,16 @@ class LocalMass(MassEffect):
 
     NAME = "local_mass"
     mass: float = parameter("kg", 0.0, 1.0, 0.06)
-    x: float = parameter("m", -1.0, 1.0, 0.1)
-    y: float = parameter("m", -1.0, 1.0, 0.1)
-    z: float = parameter("m", -1.5, 1.0, 0.1)
+    x: float = parameter("m", -1.0, 1.0, 0.1, shape=0.0)
+    y: float = parameter("m", -1.0, 1.0, 0.1, shape=0.0)
+    z: float = parameter("m", -1.5, 1.0, 0.1, shape=0.0)
 
-    @property
-    def is_off(self) -> bool:
-        """Whether it changes nothing."""
-        return self.mass == 0.0
+    @classmethod
+    def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
+        """Returns it at places all over the garment."""
+        lowest = int(np.argmin(rest_position[:, 2]))
+        places = rest_position[spread_out(rest_position, _PLACES, lowest)].tolist()
+        return tuple(cls(mass=_TRIED, x=x, y=y, z=z) for x, y, z in places)
 
     def apply(self, sheet: Sheet) -> FloatArray:
         """Returns (n,) kg."""

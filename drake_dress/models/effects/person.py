@@ -41,6 +41,7 @@ class LimbCompliance(MountEffect):
     """
 
     NAME = "limb_compliance"
+    NEEDS_CONTACT = True
     compliance: float = parameter("m/N", 0.0, 0.2, 0.025)
 
     def apply(self, force: FloatArray) -> FloatArray:

@@ -1,9 +1,16 @@
-"""All effects by name."""
+"""All effects by name: those of the package, then those that a user registers.
+
+A registered effect is a candidate of `explain`, may be hidden in generated data, and is a key below
+`effects:` in scenarios. Processes that are started later import the class anew, from its module.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TypeVar
 
+from drake_dress.errors import UserError
 from drake_dress.models.effects.air import AirDrag, Wind
 from drake_dress.models.effects.contact import (
     Adhesion,
@@ -11,7 +18,8 @@ from drake_dress.models.effects.contact import (
     Friction,
     VelocityDependentFriction,
 )
-from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.contract import check_class
+from drake_dress.models.effects.effect import ClockEffect, Effect, MountEffect
 from drake_dress.models.effects.fabric import (
     AnisotropicStiffness,
     BendingStiffness,
@@ -25,7 +33,9 @@ from drake_dress.models.effects.mass import GravityTilt, LocalMass, SurfaceDensi
 from drake_dress.models.effects.person import LimbCompliance, LimbRadius
 from drake_dress.models.effects.sensing import CameraRotation, CameraTranslation, TimeOffset
 
-EFFECTS: Mapping[str, type[Effect]] = {
+Kind = TypeVar("Kind", bound=type[Effect])
+
+_effects: dict[str, type[Effect]] = {
     effect.NAME: effect
     for effect in (
         AirDrag,
@@ -53,3 +63,63 @@ EFFECTS: Mapping[str, type[Effect]] = {
         GravityTilt,
     )
 }
+BUILT_IN = frozenset(_effects)
+EFFECTS: Mapping[str, type[Effect]] = MappingProxyType(_effects)
+"""A live view: it grows with `register_effect`."""
+
+# For messages about names that are not known.
+HOW_TO_LOAD = "load your own with --plugin FILE.py, or register_effect in Python"
+# Words that stand in place of an effect's name.
+_RESERVED = ("nothing", "random", "discretisation")
+
+
+def register_effect(kind: Kind) -> Kind:
+    """Makes an effect of a user's own known by its name; returns it, so it can be a decorator.
+
+    A class that is defined again, as in a notebook's cell, takes the place of its earlier self.
+    `check_effect` holds its derivatives against finite differences, which this does not.
+
+    Args:
+        kind: a frozen dataclass that is one of the kinds of effect.
+
+    Raises:
+        UserError: it does not keep to what an effect is, or its name is taken.
+    """
+    check_class(kind)
+    source = f"effect {kind.__name__}"
+    if issubclass(kind, ClockEffect | MountEffect):
+        raise UserError(
+            source,
+            "",
+            "changes a clock or a mount, which work with the package's own effects only; "
+            "expected another kind of effect, such as ForceEffect",
+        )
+    name = kind.NAME
+    if name in BUILT_IN or name in _RESERVED:
+        raise UserError(source, "NAME", f"is {name!r}, a name of the package, expected another")
+    there = _effects.get(name)
+    if there is not None and _place(there) != _place(kind):
+        raise UserError(source, "NAME", f"is {name!r}, which {_place(there)} has, expected another")
+    _effects[name] = kind
+    return kind
+
+
+def unregister_effect(name: str) -> None:
+    """Forgets an effect that was registered.
+
+    Raises:
+        UserError: there is none of that name.
+    """
+    if name not in own_effects():
+        raise UserError("effect", name, "is not registered, expected the name of one that is")
+    del _effects[name]
+
+
+def own_effects() -> tuple[str, ...]:
+    """Returns the names of registered effects, in the order in which they came."""
+    return tuple(name for name in _effects if name not in BUILT_IN)
+
+
+def _place(kind: type[Effect]) -> str:
+    """Returns where a class is defined."""
+    return f"{kind.__module__}.{kind.__qualname__}"

@@ -1,0 +1,103 @@
+"""A recording as a user has it: arrays in a program, before they are held against a garment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drake_dress.discrepancy.reading.raw import (
+    JOINTS,
+    MARKERS,
+    NODES,
+    PLACES,
+    RawRecording,
+    check_content,
+    noise_std,
+)
+from drake_dress.errors import UserError
+from drake_dress.models.sides import SIDES
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """One recording of a garment that two grippers hold; SI units, world frame, z up.
+
+    `explain` and `check_recordings` hold it against the scenario's garment, as they do with a file:
+    see `docs/explain.md` for what is refused.
+
+    Args:
+        time: (T,) s, strictly increasing.
+        gripper_position: (T,2,3) of the left and the right gripper, m.
+        marker_position: (T,m,3) m; NaN where a marker was not seen.
+        marker_rest_position: (m,3) where the markers sit on the rest shape, garment frame, m.
+        marker_node: (m,) nodes of the scenario's garment in its place.
+        gripper_force: (T,2,3) of the garment on the grippers, N; None where not measured.
+        joint_position: (T,6,3) shoulder, elbow, hand of left, then of right, m; None likewise.
+        marker_noise: standard deviation of a coordinate, m; estimated if None.
+        force_noise: of a component, N; estimated if None.
+        name: for messages and plots.
+
+    Raises:
+        UserError: an array has the wrong shape or does not hold numbers.
+    """
+
+    time: npt.ArrayLike
+    gripper_position: npt.ArrayLike
+    marker_position: npt.ArrayLike
+    marker_rest_position: npt.ArrayLike | None = None
+    marker_node: npt.ArrayLike | None = None
+    gripper_force: npt.ArrayLike | None = None
+    joint_position: npt.ArrayLike | None = None
+    marker_noise: float | None = None
+    force_noise: float | None = None
+    name: str = "recording"
+
+    def __post_init__(self) -> None:
+        if (self.marker_rest_position is None) == (self.marker_node is None):
+            raise UserError(
+                self.name,
+                "marker_rest_position",
+                "expected it or marker_node, and not both",
+            )
+        self.raw()
+
+    def raw(self) -> RawRecording:
+        """Returns it as what the readers of files give."""
+        arrays = {
+            dataset: self._array(field)
+            for dataset, field in _WHOLE.items()
+            if getattr(self, field) is not None
+        }
+        for field, end in _PER_GRIPPER.items():
+            if getattr(self, field) is not None:
+                both = self._array(field)
+                if both.ndim != 3 or both.shape[1:] != (2, 3):
+                    raise UserError(
+                        self.name, field, f"has shape {both.shape}, expected (time, 2, 3)"
+                    )
+                for k, side in enumerate(SIDES):
+                    arrays[f"gripper/{side}/{end}"] = both[:, k]
+        noise = {}
+        for field, dataset in _NOISE.items():
+            if getattr(self, field) is not None:
+                noise[dataset], _ = noise_std(self.name, field, getattr(self, field))
+        return RawRecording(self.name, "", self.name, arrays, noise, {}, tuple(arrays))
+
+    def _array(self, field: str) -> npt.NDArray[np.generic]:
+        value = np.asarray(getattr(self, field))
+        check_content(self.name, field, value.dtype, value.shape)
+        return value
+
+
+# Datasets of a file by the fields that hold them.
+_WHOLE = {
+    "time": "time",
+    MARKERS: "marker_position",
+    PLACES: "marker_rest_position",
+    NODES: "marker_node",
+    JOINTS: "joint_position",
+}
+_PER_GRIPPER = {"gripper_position": "position", "gripper_force": "force"}
+_NOISE = {"marker_noise": MARKERS, "force_noise": f"gripper/{SIDES[0]}/force"}
