@@ -10,7 +10,8 @@
         print(log.time[-1])
 
 `make_dressing` gives the Drake diagram without running it. `OwnParts` puts a predictor, costs or a
-controller of one's own into either. What stands in `__all__` is public.
+controller of one's own into either; `register_cost` and `register_predictor` make them keys of
+scenarios. What stands in `__all__` is public.
 """
 
 from __future__ import annotations
@@ -31,13 +32,21 @@ from drake_dress.diagrams.run import RunOptions, run_scenario
 from drake_dress.diagrams.scenario import Scenario, apply_variation, checked_scenario
 from drake_dress.file_output import RUN_FILES, prove_directory
 from drake_dress.models.control.costs import GarmentCost, PlannedStep, Slope
-from drake_dress.models.human.prediction import MotionPredictor
+from drake_dress.models.control.own_costs import register_cost, unregister_cost
+from drake_dress.models.human.prediction import (
+    ConstantVelocityPredictor,
+    MotionPredictor,
+    StillPredictor,
+    register_predictor,
+)
+from drake_dress.plugins import load_plugin
 from drake_dress.report.log import RunLog
 from drake_dress.report.replay import show_replay
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.shipped import scenario_file, shipped_scenarios
 
 __all__ = [
+    "ConstantVelocityPredictor",
     "Dressing",
     "GarmentCost",
     "MotionPredictor",
@@ -47,13 +56,18 @@ __all__ = [
     "RunResult",
     "Scenario",
     "Slope",
+    "StillPredictor",
     "checked_scenario",
+    "load_plugin",
     "load_scenario",
     "make_dressing",
     "open_log",
+    "register_cost",
+    "register_predictor",
     "run",
     "shipped_scenarios",
     "show_replay",
+    "unregister_cost",
     "write_replay",
 ]
 

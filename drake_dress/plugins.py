@@ -1,7 +1,7 @@
 """Code of a user's own that adds to the package, such as effects.
 
 A plugin is a Python file or module that calls `register_effect`. The command line loads it with
-`--plugin`; a package that is installed names it in the entry-point group `drake_dress.effects`, and
+`--plugin`; a package that is installed names it in the entry-point group `drake_dress.plugins`, and
 the environment variable `DRAKE_DRESS_PLUGINS` in a list. Child processes inherit that variable and
 the folder of a file on `sys.path`, so that they import the same module anew.
 """
@@ -19,7 +19,7 @@ from types import ModuleType
 
 from drake_dress.errors import UserError
 
-GROUP = "drake_dress.effects"
+GROUP = "drake_dress.plugins"
 VARIABLE = "DRAKE_DRESS_PLUGINS"
 
 

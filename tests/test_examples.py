@@ -11,6 +11,7 @@ FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
     "add_cost": r"without .* are at 1\.19 m after 3 s\nwith .* are at 1\.[01]\d m after 3 s",
+    "add_scenario_key": r"\{'light_touch': \{'weight': 0\.01, .*\} swift\nlargest force \d",
     "explain_own_effect": r"lacks is a chain in the hem \(mass 0\.(09|10)\d* ± .* kg\)\.\n$",
     "explain_recording": r"cameras that are displaced(.*\n)*markers off by 35, now [3-8] mm\n$",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",

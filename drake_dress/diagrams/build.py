@@ -34,6 +34,7 @@ from drake_dress.models.control.constrained_ddp import solve
 from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_model import LocalParameters
+from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.control.safety import SafetyLimits
@@ -51,11 +52,7 @@ from drake_dress.models.human.body import (
     shoulder_height,
     shoulder_joint,
 )
-from drake_dress.models.human.prediction import (
-    ConstantVelocityPredictor,
-    MotionPredictor,
-    StillPredictor,
-)
+from drake_dress.models.human.prediction import PREDICTORS, MotionPredictor
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
@@ -278,7 +275,8 @@ def controller_policy(
             stages=model_of(c.stages, waiting_progress=g.waiting_progress),
         ),
     )
-    return DressingPolicy(mesh, material(c.material), shape, parameters, costs)
+    all_costs = (*registered_costs(c.costs), *costs)
+    return DressingPolicy(mesh, material(c.material), shape, parameters, all_costs)
 
 
 def solve_budget(scenario: schema.Scenario) -> Budget:
@@ -349,9 +347,7 @@ def motion(values: schema.Motion) -> motions.Motion:
 
 def predictor(scenario: schema.Scenario) -> MotionPredictor:
     """Returns how the controller believes that the arms move on."""
-    if scenario.controller.predictor == "constant_velocity":
-        return ConstantVelocityPredictor()
-    return StillPredictor()
+    return PREDICTORS[scenario.controller.predictor]()
 
 
 def effects(scenario: schema.Scenario) -> tuple[Effect, ...]:

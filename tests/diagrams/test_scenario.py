@@ -21,13 +21,7 @@ from drake_dress.diagrams.scenario import (
 )
 from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.scenario.ranges import range_of
-from drake_dress.diagrams.scenario.schema import (
-    Arm,
-    Coat,
-    EffectValues,
-    Variation,
-    effects_schema,
-)
+from drake_dress.diagrams.scenario.schema import SCHEMAS, Arm, Coat, Variation
 from drake_dress.diagrams.scenario.typed import check_ranges
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import LOOP_NAMES
@@ -120,8 +114,8 @@ def numbers_below(schema: Any, key: str = "") -> Iterator[str]:
     inner = [t for t in typing.get_args(schema) if t is not type(None)]
     if dataclasses.is_dataclass(schema):
         for name, hint in typing.get_type_hints(schema).items():
-            inside = effects_schema() if hint == EffectValues else hint
-            yield from numbers_below(inside, f"{key}.{name}" if key else name)
+            dotted = f"{key}.{name}" if key else name
+            yield from numbers_below(SCHEMAS[dotted]() if dotted in SCHEMAS else hint, dotted)
     elif typing.get_origin(schema) is dict:
         for name in LOOP_NAMES if key.endswith("loops") else SIDES:
             yield from numbers_below(inner[1], f"{key}.{name}")

@@ -14,6 +14,7 @@ from drake_dress.diagrams.scenario.schema import (
     Station,
 )
 from drake_dress.errors import UserError
+from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.human import motions
 from drake_dress.models.supervision.injection import sources_of
@@ -195,3 +196,11 @@ def _check_speed(source: str, key: str, motion: Motion, max_hand_speed: float) -
                 f"moves the hand at up to {wave.speed:.2g} m/s, "
                 f"expected at most max_hand_speed, {max_hand_speed:g} m/s",
             )
+
+
+def check_costs(source: str, values: dict[str, dict[str, float]]) -> None:
+    """Holds a user's costs against what they take."""
+    try:
+        registered_costs(values)
+    except UserError as error:
+        raise UserError(source, f"{error.source}.{error.key}", error.message) from error

@@ -16,11 +16,12 @@ from drake_dress.diagrams.scenario.checks import (
     check_behaviour,
     check_cameras,
     check_controller,
+    check_costs,
     check_hardware,
     check_safety,
 )
 from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
-from drake_dress.diagrams.scenario.schema import GlobalMpc, Scenario, effects_schema
+from drake_dress.diagrams.scenario.schema import SCHEMAS, GlobalMpc, Scenario
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
@@ -71,7 +72,7 @@ def _checked(source: str, content: dict[str, Any]) -> Scenario:
     _resolve_delay(source, content)
     fill_in_fidelity(content)
     content = typed(source, "", content, Scenario)
-    _fill_in_effects(content)
+    _fill_in_by_name(content)
     try:
         scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))
     except (RuntimeError, ValueError, TypeError) as error:
@@ -80,6 +81,7 @@ def _checked(source: str, content: dict[str, Any]) -> Scenario:
     _move_force_limit(source, content, scenario)
     check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
     check_controller(source, scenario.controller)
+    check_costs(source, scenario.controller.costs)
     check_behaviour(source, scenario.person.behaviour)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)
@@ -144,16 +146,21 @@ def _resolve_delay(source: str, content: dict[str, Any]) -> None:
     place["delay"] = round(step * max(1, math.ceil(seconds / step - 1e-9)), 9)
 
 
-def _fill_in_effects(content: dict[str, Any]) -> None:
-    """Writes out every parameter of the effects that are given, in the order of the list."""
-    given = content.get("effects")
-    if given is None:
-        return
-    filled = {}
-    for name, schema in get_type_hints(effects_schema()).items():
-        if given.get(name) is not None:
-            filled[name] = dataclasses.asdict(get_args(schema)[0](**given[name]))
-    content["effects"] = filled
+def _fill_in_by_name(content: dict[str, Any]) -> None:
+    """Writes out every parameter of effects and costs that are given, in the order of the list."""
+    for key, schema_of in SCHEMAS.items():
+        *parents, last = key.split(".")
+        place: Any = content
+        for parent in parents:
+            place = place.get(parent) or {}
+        given = place.get(last)
+        if given is None:
+            continue
+        filled = {}
+        for name, schema in get_type_hints(schema_of()).items():
+            if given.get(name) is not None:
+                filled[name] = dataclasses.asdict(get_args(schema)[0](**given[name]))
+        place[last] = filled
 
 
 def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:

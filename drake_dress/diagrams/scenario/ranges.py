@@ -9,6 +9,7 @@ from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
 
@@ -26,7 +27,6 @@ CHOICES = {
         f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
         for motion in ("reach", "withdraw", "wave")
     },
-    "controller.predictor": ("still", "constant_velocity"),
     "plant.fidelity": tuple(FIDELITIES),
     "plant.integrator": ("implicit", "projective_dynamics"),
     "controller.method": ("full", "global", "local"),
@@ -329,6 +329,13 @@ _OF_MEASURES: dict[str, tuple[float, float]] = {
     "forearm_mass": (0.1, 6.0),
 }
 _RANGES |= {f"measures.{name}": bounds for name, bounds in _OF_MEASURES.items()}
+
+
+def choices_of(key: str) -> tuple[str, ...] | None:
+    """Returns what the text at a dotted key may be, if not anything."""
+    if key == "controller.predictor":
+        return tuple(PREDICTORS)
+    return CHOICES.get(plain(key))
 
 
 def plain(key: str) -> str:

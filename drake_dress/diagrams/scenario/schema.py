@@ -6,6 +6,7 @@ others refer to them. `tests/diagrams/test_defaults.py` holds both against each 
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,7 @@ from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth import material
 from drake_dress.models.control import costs, local_model, policy, safety, task_parameters
+from drake_dress.models.control.own_costs import COSTS
 from drake_dress.models.dressing import stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
@@ -26,6 +28,9 @@ from drake_dress.models.supervision.garment_shape import ShapeBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
 from drake_dress.models.supervision.person_pose import PoseBounds
 from drake_dress.models.supervision.supervision import Patience
+
+# By name, then by parameter: of a section that users add to, see `SCHEMAS`.
+ValuesByName = dict[str, dict[str, float]]
 
 _STANDARD = FIDELITIES["standard"]
 _POLICY = policy.PolicyParameters()
@@ -320,6 +325,8 @@ class Controller:
     local: Local = field(default_factory=Local)
     # how the arms are believed to move on: still, or constant_velocity
     predictor: str = "still"
+    # costs of a user's own by name, each with its fields; see models/control/own_costs.py
+    costs: ValuesByName = field(default_factory=dict)
     command_rate: float = 100.0  # Hz
 
 
@@ -532,9 +539,20 @@ def effects_schema() -> type:
     return dataclasses.make_dataclass("Effects", entries)
 
 
-# Physical effects by name, each with its parameters in SI units; see models/effects/. One that is
-# not given is off. Which names there may be is `effects_schema` when a scenario is read.
-EffectValues = dict[str, dict[str, float]]
+def costs_schema() -> type:
+    """Returns a dataclass with every cost that users registered until now."""
+    entries: list[tuple[str, Any, Any]] = []
+    for name, kind in COSTS.items():
+        below = [(f.name, float, field(default=f.default)) for f in dataclasses.fields(kind)]
+        entries.append((name, dataclasses.make_dataclass(name, below) | None, field(default=None)))
+    return dataclasses.make_dataclass("Costs", entries)
+
+
+# Sections whose names are those that are known when a scenario is read.
+SCHEMAS: dict[str, Callable[[], type]] = {
+    "effects": effects_schema,
+    "controller.costs": costs_schema,
+}
 
 
 @dataclass
@@ -559,4 +577,5 @@ class Scenario:
     lab: Lab = field(default_factory=Lab)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
-    effects: EffectValues = field(default_factory=dict)
+    # physical effects by name, each with its parameters in SI units; see models/effects/
+    effects: ValuesByName = field(default_factory=dict)

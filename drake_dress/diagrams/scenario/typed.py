@@ -7,8 +7,8 @@ import types
 import typing
 from typing import Any
 
-from drake_dress.diagrams.scenario.ranges import CHOICES, plain, range_of
-from drake_dress.diagrams.scenario.schema import EffectValues, effects_schema
+from drake_dress.diagrams.scenario.ranges import choices_of, range_of
+from drake_dress.diagrams.scenario.schema import SCHEMAS
 from drake_dress.errors import UserError
 from drake_dress.models.effects.registry import HOW_TO_LOAD
 
@@ -23,9 +23,12 @@ def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
     if name not in hints:
         near = difflib.get_close_matches(str(name), hints, n=1)
         expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(hints)}"
-        what = f"unknown effect ({HOW_TO_LOAD})" if key == "effects" else "unknown key"
+        if not hints:
+            expected = "there is none"
+        kinds = {"effects": "effect", "controller.costs": "cost"}
+        what = f"unknown {kinds[key]} ({HOW_TO_LOAD})" if key in kinds else "unknown key"
         raise UserError(source, dotted, f"{what}, {expected}")
-    return effects_schema() if hints[name] == EffectValues else hints[name]
+    return SCHEMAS[dotted]() if dotted in SCHEMAS else hints[name]
 
 
 def typed(source: str, key: str, value: Any, schema: Any) -> Any:
@@ -61,7 +64,7 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
         if isinstance(value, bool) or not isinstance(value, int):
             raise UserError(source, key, f"is {kind_of(value)}, expected a whole number")
     elif schema is str:
-        choices = CHOICES.get(plain(key))
+        choices = choices_of(key)
         if choices is not None and value not in choices:
             raise UserError(source, key, f"is {kind_of(value)}, expected {' or '.join(choices)}")
         if not isinstance(value, str):

@@ -5,7 +5,10 @@ A predictor sees joints, never what the person wants.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -172,3 +175,28 @@ def resampled(samples: FloatArray, newest: FloatArray, age: float) -> FloatArray
     else:
         past = age * newer + (1.0 - age) * older
     return np.concatenate([past, newest[None]])
+
+
+_predictors: dict[str, Callable[[], MotionPredictor]] = {
+    "still": StillPredictor,
+    "constant_velocity": ConstantVelocityPredictor,
+}
+PREDICTORS: Mapping[str, Callable[[], MotionPredictor]] = MappingProxyType(_predictors)
+"""What `controller.predictor` may name; a live view, which grows with `register_predictor`."""
+
+
+def register_predictor(name: str, make: Callable[[], MotionPredictor]) -> None:
+    """Makes a predictor known, so that `controller.predictor` may name it.
+
+    Args:
+        name: lower-case letters, digits and _.
+        make: returns a new one, such as its class.
+
+    Raises:
+        ValueError: the name is one of the package's, or no name.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        raise ValueError(f"the name is {name!r}, expected lower-case letters, digits and _")
+    if _predictors.get(name) in (StillPredictor, ConstantVelocityPredictor):
+        raise ValueError(f"the name {name} is one of the package's, expected another")
+    _predictors[name] = make
