@@ -6,6 +6,7 @@ installed there. A node that is lost costs the runs that it was at: they are beg
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import socket
@@ -93,7 +94,7 @@ def connected(address: str) -> Any:
     # Ray would end this process at once, with nothing said and nothing kept
     handler = signal.getsignal(signal.SIGTERM)
     try:
-        ray.init(**where, runtime_env=environment, log_to_driver=False, logging_level="error")
+        ray.init(**where, runtime_env=environment, log_to_driver=False, logging_level=logging.ERROR)
     except (ConnectionError, ValueError, RuntimeError) as error:
         first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise UserError("bench", "--ray", f"no cluster at {address}: {first}") from None

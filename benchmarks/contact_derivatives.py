@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from drake_dress.file_output import output_file, write_text
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
@@ -63,20 +63,21 @@ def compare(seed: int, time_step: float) -> Comparison | None:
         return float(np.sum(weight[0] * x1) + np.sum(weight[1] * v1) + pull)
 
     g = cloth.vector_jacobian_product(tape, *weight, weight_r)
-    exact, held, true = [], [], []
+    exact: list[float] = []
+    held: list[float] = []
+    true: list[float] = []
     for _ in range(_DIRECTIONS):
         # A step moves nodes by h v: directions of like effect in x, v and the grippers' motion.
         d = [rng.normal(size=a.shape) for a in (x, v, motion)]
         d[1] /= time_step
-        exact.append(sum(np.sum(a * b) for a, b in zip((g.x, g.v, g.held_motion), d, strict=True)))
+        slopes = zip((g.x, g.v, g.held_motion), d, strict=True)
+        exact.append(float(sum(np.sum(a * b) for a, b in slopes)))
         for found, keep in ((held, True), (true, False)):
-            high, low = (
-                loss(
-                    *(a + s * _DIFFERENCE * b for a, b in zip((x, v, motion), d, strict=True)), keep
-                )
-                for s in (1.0, -1.0)
-            )
-            found.append((high - low) / (2.0 * _DIFFERENCE))
+            ends = []
+            for s in (1.0, -1.0):
+                moved = [a + s * _DIFFERENCE * b for a, b in zip((x, v, motion), d, strict=True)]
+                ends.append(loss(moved[0], moved[1], moved[2], keep))
+            found.append((ends[0] - ends[1]) / (2.0 * _DIFFERENCE))
     return Comparison(
         time_step,
         seed,
@@ -89,7 +90,9 @@ def compare(seed: int, time_step: float) -> Comparison | None:
     )
 
 
-def _random_state(rng, time_step):  # type: ignore[no-untyped-def]
+def _random_state(
+    rng: np.random.Generator, time_step: float
+) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray, Obstacles]:
     columns, rows, spacing = rng.integers(8, 14), rng.integers(8, 14), rng.uniform(0.02, 0.04)
     x, faces = _sheet(int(columns), int(rows), spacing)
     x += 1e-4 * rng.normal(size=x.shape)
@@ -121,7 +124,7 @@ def _random_state(rng, time_step):  # type: ignore[no-untyped-def]
     return cloth, x, v, np.tile(time_step * velocity, (len(held), 1)), limbs
 
 
-def _sheet(columns: int, rows: int, spacing: float):  # type: ignore[no-untyped-def]
+def _sheet(columns: int, rows: int, spacing: float) -> tuple[FloatArray, IntArray]:
     grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"), -1)
     flat = spacing * grid.reshape(-1, 2)
     a = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()

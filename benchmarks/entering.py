@@ -113,7 +113,7 @@ def entries(path: Path, log: RunLog) -> Iterator[Entry]:
 def _entry(moment: Moment, policy: DressingPolicy, side: int) -> Entry:
     h = policy.parameters.time_step
     steps = round(_AHEAD / h)
-    moved = moment.joints(h * np.arange(steps + 1))
+    moved = moment.joints(h * np.arange(steps + 1, dtype=float))
     stayed = np.repeat(moved[:1], steps + 1, axis=0)
     return Entry(
         _ahead(policy, moment.plant(steps * h), moved[-1], side),
@@ -127,7 +127,8 @@ def _led(moment: Moment, policy: DressingPolicy, joints: FloatArray) -> FloatArr
     cloth, h = policy.controller.cloth, policy.parameters.time_step
     obstacles = person_obstacles(policy.person, joints, h)
     x, v = moment.plant(0.0), moment.velocity()
-    for motion, around in zip(moment.motion(h * np.arange(len(joints))), obstacles, strict=True):
+    times = h * np.arange(len(joints), dtype=float)
+    for motion, around in zip(moment.motion(times), obstacles, strict=True):
         x, v, _, _ = cloth.step(x, v, motion, around)
     return x
 

@@ -145,8 +145,8 @@ def moments(log: RunLog, run: str) -> list[Moment]:
             if second:
                 values["s of the first sleeve"] = float(s[k, 1 - i])
             found.append(Moment(run, float(time[k]), side, second, wait, begins, values))
-    side = _gone_about(found)
-    return [m for m in found if m.second or m.side == side]
+    about = _gone_about(found)
+    return [m for m in found if m.second or m.side == about]
 
 
 def _gone_about(found: Sequence[Moment]) -> str:
@@ -185,8 +185,8 @@ def quantities(
     hands = float(np.linalg.norm(joints[2] - joints[5]))
     return {
         "hand to the armhole's centre, cm": 100 * float(np.linalg.norm(offset)),
-        "hand beside the armhole's normal, cm": 100 * distance_aside(offset, sleeve.v_c),
-        "centre beside the forearm's line, cm": 100 * distance_aside(offset, forearm),
+        "hand beside the armhole's normal, cm": 100 * float(distance_aside(offset, sleeve.v_c)),
+        "centre beside the forearm's line, cm": 100 * float(distance_aside(offset, forearm)),
         "normal off the forearm, °": _degrees(float(sleeve.v_c @ forearm)),
         "armholes apart, share of rest": float(np.linalg.norm(sleeve.p_c - other.p_c)) / reach,
         "gripper over the other one, cm": 100 * float((grippers[i] - grippers[1 - i])[2]),

@@ -21,6 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 
 from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario
@@ -34,7 +35,7 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
-from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
+from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.models.human.body import body_capsules, shoulder_joint
@@ -209,7 +210,7 @@ def _cloth(run: Run, belief: GarmentMesh, variant: Variant) -> ExplicitBiasCloth
     )
 
 
-def _errors(a, b) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def _errors(a: SleeveState, b: SleeveState) -> tuple[float, float]:
     """Returns the distance of two sleeves' centres, m, and the angle between them, °."""
     angle = np.degrees(np.arccos(np.clip(a.v_c @ b.v_c, -1.0, 1.0)))
     return float(np.linalg.norm(a.p_c - b.p_c)), float(angle)
@@ -218,7 +219,9 @@ def _errors(a, b) -> tuple[float, float]:  # type: ignore[no-untyped-def]
 class Moment:
     """What was, and what came, seen with the controller's mesh."""
 
-    def __init__(self, run: Run, belief: GarmentMesh, seen, log: RunLog, time: float) -> None:  # type: ignore[no-untyped-def]
+    def __init__(
+        self, run: Run, belief: GarmentMesh, seen: sp.csr_array, log: RunLog, time: float
+    ) -> None:
         self._run, self._belief, self._seen, self._log = run, belief, seen, log
         self._time = time
         self._signs = [loop_orientation(belief, side) for side in SIDES]
@@ -244,7 +247,7 @@ class Moment:
         counts = [len(self._belief.grasp[side]) for side in SIDES]
         return np.repeat(np.diff(self.grippers(after), axis=0), counts, axis=1)
 
-    def sleeve(self, x: FloatArray, side: int):  # type: ignore[no-untyped-def]
+    def sleeve(self, x: FloatArray, side: int) -> SleeveState:
         """Returns the state of a sleeve of the garment at `x`."""
         return sleeve_state(x, self._belief.loops[f"{SIDES[side]}_armhole"], self._signs[side])
 
@@ -288,7 +291,7 @@ class Moment:
     ) -> tuple[list[FloatArray], tuple[float, float]]:
         """Returns the garment as foreseen, and times of a second of it: alone, with gradient."""
         steps = round(AFTER[-1] / h)
-        at = h * np.arange(steps + 1)
+        at = h * np.arange(steps + 1, dtype=float)
         obstacles = person_obstacles(self._run.person, self.joints(at), h)
         motion = self.motion(at)
         x, v = self.plant(0.0), self.velocity()

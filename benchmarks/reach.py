@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -140,7 +141,7 @@ def follow(run: Recorded, arms: Arms) -> Followed:
 
 def table(runs: Sequence[Recorded], placements: Sequence[Arms]) -> Table:
     """Returns a row a placement: lag over all runs, the worst run's, and least distances."""
-    rows = []
+    rows: list[list[Any]] = []
     for arms in placements:
         name = (
             f"{arms.distance_behind:g} behind, {arms.spread:g} apart, "

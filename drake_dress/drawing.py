@@ -13,7 +13,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,13 +50,13 @@ def plain_settings() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float, height: float, **options: object) -> Figure:
+def new_figure(width: float, height: float, **options: Any) -> Figure:
     """Returns an empty figure of so many inches, on a canvas of pixels."""
     load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), **options)  # type: ignore[arg-type]
+    figure = Figure(figsize=(width, height), **options)
     FigureCanvasAgg(figure)
     return figure
 
@@ -71,7 +71,7 @@ def as_svg(figure: Figure) -> bytes:
 def pixels(figure: Figure) -> npt.NDArray[np.uint8]:
     """Returns (height, width, 4) RGBA of a figure."""
     figure.canvas.draw()
-    return np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+    return np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]  # of Agg
 
 
 def as_png(picture: npt.NDArray[np.uint8]) -> bytes:

@@ -265,24 +265,32 @@ def plain_value(word: str) -> bool | int | float | str | None:
         meant = "true" if word.lower() in _YES else "false"
         raise ValueError(f"{word} is {meant} or text, expected {meant} or '{word}'")
     if _INTEGER.fullmatch(word):
-        # Text to int takes quadratic time, and Python refuses thousands of digits.
-        value = int(word) if len(word) < 30 else _MOST + 1
-        if not _LEAST <= value <= _MOST:
-            raise ValueError(f"{_short(word)} is out of range, expected at most 64 bits")
-        return value
+        return _whole(word)
     if _LEADING_ZERO.fullmatch(word):
         raise ValueError(_zeros(word))
     if _FLOAT.fullmatch(word):
-        number = float(word)
-        if not math.isfinite(number):
-            raise ValueError(f"{_short(word)} is out of range, expected at most 1.7e308")
-        return number
+        return _decimal(word)
     if _SPECIAL.fullmatch(word):
         return float(word.replace(".", ""))
     told = _other_number(word)
     if told:
         raise ValueError(told)
     return word
+
+
+def _whole(word: str) -> int:
+    # Text to int takes quadratic time, and Python refuses thousands of digits.
+    value = int(word) if len(word) < 30 else _MOST + 1
+    if not _LEAST <= value <= _MOST:
+        raise ValueError(f"{_short(word)} is out of range, expected at most 64 bits")
+    return value
+
+
+def _decimal(word: str) -> float:
+    number = float(word)
+    if not math.isfinite(number):
+        raise ValueError(f"{_short(word)} is out of range, expected at most 1.7e308")
+    return number
 
 
 def _other_number(word: str) -> str:

@@ -18,7 +18,8 @@ class LightTouch:
 
     def value(self, step: dressing.PlannedStep) -> float:
         """Returns the cost."""
-        return self.weight * sum(max(0.0, f @ f - self.free**2) for f in map(step.force, (0, 1)))
+        squares = [float(np.sum(step.force(side) ** 2)) for side in (0, 1)]
+        return self.weight * sum(max(0.0, square - self.free**2) for square in squares)
 
     def add_slope(self, step: dressing.PlannedStep, slope: dressing.Slope) -> None:
         """Adds its derivative by the forces of the held nodes."""

@@ -1,13 +1,13 @@
 """Explains a recording that is given as arrays: explain_recording.py."""
 
-import numpy as np
+from typing import Any
 
 from drake_dress import explain
 
 QUICK = ["plant.spacing=0.06", "plant.time_step=0.008", "plant.tolerance=2e-3"]
 
 
-def recorded() -> dict[str, np.ndarray]:
+def recorded() -> dict[str, Any]:
     """Returns arrays as a lab has them; here a simulated one whose cameras are displaced."""
     session = explain.Session(motions=["sway"], duration=1.6)
     lab = explain.simulate("measured", "camera_translation", QUICK, size=3.0, session=session)

@@ -1,7 +1,9 @@
 """Puts a controller of one's own into the diagram: both grippers rise, and slow down under load."""
 
+from collections.abc import Callable
+
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, InputPort, LeafSystem
 
 from drake_dress import dressing
 
@@ -18,10 +20,10 @@ class Rise(LeafSystem):
             self.DeclareVectorOutputPort(f"{side}_velocity_request", 3, self._rise(force))
         self.DeclareVectorOutputPort("request_time", 1, self._now)
 
-    def _rise(self, force):
+    def _rise(self, force: InputPort) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             load = np.linalg.norm(force.Eval(context))
-            output.SetFromVector([0.0, 0.0, SPEED * max(0.0, 1.0 - load / ENOUGH)])
+            output.SetFromVector([0.0, 0.0, SPEED * max(0.0, 1.0 - float(load) / ENOUGH)])
 
         return calc
 

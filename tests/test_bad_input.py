@@ -343,7 +343,9 @@ def test_bad_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ),
     ],
 )
-def test_measured_data_that_cannot_be_used(tmp_path, capsys, words, expected):
+def test_measured_data_that_cannot_be_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: list[str]
+) -> None:
     scenario = str(Path(__file__).parents[1] / "scenarios" / "measured.yaml")
     out = tmp_path / "out"
     words = [{"SCENARIO": scenario, "OUT": str(out)}.get(w, w) for w in words]

@@ -6,6 +6,7 @@ import builtins
 import importlib
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -80,10 +81,10 @@ def test_a_module_that_is_missing_later(
 ) -> None:
     usual = builtins.__import__
 
-    def missing(name: str, *words: object, **more: object) -> object:
+    def missing(name: str, *words: Any, **more: Any) -> object:
         if name.startswith("drake_dress.diagrams.calibration"):
             raise ImportError("libGL.so.1: cannot open shared object file", name="cv2")
-        return usual(name, *words, **more)  # type: ignore[arg-type]
+        return usual(name, *words, **more)
 
     monkeypatch.setattr(builtins, "__import__", missing)
     assert main(["calibrate", "folder"]) == 2

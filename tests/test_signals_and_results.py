@@ -19,6 +19,7 @@ import pytest
 
 from drake_dress.__main__ import main
 from drake_dress.diagrams import run as run_module
+from drake_dress.diagrams.assemble import wired
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
@@ -140,7 +141,6 @@ def test_a_signal_before_the_first_step_ends_a_run_as_one_after_it_does(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    wired = run_module.wired
 
     def wired_meanwhile(*parts: Any) -> Dressing:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -302,5 +302,5 @@ def test_a_run_goes_on_without_a_page_where_no_port_is_free(
     monkeypatch.setattr("drake_dress.report.web_page.Meshcat", busy)
     with pytest.raises(UserError, match="7000 to 7999"):
         open_page()
-    assert run_module._open_meshcat() is None
+    assert run_module._open_meshcat(print) is None
     assert "goes on without" in capsys.readouterr().err

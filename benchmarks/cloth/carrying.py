@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.comparison import Result, own_recipes
-from benchmarks.cloth.engines import StateEngine
+from benchmarks.cloth.engines import ExplicitBiasEngine, StateEngine
 from benchmarks.cloth.garments import CONTROLLER_SPACING, QUICK_SPACING, grasp, jacket
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.motions import at_rest, carried
@@ -62,10 +62,11 @@ def measure(session: Session) -> Result:
                 session.say(f"  {recipe.name}: skipped, {missing}")
                 continue
             engine = recipe.make(scene, h)
+            assert isinstance(engine, ExplicitBiasEngine | StateEngine)
             force = []
             for k in range(round(DURATION / h)):
                 engine.step(scene.motion((k + 1) * h))
-                on_nodes = engine.held_force()  # type: ignore[attr-defined]
+                on_nodes = engine.held_force()
                 per_gripper = on_nodes.reshape(2, -1, 3).sum(axis=1)
                 force.append(np.linalg.norm(per_gripper, axis=1) / share)
             kept = np.array(force)

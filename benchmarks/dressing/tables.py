@@ -11,6 +11,7 @@ from benchmarks.cloth.table import Table
 from benchmarks.dressing.cases import METHODS, SERIES_STEP
 from benchmarks.statistics import wilson
 from drake_dress.drawing import as_svg, plain_settings
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.page import chart
 from drake_dress.report.summary import SuccessRules
@@ -91,7 +92,9 @@ def figure(results: Sequence[dict[str, Any]]) -> str:
     return as_svg(drawing).decode("utf-8")
 
 
-def _bands(series: Iterable[dict[str, Any]], name: str):  # type: ignore[no-untyped-def]
+def _bands(
+    series: Iterable[dict[str, Any]], name: str
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Returns times and quartiles over runs; a run that has ended stays as it ended."""
     rows = [np.array(s[name], dtype=float) for s in series]
     longest = max(map(len, rows))

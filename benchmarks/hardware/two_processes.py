@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -150,49 +151,87 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
 
     # at once: the run waits for the lab, and each takes seconds to load
     process = {name: started(name) for name in words}
-    memory: dict[str, list[float]] = {"lab": [], "run": []}
-    begin, begun, filled = time.monotonic(), None, False
-    alone_since, sent_away = None, False
+    watch = _Watch(plan, process, lab_open)
     while any(p.poll() is None for p in process.values()):
         time.sleep(_POLL)
-        now = time.monotonic()
-        if now - begin > plan.timeout:
-            for p in process.values():
-                p.kill()
-        if process["run"].poll() is not None and begun is None:
-            # it did not come so far; the lab, once it is open, need not wait for it
-            if alone_since is None and lab_open in (out / "lab.log").read_text():
-                alone_since = now
-            if alone_since is not None and now - alone_since > _ALONE and not sent_away:
-                sent_away = True
-                process["lab"].send_signal(signal.SIGINT)
-        if begun is None and _BEGUN in (out / "lab.log").read_text():
-            begun = now
-        if begun is not None and plan.kill_at is not None and now - begun >= plan.kill_at:
-            process["run"].kill()
-        fills = begun is not None and plan.fill_at is not None and now - begun >= plan.fill_at
-        if fills and not filled:
-            filled = True
-            fill(run_out / "filler")
-        if plan.sampled and begun is not None and now - begun >= len(memory["lab"]):
-            for name, p in process.items():
-                memory[name].append(memory_of(p.pid))
+        watch.look(time.monotonic())
     for file in files.values():
         file.close()
     if plan.fill_at is not None:
-        (run_out / "filler").unlink(missing_ok=True)
-        kept = out / "run-kept"
-        kept.mkdir(exist_ok=True)
-        for path in run_out.iterdir():
-            (kept / path.name).write_bytes(path.read_bytes())
+        _keep(run_out, out / "run-kept")
     return Outcome(
         process["lab"].returncode,
         process["run"].returncode,
         (out / "lab.log").read_text(),
         (out / "run.log").read_text(),
-        memory["lab"],
-        memory["run"],
+        watch.memory["lab"],
+        watch.memory["run"],
     )
+
+
+class _Watch:
+    """Does what a plan says to a lab and a run that are under way, and samples their memory.
+
+    Args:
+        plan: the plan.
+        process: of `lab` and `run`.
+        lab_open: what a lab says when it is open.
+    """
+
+    def __init__(
+        self, plan: Plan, process: Mapping[str, subprocess.Popen[bytes]], lab_open: str
+    ) -> None:
+        self.memory: dict[str, list[float]] = {"lab": [], "run": []}
+        self._plan, self._process, self._lab_open = plan, process, lab_open
+        self._out = Path(plan.out)
+        self._begin = time.monotonic()
+        self._begun: float | None = None
+        self._alone_since: float | None = None
+        self._sent_away = self._filled = False
+
+    def look(self, now: float) -> None:
+        """Does what is due at a time of the monotonic clock, s."""
+        if now - self._begin > self._plan.timeout:
+            for p in self._process.values():
+                p.kill()
+        if self._process["run"].poll() is not None and self._begun is None:
+            self._leave_lab_alone(now)
+        if self._begun is None and _BEGUN in self._lab_words():
+            self._begun = now
+        if self._begun is not None:
+            self._act(now - self._begun)
+
+    def _lab_words(self) -> str:
+        return (self._out / "lab.log").read_text()
+
+    def _leave_lab_alone(self, now: float) -> None:
+        """The run did not come so far; the lab, once it is open, need not wait for it."""
+        if self._alone_since is None and self._lab_open in self._lab_words():
+            self._alone_since = now
+        is_long = self._alone_since is not None and now - self._alone_since > _ALONE
+        if is_long and not self._sent_away:
+            self._sent_away = True
+            self._process["lab"].send_signal(signal.SIGINT)
+
+    def _act(self, since: float) -> None:
+        """Does what is due so long after the first command, s."""
+        plan = self._plan
+        if plan.kill_at is not None and since >= plan.kill_at:
+            self._process["run"].kill()
+        if plan.fill_at is not None and since >= plan.fill_at and not self._filled:
+            self._filled = True
+            fill(self._out / "run" / "filler")
+        if plan.sampled and since >= len(self.memory["lab"]):
+            for name, p in self._process.items():
+                self.memory[name].append(memory_of(p.pid))
+
+
+def _keep(run_out: Path, kept: Path) -> None:
+    """Copies what is on the run's own disk, which ends with its processes."""
+    (run_out / "filler").unlink(missing_ok=True)
+    kept.mkdir(exist_ok=True)
+    for path in run_out.iterdir():
+        (kept / path.name).write_bytes(path.read_bytes())
 
 
 def _set(values: list[str]) -> list[str]:

@@ -19,7 +19,7 @@ from benchmarks.inputs.trials import Expect, Trial, place
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.reading import read_recordings
-from drake_dress.models.arrays import BoolArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
@@ -89,28 +89,40 @@ def draw_measurement(rng: Rng) -> Trial:
         if seen.shape != reference.shape:
             return f"markers of shape {seen.shape}"
         if how == "bytes":
-            # bits of a number may have changed, by as much as noise does
-            off = np.linalg.norm(seen - reference, axis=2)
-            worst = float(np.nanmax(off)) if np.isfinite(off).any() else 0.0
-            return f"a marker {worst:.3g} m off" if worst > _OFF else None
+            return _far_off(seen, reference)
         if seen.shape[0] != len(recording.time):
             return f"{len(recording.time)} times of {seen.shape[0]} samples"
-        if log.spoilt is not None and np.isfinite(seen[log.spoilt]).any():
-            return (
-                f"{int(np.isfinite(seen[log.spoilt]).all(axis=-1).sum())} spoilt samples believed"
-            )
-        if expect is Expect.ACCEPT:
-            good = np.isfinite(reference).all(axis=2)
-            if log.spoilt is not None:
-                good &= ~log.spoilt
-            kept = np.isfinite(seen).all(axis=2) & good
-            if kept.sum() < 0.97 * good.sum():
-                return f"{int(good.sum() - kept.sum())} of {int(good.sum())} sound samples dropped"
-            if not np.allclose(seen[kept], reference[kept], atol=1e-5):
-                return "other marker positions"
-        return None
+        wrong = _believed(seen, log.spoilt)
+        if wrong is None and expect is Expect.ACCEPT:
+            wrong = _lost(seen, reference, log.spoilt)
+        return wrong
 
     return Trial(f"{suffix} {told}", expect, use)
+
+
+def _far_off(seen: FloatArray, reference: FloatArray) -> str | None:
+    # bits of a number may have changed, by as much as noise does
+    off = np.linalg.norm(seen - reference, axis=2)
+    worst = float(np.nanmax(off)) if np.isfinite(off).any() else 0.0
+    return f"a marker {worst:.3g} m off" if worst > _OFF else None
+
+
+def _believed(seen: FloatArray, spoilt: BoolArray | None) -> str | None:
+    if spoilt is None or not np.isfinite(seen[spoilt]).any():
+        return None
+    return f"{int(np.isfinite(seen[spoilt]).all(axis=-1).sum())} spoilt samples believed"
+
+
+def _lost(seen: FloatArray, reference: FloatArray, spoilt: BoolArray | None) -> str | None:
+    good = np.asarray(np.isfinite(reference).all(axis=2))
+    if spoilt is not None:
+        good &= ~spoilt
+    kept = np.isfinite(seen).all(axis=2) & good
+    if kept.sum() < 0.97 * good.sum():
+        return f"{int(good.sum() - kept.sum())} of {int(good.sum())} sound samples dropped"
+    if not np.allclose(seen[kept], reference[kept], atol=1e-5):
+        return "other marker positions"
+    return None
 
 
 def prepare(folder: Path) -> None:
@@ -154,7 +166,7 @@ def _sound() -> _Log:
     return deepcopy(_read_base())
 
 
-def _pick(rng: Rng, items: Sequence[Any]) -> Any:
+def _pick(rng: Rng, items: Sequence[Any] | npt.NDArray[Any]) -> Any:
     return items[int(rng.integers(len(items)))]
 
 
@@ -382,7 +394,8 @@ def _write_hdf5(log: _Log, path: Path, **options: Any) -> None:
 
 def _write_npz(log: _Log, path: Path) -> None:
     noise = {f"{name}/noise_std": np.asarray(v) for name, v in log.noise.items()}
-    np.savez(path, **log.data, **noise)
+    arrays: dict[str, Any] = {**log.data, **noise}
+    np.savez(path, **arrays)
 
 
 def _rows(log: _Log) -> list[list[str]]:
@@ -580,31 +593,26 @@ def _marker_list(rng: Rng, log: _Log, path: Path) -> _Told:
     how = _pick(
         rng, ("missing", "twice", "from 1", "fraction", "word", "more", "empty", "shuffled", "none")
     )
-    expect = Expect.REFUSE
-    if how == "missing":
+    instead = {"twice": str((k + 1) % len(body)), "fraction": f"{k}.5", "word": "m7"}
+    if how in instead:
+        body[k][0] = instead[how]
+    elif how == "missing":
         del body[k]
-    elif how == "twice":
-        body[k][0] = str((k + 1) % len(body))
     elif how == "from 1":
         for i, row in enumerate(body):
             row[0] = str(i + 1)
-    elif how == "fraction":
-        body[k][0] = f"{k}.5"
-    elif how == "word":
-        body[k][0] = "m7"
     elif how == "more":
         body.append([str(len(body)), "0", "0", "0"])
     elif how == "empty":
         body = []
     elif how == "shuffled":
         rng.shuffle(body)
-        expect = Expect.ACCEPT
     beside = path.with_suffix(".markers.csv")
     if how == "none":
         beside.unlink()
     else:
         beside.write_text(_text([places[0], *body]))
-    return how, expect
+    return how, Expect.ACCEPT if how == "shuffled" else Expect.REFUSE
 
 
 def _columns(rng: Rng, log: _Log, path: Path) -> _Told:

@@ -302,6 +302,17 @@ def _dialect(rng: Rng, s: _Sheet) -> tuple[str, bytes, Expect]:
         words = [f"{i}{more}" for i in index]
         joint = " \\\n  " if "continued" in habits and k % 7 == 0 else " "
         lines.append("f " + joint.join(words))
+    text = ("\r\n" if "crlf" in habits else "\n").join([*_laid_out(lines, habits), ""])
+    if "crlf" in habits:
+        text = text.replace("\\\n", "\\\r\n")
+    data = text.encode()
+    if "bom" in habits:
+        data = b"\xef\xbb\xbf" + data
+    return "+".join(sorted(habits)) or "plain", data, Expect.ACCEPT
+
+
+def _laid_out(lines: list[str], habits: set[str]) -> list[str]:
+    """Returns the same statements with other blanks, notes and empty lines."""
     if "tabs" in habits:
         lines = [line.replace(" ", "\t") if "\\" not in line else line for line in lines]
     if "indent" in habits:
@@ -312,13 +323,7 @@ def _dialect(rng: Rng, s: _Sheet) -> tuple[str, bytes, Expect]:
         ]
     if "blank" in habits:
         lines = [x for k, line in enumerate(lines) for x in ([line, ""] if k % 11 == 0 else [line])]
-    text = ("\r\n" if "crlf" in habits else "\n").join([*lines, ""])
-    if "crlf" in habits:
-        text = text.replace("\\\n", "\\\r\n")
-    data = text.encode()
-    if "bom" in habits:
-        data = b"\xef\xbb\xbf" + data
-    return "+".join(sorted(habits)) or "plain", data, Expect.ACCEPT
+    return lines
 
 
 def _damaged(rng: Rng, sound: bytes) -> tuple[str, bytes]:
@@ -341,12 +346,17 @@ def _damaged(rng: Rng, sound: bytes) -> tuple[str, bytes]:
     elif how == "noise":
         data = bytearray(rng.bytes(int(rng.integers(1, 5000))))
     elif how == "lines":
-        lines = data.split(b"\n")
-        for _ in range(int(rng.integers(1, 10))):
-            k = int(rng.integers(len(lines)))
-            if rng.random() < 0.5:
-                del lines[k]
-            else:
-                lines.insert(k, lines[int(rng.integers(len(lines)))])
-        data = bytearray(b"\n".join(lines))
+        data = _other_lines(rng, data)
     return how, bytes(data)
+
+
+def _other_lines(rng: Rng, data: bytearray) -> bytearray:
+    """Returns a file of which some lines are gone, and others stand where they did not."""
+    lines = data.split(b"\n")
+    for _ in range(int(rng.integers(1, 10))):
+        k = int(rng.integers(len(lines)))
+        if rng.random() < 0.5:
+            del lines[k]
+        else:
+            lines.insert(k, lines[int(rng.integers(len(lines)))])
+    return bytearray(b"\n".join(lines))

@@ -76,22 +76,12 @@ def play(plan: Plan) -> Ended:
     """Carries out a plan; the disk of `disk_full` has to be this process's own."""
     out = Path(plan.out)
     out.mkdir(parents=True, exist_ok=True)
-    place = out
-    if plan.how == "disk_full":
-        place = out / "disk"
-        place.mkdir()
-        mount = ["mount", "-t", "tmpfs", "-o", _DISK, "tmpfs", str(place)]
-        subprocess.run(mount, check=True)
+    place = _place(plan, out)
     for path in Path(plan.earlier).iterdir():
         shutil.copy(path, place / path.name)
-    command = [sys.executable, "-m", "drake_dress", "run", plan.scenario, "--no-meshcat"]
-    command += ["--out", str(place), "--seed", str(plan.seed)]
-    if plan.how != "group":
-        command.append("--one-process")
-    command += [word for value in plan.settings for word in ("--set", value)]
     begin = time.monotonic()
     process = subprocess.Popen(
-        command,
+        _command(plan, place),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -116,14 +106,7 @@ def play(plan: Plan) -> Ended:
         now = time.monotonic() - begin
         if plan.how and acted is None and now >= plan.moment:
             acted = now
-            if plan.how == "disk_full":
-                fill(place / "filler")
-            elif plan.how == "group":
-                # as `timeout` does
-                process.terminate()
-                os.killpg(process.pid, signal.SIGTERM)
-            else:
-                process.send_signal(signal.SIGKILL if plan.how == "kill" else signal.SIGTERM)
+            _act(plan.how, process, place)
         if now > plan.timeout:
             os.killpg(process.pid, signal.SIGKILL)
     wall = time.monotonic() - begin
@@ -133,6 +116,36 @@ def play(plan: Plan) -> Ended:
         for path in place.iterdir():
             shutil.copy(path, out / path.name)
     return Ended(process.returncode, "".join(lines), wall, acted, (told[0], told[1]))
+
+
+def _place(plan: Plan, out: Path) -> Path:
+    """Returns the folder of the run: on a small disk of its own where that is to be filled."""
+    if plan.how != "disk_full":
+        return out
+    place = out / "disk"
+    place.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", _DISK, "tmpfs", str(place)], check=True)
+    return place
+
+
+def _command(plan: Plan, place: Path) -> list[str]:
+    command = [sys.executable, "-m", "drake_dress", "run", plan.scenario, "--no-meshcat"]
+    command += ["--out", str(place), "--seed", str(plan.seed)]
+    if plan.how != "group":
+        command.append("--one-process")
+    return command + [word for value in plan.settings for word in ("--set", value)]
+
+
+def _act(how: str, process: subprocess.Popen[str], place: Path) -> None:
+    """Does to a run what ends it."""
+    if how == "disk_full":
+        fill(place / "filler")
+    elif how == "group":
+        # as `timeout` does
+        process.terminate()
+        os.killpg(process.pid, signal.SIGTERM)
+    else:
+        process.send_signal(signal.SIGKILL if how == "kill" else signal.SIGTERM)
 
 
 if __name__ == "__main__":

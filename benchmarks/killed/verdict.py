@@ -46,16 +46,7 @@ def problems(
         how: it was ended.
         end: how it did.
     """
-    wrong = []
-    if "Traceback" in end.words:
-        wrong.append("traceback")
-    if how in _ANSWERED and end.acted is not None and end.wall - end.acted > _SOON:
-        wrong.append(f"ended {end.wall - end.acted:.0f} s after SIGTERM")
-    if how in _ANSWERED and end.acted is not None and end.status not in _AFTER_TERMINATION:
-        # before the run could take a signal, and when all is written, the system ends it
-        by_the_system = end.status == -15 and (end.told[0] <= 0.0 or _WRITTEN in end.words)
-        if not by_the_system:
-            wrong.append(f"exit status {end.status} after SIGTERM")
+    wrong = _answer_problems(how, end)
     now = fingerprints(folder)
     old = [name for name, digest in now.items() if earlier.get(name) == digest]
     if old and len(old) < len(now):
@@ -73,6 +64,21 @@ def problems(
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         if summary["seed"] != seed:
             wrong.append(f"summary of seed {summary['seed']}, log of {seed}")
+    return wrong
+
+
+def _answer_problems(how: str, end: Ended) -> list[str]:
+    """Returns what is wrong with how a run took being ended."""
+    wrong = []
+    if "Traceback" in end.words:
+        wrong.append("traceback")
+    if how in _ANSWERED and end.acted is not None and end.wall - end.acted > _SOON:
+        wrong.append(f"ended {end.wall - end.acted:.0f} s after SIGTERM")
+    if how in _ANSWERED and end.acted is not None and end.status not in _AFTER_TERMINATION:
+        # before the run could take a signal, and when all is written, the system ends it
+        by_the_system = end.status == -15 and (end.told[0] <= 0.0 or _WRITTEN in end.words)
+        if not by_the_system:
+            wrong.append(f"exit status {end.status} after SIGTERM")
     return wrong
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,17 +38,15 @@ def read_problems(path: Path) -> list[LocalProblem]:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
-        return [
-            LocalProblem(
-                **{name: arrays[name][i] for name in _PLAIN},
-                **{
-                    bounds: NormBounds(*(arrays[f"{bounds}.{part}"][i] for part in _PARTS))
-                    for bounds in ("state_bounds", "input_bounds")
-                },
-            )
-            for i in range(len(arrays["start"]))
-        ]
+        return [_problem(arrays, i) for i in range(len(arrays["start"]))]
     except OSError as error:
         raise UserError(str(path), "", f"cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, IndexError, EOFError) as error:
         raise UserError(str(path), "", f"expected local problems as NPZ: {error}") from None
+
+
+def _problem(arrays: Mapping[str, Any], i: int) -> LocalProblem:
+    fields: dict[str, Any] = {name: arrays[name][i] for name in _PLAIN}
+    for bounds in ("state_bounds", "input_bounds"):
+        fields[bounds] = NormBounds(*(arrays[f"{bounds}.{part}"][i] for part in _PARTS))
+    return LocalProblem(**fields)

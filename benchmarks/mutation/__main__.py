@@ -93,7 +93,7 @@ def _result(mutant: Mutant, copy: Path) -> dict[str, Any]:
 
 
 def _table(results: Mapping[str, dict[str, Any]], seed: int) -> Table:
-    rows = []
+    rows: list[list[Any]] = []
     for name in MODULES:
         said = [r["said"] for r in results.values() if r["case"]["module"] == name]
         if not said:

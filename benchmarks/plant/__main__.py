@@ -67,13 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         around(options.into, _NAME)
     scenario = load_scenario(options.scenario)
     folder = options.scenario.parent
-    run = options.work / "run"
-    if not (run / "summary.json").exists():
-        print("a dressing is run, from which the motion is taken", flush=True)
-        _, problem = run_scenario(options.scenario, run, (), report=False)
-        if problem:
-            raise UserError("bench", "plant", problem)
-    motion = DressingMotion.read(run / "run.h5")
+    motion = _motion(options.scenario, options.work / "run")
     fine = REFERENCE.of(scenario, folder)
     coarse = build_garment(scenario.garment, scenario.plant.spacing, folder)
     with caught_interrupt() as stop:
@@ -99,6 +93,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.into is not None:
         write_between(options.into, _NAME, shown)
     return 0
+
+
+def _motion(scenario: Path, run: Path) -> DressingMotion:
+    """Returns the motion of a dressing, which is run if it was not before."""
+    if not (run / "summary.json").exists():
+        print("a dressing is run, from which the motion is taken", flush=True)
+        _, problem = run_scenario(scenario, run, (), report=False)
+        if problem:
+            raise UserError("bench", "plant", problem)
+    return DressingMotion.read(run / "run.h5")
 
 
 def _kept_part(

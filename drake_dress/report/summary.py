@@ -125,6 +125,12 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     if not m.finite.all():
         t = log.time[np.argmin(m.finite)]
         return f"simulation diverged: positions or forces not finite at t = {t:.2f} s"
+    broken = _sleeve_that_is_off(log, m, rules) or _too_large_force(log, m, rules)
+    # how far an estimate is inside the person, or strained, tells of the estimate
+    return broken if broken or log.estimated else _damage(log, m, rules)
+
+
+def _sleeve_that_is_off(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     for side in SIDES:
         s = log.dressing[side][-1, 0]
         if not s >= rules.min_s:
@@ -135,15 +141,21 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         linking = int(m.linking[-1, k])
         if abs(linking) != 1:
             return f"{side} arm outside the sleeve: linking number {linking}"
+    return None
+
+
+def _too_large_force(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     for k, side in enumerate(SIDES):
         i = int(np.argmax(np.nan_to_num(m.gripper_force[:, k])))
         force = m.gripper_force[i, k]
         if force > rules.max_gripper_force:
             limit = f"{force:.1f} N > {rules.max_gripper_force:g} N"
             return f"{side} gripper force too high: {limit} at t = {log.time[i]:.2f} s"
-    if log.estimated:
-        # how far an estimate is inside the person, or strained, tells of the estimate
-        return None
+    return None
+
+
+def _damage(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
+    """Returns what the garment does that it must not do, to the person or to itself."""
     i = int(np.argmax(m.penetration))
     if m.penetration[i] > rules.max_penetration:
         limit = f"{1e3 * m.penetration[i]:.1f} mm > {1e3 * rules.max_penetration:g} mm"

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.norm_bounds import NormBounds
 from drake_dress.models.control.solution import Solution
@@ -66,14 +70,22 @@ def cone_programme(problem: LocalProblem, before: Solution | None) -> Solution:
     return solve_cone_programme(problem, spills=True)[0]
 
 
-def _add_cost(program, weight, target, z) -> None:  # type: ignore[no-untyped-def]
+def _add_cost(
+    program: MathematicalProgram, weight: FloatArray, target: FloatArray, z: npt.NDArray[Any]
+) -> None:
     if np.any(weight > 0.0):
         program.AddQuadraticCost(
             np.diag(2.0 * weight), -2.0 * weight * target, float(weight @ target**2), z, True
         )
 
 
-def _add_bounds(program, bounds: NormBounds, t: int, z, price: float | None) -> None:  # type: ignore[no-untyped-def]
+def _add_bounds(
+    program: MathematicalProgram,
+    bounds: NormBounds,
+    t: int,
+    z: npt.NDArray[Any],
+    price: float | None,
+) -> None:
     for matrix, offset, radius in zip(
         bounds.matrix[t], bounds.offset[t], bounds.radius[t], strict=True
     ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
@@ -91,7 +91,7 @@ class ActivePerson(LeafSystem):
             after = active.step(state, angles[i], armhole, context.get_time(), self._period)
             discrete.set_value(index, after.flat())
 
-    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+    def _show(self, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             states = [context.get_discrete_state(index).value()[rows] for index in self._states]
             output.SetFromVector(np.concatenate(states))

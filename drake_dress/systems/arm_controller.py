@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
@@ -137,7 +140,7 @@ class ArmController(LeafSystem):
             return GripperGoal(self._arms.arms[i].tool_position(q), np.zeros(3), self._rotation[i])
         return GripperGoal(position, velocity, self._rotation[i])
 
-    def _show(self, state, rows: slice):  # type: ignore[no-untyped-def]
+    def _show(self, state: Any, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(context.get_discrete_state(state).value()[rows])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -66,7 +66,7 @@ class ArmMeasurement(LeafSystem):
             for row, name in enumerate(_QUANTITIES):
                 self.DeclareVectorOutputPort(f"{side}_gripper_{name}", 3, self._show(i, row))
 
-    def _measure(self, i: int, side: str):  # type: ignore[no-untyped-def]
+    def _measure(self, i: int, side: str) -> Callable[[Context, AbstractValue], None]:
         def calc(context: Context, output: AbstractValue) -> None:
             valid = self.GetInputPort(f"{side}_valid")
             if valid.HasValue(context) and not valid.Eval(context)[0] > 0.5:
@@ -80,7 +80,7 @@ class ArmMeasurement(LeafSystem):
 
         return calc
 
-    def _show(self, i: int, row: int):  # type: ignore[no-untyped-def]
+    def _show(self, i: int, row: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(self._measured[i].Eval(context)[row])
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -276,7 +279,7 @@ class ClothPlant(LeafSystem):
             owner[self.cloth.held], reaction[self.cloth.held] = pressing.owner, pressing.force
         return body_wrenches(self._person.body_of, origin, after.x, owner, reaction)
 
-    def _calc(self, index):  # type: ignore[no-untyped-def]
+    def _calc(self, index: Any) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(context.get_discrete_state(index).value())
 
@@ -293,7 +296,7 @@ class ClothPlant(LeafSystem):
         )
         output.SetFromVector(reaction.ravel())
 
-    def _calc_gripper_force(self, side: int):  # type: ignore[no-untyped-def]
+    def _calc_gripper_force(self, side: int) -> Callable[[Context, BasicVector], None]:
         nodes = self.cloth.held[self._side == side]
 
         def calc(context: Context, output: BasicVector) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
@@ -81,7 +83,7 @@ class CommandGuard(LeafSystem):
         )
         discrete.set_value(self._state, after.packed())
 
-    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+    def _show(self, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(context.get_discrete_state(self._state).value()[rows])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
@@ -75,7 +75,7 @@ class FaultPlayer(LeafSystem):
         last = float(context.get_discrete_state(self._begun).value()[1])
         output.SetFromVector([context.get_time() - last])
 
-    def _fresh(self, side: str):  # type: ignore[no-untyped-def]
+    def _fresh(self, side: str) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             valid = self.GetInputPort(f"{side}_valid").Eval(context)[0] > 0.5
             on = kinds_at(self._faults, f"{side}_arm", self._since(context))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,7 +44,7 @@ class GarmentOracle(LeafSystem):
                 f"estimated_{name}", 3 * m, self._calc(i, n), {port.ticket()}
             )
 
-    def _calc(self, port: int, n: int):  # type: ignore[no-untyped-def]
+    def _calc(self, port: int, n: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             value = self.get_input_port(port).Eval(context).reshape(n, 3)
             see = (seen_points, seen_rates)[port]

@@ -310,7 +310,7 @@ class GlobalMpc(LeafSystem):
         seen = float(context.get_discrete_state(self._shown).value()[10])
         output.SetFromVector([context.get_time() - seen])
 
-    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+    def _show(self, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(context.get_discrete_state(self._shown).value()[rows])
 

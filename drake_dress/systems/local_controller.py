@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -180,7 +181,7 @@ class LocalCompensation(LeafSystem):
             seen = np.concatenate([*centers, *self._grippers(context)])
         output.set_value(plan.velocity_at(context.get_time(), seen))
 
-    def _request(self, side: int):  # type: ignore[no-untyped-def]
+    def _request(self, side: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(self._velocity.Eval(context)[side])
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
@@ -37,7 +39,7 @@ class PlanFollower(LeafSystem):
             self.DeclareVectorOutputPort(f"{side}_velocity_request", 3, self._calc(i), ticket)
         self.DeclareVectorOutputPort("request_time", 1, self._calc_time, {self.time_ticket()})
 
-    def _calc(self, side: int):  # type: ignore[no-untyped-def]
+    def _calc(self, side: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             plan: GlobalPlan = self.get_input_port(0).Eval(context)
             step = int(np.floor((context.get_time() - plan.start + 1e-9) / plan.time_step))

@@ -108,7 +108,14 @@ class RunRecorder(LeafSystem):
         self._extremes = {side: ArmExtremes() for side in SIDES}
         self._clearance = np.full(3, np.inf)
         self._verdict = np.zeros(2, dtype=int)
-        n = len(mesh.rest_position)
+        self._declare_inputs(len(mesh.rest_position), estimate_count)
+        if has_control:
+            self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
+        if arm_period is not None:
+            self.DeclarePeriodicPublishEvent(arm_period, 0.0, self._watch_arms)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
+
+    def _declare_inputs(self, n: int, estimate_count: int) -> None:
         self.DeclareVectorInputPort("garment_position", 3 * n)
         if self._model is None:
             self.DeclareVectorInputPort("contact", n)
@@ -118,26 +125,21 @@ class RunRecorder(LeafSystem):
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
             self.DeclareVectorInputPort(f"{side}_gripper_force", 3)
-        if has_control:
+        if self._has_control:
             self.DeclareVectorInputPort("stage", 2)
             self.DeclareVectorInputPort("solve_time", 2)
             self.DeclareVectorInputPort("verdict", 2)
-        if has_local:
+        if self._has_local:
             self.DeclareVectorInputPort("local_solve_time", 2)
         self.DeclareVectorInputPort("estimated_position", 3 * estimate_count)
         self.DeclareVectorInputPort("estimated_joint_position", 18)
-        if arm_period is not None:
+        if self._has_arms:
             for side in SIDES:
                 for name in _OF_ARM:
                     self.DeclareVectorInputPort(f"{side}_arm_{name}", 7)
-            if has_control:
+            if self._has_control:
                 self.DeclareVectorInputPort("clearance", 3)
         self.DeclareVectorInputPort("active", 1)
-        if has_control:
-            self.DeclarePeriodicPublishEvent(verdict_period, 0.0, self._collect)
-        if arm_period is not None:
-            self.DeclarePeriodicPublishEvent(arm_period, 0.0, self._watch_arms)
-        self.DeclarePeriodicPublishEvent(period, 0.0, self._append)
 
     def _collect(self, context: Context) -> None:
         self._verdict |= self.GetInputPort("verdict").Eval(context).astype(int)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
@@ -156,7 +156,7 @@ class SafetyGovernor(LeafSystem):
         ]
         return Skin(room[tightest], near.normal[tightest])
 
-    def _show(self, rows: slice):  # type: ignore[no-untyped-def]
+    def _show(self, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(context.get_discrete_state(self._memory).value()[rows])
 

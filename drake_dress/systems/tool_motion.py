@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.common.value import Value
@@ -49,13 +49,13 @@ class ToolMotion(LeafSystem):
                 f"{side}_velocity", 3, self._velocity(int(tool)), {self._velocities.ticket()}
             )
 
-    def _position(self, tool: int):  # type: ignore[no-untyped-def]
+    def _position(self, tool: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(self._poses.Eval(context)[tool].translation())
 
         return calc
 
-    def _velocity(self, tool: int):  # type: ignore[no-untyped-def]
+    def _velocity(self, tool: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(np.array(self._velocities.Eval(context)[tool].translational()))
 

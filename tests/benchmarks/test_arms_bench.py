@@ -1,15 +1,20 @@
 """Every scenario with and without arms: which runs there are, and what is made of their results."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
 
 from benchmarks.arms import __main__ as bench
 from benchmarks.arms.__main__ import _SCENARIOS, GRIPPERS, METHODS, SCENARIOS, Case, tables
 from drake_dress.diagrams.scenario import load_scenario
 
 
-def result(case, success=True):
-    summary = {
+def result(case: Case, success: bool = True) -> dict[str, Any]:
+    summary: dict[str, Any] = {
         "success": success,
         "reason": None if success else "left sleeve not on: s = 0.00 < 1.9",
         "dressing_time_s": 20.0 if success else None,
@@ -30,7 +35,7 @@ def result(case, success=True):
     return {"case": asdict(case), "status": int(not success), "summary": summary}
 
 
-def test_every_scenario_that_dresses_is_run_with_and_without_arms():
+def test_every_scenario_that_dresses_is_run_with_and_without_arms() -> None:
     there = {p.stem for p in _SCENARIOS.glob("*.yaml")}
     assert set(SCENARIOS) == there - {"measured"}
     for name in SCENARIOS:
@@ -40,7 +45,7 @@ def test_every_scenario_that_dresses_is_run_with_and_without_arms():
                 load_scenario(_SCENARIOS / f"{name}.yaml", settings)
 
 
-def test_runs_with_and_without_arms_stand_side_by_side():
+def test_runs_with_and_without_arms_stand_side_by_side() -> None:
     cases = [Case("lab", "full", grippers) for grippers in GRIPPERS]
     dressed, arms, reasons = tables([result(cases[0]), result(cases[1], success=False)])
     assert dressed.rows == [["lab, full", 20.0, 15.0, 5.0, 1.0, "no", 15.0, 5.0, 1.0]]
@@ -50,10 +55,12 @@ def test_runs_with_and_without_arms_stand_side_by_side():
     assert alone.rows[0][1:5] == [None] * 4
 
 
-def test_runs_in_a_file_are_not_run_again(tmp_path, capsys, monkeypatch):
+def test_runs_in_a_file_are_not_run_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = []
 
-    def run(case, keep, overrides):
+    def run(case: Case, keep: Path | None, overrides: Sequence[str]) -> dict[str, Any]:
         asked.append(case.name)
         return result(case)
 

@@ -1,7 +1,10 @@
 """The dressing experiments: which runs there are, and what is made of their results."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,7 +30,13 @@ from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import make_coat
 
 
-def result(method="full", seed=0, success=True, reason=None, time=20.0):
+def result(
+    method: str = "full",
+    seed: int = 0,
+    success: bool = True,
+    reason: str | None = None,
+    time: float | None = 20.0,
+) -> dict[str, Any]:
     count = 5 if success else 9
     series = {"time": [0.2 * k for k in range(count)]}
     for side in ("left", "right"):
@@ -54,7 +63,7 @@ def result(method="full", seed=0, success=True, reason=None, time=20.0):
     }
 
 
-def test_a_part_of_the_runs_is_a_fair_part_of_all_groups():
+def test_a_part_of_the_runs_is_a_fair_part_of_all_groups() -> None:
     found = cases(METHODS, list(PERSONS), list(COATS), range(3))
     assert (
         len({c.name for c in found}) == len(found) == 3 * len(METHODS) * len(PERSONS) * len(COATS)
@@ -68,7 +77,7 @@ def test_a_part_of_the_runs_is_a_fair_part_of_all_groups():
 
 @pytest.mark.parametrize("person", PERSONS)
 @pytest.mark.parametrize("coat", COATS)
-def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
+def test_every_run_is_a_scenario_that_its_seed_varies(person: str, coat: str) -> None:
     settings = [
         f"garment.coat={COATS[coat]}",
         f"variation={VARIATIONS['all']}",
@@ -92,7 +101,7 @@ def test_every_run_is_a_scenario_that_its_seed_varies(person, coat):
         make_coat(coat_parameters(s.garment.coat), 0.06)
 
 
-def test_both_arms_inside_below_the_shoulder_are_counted():
+def test_both_arms_inside_below_the_shoulder_are_counted() -> None:
     short = "left sleeve not on: s = 1.85 < 1.9"
     results = [result(seed=k, success=k > 1, reason=short) for k in range(4)]
     by_method = tables(results)[0]
@@ -100,7 +109,7 @@ def test_both_arms_inside_below_the_shoulder_are_counted():
     assert by_method.rows[0][by_method.header.index("both arms inside, s < 1.9")] == 2
 
 
-def test_tables_count_what_was_dressed_and_say_why_not():
+def test_tables_count_what_was_dressed_and_say_why_not() -> None:
     results = [result(seed=k, time=20.0 + k) for k in range(3)]
     results += [result("local", 0, False, "left sleeve not on: s = 0.00 < 1.9")]
     by_method, beside, _, by_group, reasons = tables(results)
@@ -114,7 +123,7 @@ def test_tables_count_what_was_dressed_and_say_why_not():
     assert figure(results).lstrip().startswith("<?xml")
 
 
-def test_a_study_has_a_page_and_a_table_of_all_runs(tmp_path):
+def test_a_study_has_a_page_and_a_table_of_all_runs(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     results = [
         result(seed=k, success=k != 1, reason=None if k != 1 else "left <sleeve> not on: s = 1")
@@ -138,15 +147,15 @@ def test_a_study_has_a_page_and_a_table_of_all_runs(tmp_path):
         assert row["drawn.body_upper_arm_length"] == scenario.person.measures.upper_arm_length
 
 
-def test_methods_are_held_against_full_where_all_else_is_the_same():
+def test_methods_are_held_against_full_where_all_else_is_the_same() -> None:
     results = [result(seed=k, time=20.0) for k in range(4)]
     results += [result("global", k, k < 2, "no", time=20.0 + 3.0 * k) for k in (0, 1, 2, 7)]
     _, beside, *_ = tables(results)
     assert beside.rows == [["global", 3, 2, 1, 0, 0, 1.5]]
 
 
-def test_how_far_runs_came_is_told_by_hands_that_stay_in():
-    def came(left, right, dressed=None):
+def test_how_far_runs_came_is_told_by_hands_that_stay_in() -> None:
+    def came(left: list[float], right: list[float], dressed: float | None = None) -> dict[str, Any]:
         r = result(seed=0, success=dressed is not None, time=dressed)
         r["series"] |= {"s_left": left, "s_right": right}
         return r
@@ -162,10 +171,12 @@ def test_how_far_runs_came_is_told_by_hands_that_stay_in():
     assert stages.rows == [["full", 3, 1.0, 2, pytest.approx(0.3), 1, pytest.approx(2.0), 1]]
 
 
-def test_runs_in_a_file_are_not_run_again(tmp_path, capsys, monkeypatch):
+def test_runs_in_a_file_are_not_run_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = []
 
-    def run(case, keep, overrides):
+    def run(case: Case, keep: Path | None, overrides: Sequence[str]) -> dict[str, Any]:
         asked.append(case)
         return result(case.method, case.seed)
 
@@ -179,7 +190,7 @@ def test_runs_in_a_file_are_not_run_again(tmp_path, capsys, monkeypatch):
     assert "| full |" in capsys.readouterr().out
 
 
-def test_a_file_of_something_else_is_refused(tmp_path):
+def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "results.json"
     file.write_text("{}x")
     with pytest.raises(UserError, match="expected results"):
@@ -187,14 +198,14 @@ def test_a_file_of_something_else_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(("right", "count"), [(0, 5), (5, 5), (3, 10), (90, 100)])
-def test_the_interval_holds_the_share_and_stays_within_all(right, count):
+def test_the_interval_holds_the_share_and_stays_within_all(right: int, count: int) -> None:
     low, high = wilson(right, count)
     assert 0.0 <= low <= right / count <= high <= 1.0
     wider = wilson(right, count)[1] - wilson(right, count)[0]
     assert wider > wilson(10 * right, 10 * count)[1] - wilson(10 * right, 10 * count)[0]
 
 
-def test_the_interval_of_none_and_of_all_ends_there():
+def test_the_interval_of_none_and_of_all_ends_there() -> None:
     """And not a rounding beyond it, which was told as -0 %."""
     for count in range(1, 60):
         assert f"{wilson(0, count)[0]:.0f}" == "0"

@@ -1,6 +1,9 @@
 """The study of `drake-dress explain`: its cases and its tables, from results made up here."""
 
 import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,7 +22,13 @@ from drake_dress.errors import UserError
 from tests.models.effects.own import registered
 
 
-def result(group="effect", hide="friction", named=("friction",), verdict="named", **changes):
+def result(
+    group: str = "effect",
+    hide: str = "friction",
+    named: Sequence[str] = ("friction",),
+    verdict: str = "named",
+    **changes: Any,
+) -> dict[str, Any]:
     hidden = {} if hide == "nothing" else {n: {"added": 0.2} for n in hide.split("+")}
     confidence = changes.pop("confidence", 0.95)
     case = {"group": group, "hide": hide, "seed": 1, "size": 1.0, "marker_noise": 1e-3}
@@ -39,7 +48,7 @@ def result(group="effect", hide="friction", named=("friction",), verdict="named"
     }
 
 
-def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it():
+def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it() -> None:
     draws = {"effect": 2, "nothing": 3, "pair": 1, "coarse": 1, "outside": 1}
     found = study(list(draws), draws, 7, [1.0, 2.0], [1e-3, 3e-3], 1)
     assert len({c.name for c in found}) == len(found)
@@ -51,13 +60,13 @@ def test_a_study_has_all_groups_at_its_centre_and_effects_beside_it():
     assert all(c.force_noise == pytest.approx(50.0 * c.marker_noise) for c in found)
 
 
-def test_a_study_hides_registered_effects_too():
+def test_a_study_hides_registered_effects_too() -> None:
     with registered():
         found = study(["effect"], {"effect": 1}, 7, [1.0], [1e-3], 1)
     assert [c.hide for c in found] == [*SIZES, "hem_chain"]
 
 
-def test_only_the_whole_truth_and_nothing_else_is_right():
+def test_only_the_whole_truth_and_nothing_else_is_right() -> None:
     assert right(result())
     assert not right(result(named=("friction", "wind")))
     assert not right(result(named=("adhesion",)))
@@ -68,7 +77,7 @@ def test_only_the_whole_truth_and_nothing_else_is_right():
     assert right(result(group="coarse", hide="nothing", named=("discretisation",)))
 
 
-def test_numerics_that_are_named_too_are_counted_apart():
+def test_numerics_that_are_named_too_are_counted_apart() -> None:
     both = result(named=("discretisation", "friction"))
     assert right_but_for_numerics(both)
     assert not right(both)
@@ -78,15 +87,15 @@ def test_numerics_that_are_named_too_are_counted_apart():
     assert not right_but_for_numerics(result(group="coarse", hide="nothing"))
 
 
-def test_what_no_list_has_is_right_where_it_is_not_believed():
-    kin = {"group": "outside", "hide": "snag", "named": ("local_mass",)}
+def test_what_no_list_has_is_right_where_it_is_not_believed() -> None:
+    kin: dict[str, Any] = {"group": "outside", "hide": "snag", "named": ("local_mass",)}
     assert right(result(**kin, verdict="unexplained", confidence=1.0))
     assert right(result(**kin, confidence=0.5))
     assert not right(result(**kin, confidence=0.9))
     assert not right(result(group="outside", hide="snag", named=(), verdict="nothing"))
 
 
-def test_a_kin_of_what_no_list_has_has_no_parameters_to_compare():
+def test_a_kin_of_what_no_list_has_has_no_parameters_to_compare() -> None:
     cuff = result(
         group="outside", hide="magnetised_cuff", named=("local_mass",), verdict="unexplained"
     )
@@ -96,7 +105,7 @@ def test_a_kin_of_what_no_list_has_has_no_parameters_to_compare():
     assert tables([cuff])
 
 
-def test_tables_tell_centre_and_what_is_beside_it_apart():
+def test_tables_tell_centre_and_what_is_beside_it_apart() -> None:
     found = [
         result(),
         result(seed=2, named=("adhesion",)),
@@ -112,14 +121,16 @@ def test_tables_tell_centre_and_what_is_beside_it_apart():
     assert tables([]) == []
 
 
-def test_reliability_counts_causes_by_their_confidence():
+def test_reliability_counts_causes_by_their_confidence() -> None:
     found = [result(), result(named=("adhesion",)), result(confidence=0.2)]
     by_range = {(low, high): hits for low, high, hits in reliability(found)}
     assert by_range[0.95, 1.0] == [True, False]
     assert by_range[0.0, 0.5] == [True]
 
 
-def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):
+def test_what_a_file_of_results_holds_is_not_run_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "results.json"
     cases = study(["nothing"], {"nothing": 2}, 5, [1.0], [1e-3], 1)
     made_up = [result(group="nothing", hide="nothing", named=(), verdict="nothing") for _ in cases]
@@ -138,7 +149,7 @@ def test_what_a_file_of_results_holds_is_not_run_again(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("content", ["{", "[1]", '[{"case": {"group": "effect"}}]', "[{}]"])
-def test_a_file_of_something_else_is_refused(content, tmp_path):
+def test_a_file_of_something_else_is_refused(content: str, tmp_path: Path) -> None:
     path = tmp_path / "results.json"
     path.write_text(content)
     with pytest.raises(UserError, match="expected results"):
@@ -147,7 +158,7 @@ def test_a_file_of_something_else_is_refused(content, tmp_path):
 
 
 @pytest.mark.parametrize("words", [["--noise", "x"], ["--size", "0"], ["--only", "all"]])
-def test_bad_options_are_refused(words, capsys):
+def test_bad_options_are_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_:
         main(words)
     assert exit_.value.code == 2

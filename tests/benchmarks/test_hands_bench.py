@@ -106,8 +106,8 @@ def test_moments_of_a_run_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture
     armhole = garment.loops["left_armhole"]
     samples = []
     for sample in synthetic.dressing(garment, count=301, duration=300.0):
-        joints = sample.joint_position.copy()
-        joints[2] = sample.garment_position[armhole].mean(axis=0)
+        joints = np.array(sample.joint_position)
+        joints[2] = np.asarray(sample.garment_position)[armhole].mean(axis=0)
         samples.append(replace(sample, joint_position=joints))
     log = synthetic.write(tmp_path / "run.h5", garment, samples)
     kept = tmp_path / "moments.json"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+from benchmarks.logged import opened
+from drake_dress.report.log import RunLog
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks import reach
@@ -93,19 +95,21 @@ def test_what_a_log_holds_is_read_at_even_times(tmp_path: Path) -> None:
     garment = synthetic.coat()
     samples = synthetic.dressing(garment, count=11, duration=1.0)
     log = synthetic.write(tmp_path / "run.h5", garment, samples)
-    (opened,) = [recorded(path, log) for path, log in reach.opened([log])]
-    assert len(opened.grippers) == 50
+    (known,) = [recorded(path, log) for path, log in opened([log])]
+    assert len(known.grippers) == 50
     first = np.stack([samples[0].gripper_position[side] for side in ("left", "right")])
     second = np.stack([samples[1].gripper_position[side] for side in ("left", "right")])
-    np.testing.assert_allclose(opened.grippers[2], first + 0.4 * (second - first), atol=1e-5)
-    np.testing.assert_allclose(opened.velocity[2], (second - first) / 0.1, atol=1e-4)
-    np.testing.assert_allclose(opened.person(7).first, samples[0].capsule_a, atol=1e-6)
+    np.testing.assert_allclose(known.grippers[2], first + 0.4 * (second - first), atol=1e-5)
+    np.testing.assert_allclose(known.velocity[2], (second - first) / 0.1, atol=1e-4)
+    np.testing.assert_allclose(known.person(7).first, np.asarray(samples[0].capsule_a), atol=1e-6)
 
 
-def test_logs_of_arms_are_refused() -> None:
+def test_logs_of_arms_are_refused(tmp_path: Path) -> None:
     text = _SCENARIO.read_text() + "\nstation: {arms: {model: panda}}\n"
-    with pytest.raises(UserError, match="expected floating"):
-        recorded(Path("runs/here/run.h5"), SimpleNamespace(scenario_text=text))
+    garment = synthetic.coat()
+    path = synthetic.write(tmp_path / "run.h5", garment, [], scenario=text)
+    with RunLog.open(path) as log, pytest.raises(UserError, match="expected floating"):
+        recorded(path, log)
 
 
 def test_a_log_that_is_none_is_told(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.drawing import drawn_seed
 
@@ -37,7 +38,9 @@ def test_broken_limits_are_told() -> None:
     assert worst.broken() == ["speed", "acceleration", "pull", "lead", "force"]
 
 
-def test_table_and_status_tell_what_was_measured(capsys, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_table_and_status_tell_what_was_measured(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sys, "argv", ["safety.py", "--commands", "100", "--seed", "7"])
     assert safety.main() == 0
     out = capsys.readouterr().out

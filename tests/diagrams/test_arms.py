@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from drake_dress.diagrams.arms import PlantArm, add_arms
 from drake_dress.models.arm.panda import LIMITS
-from drake_dress.models.sides import SIDES
+from drake_dress.models.sides import SIDES, Side
 
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 
@@ -27,7 +27,7 @@ class Lab:
     """Two arms alone in a plant of the garment's time step."""
 
     plant: MultibodyPlant
-    arms: dict[str, PlantArm]
+    arms: dict[Side, PlantArm]
     simulator: Simulator
     root: Context
 
@@ -57,7 +57,7 @@ def lab() -> Lab:
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_links_are_where_the_plain_model_says(lab: Lab, side: str) -> None:
+def test_links_are_where_the_plain_model_says(lab: Lab, side: Side) -> None:
     rng = np.random.default_rng(0)
     arm = lab.arms[side]
     tool = lab.plant.get_body(arm.tool)

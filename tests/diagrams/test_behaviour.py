@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
+from drake_dress.diagrams.behaviour import Behaviour, Kind, add_behaviour
 from drake_dress.diagrams.person import (
     JointParameters,
     Person,
@@ -277,16 +277,16 @@ def test_hand_drawn_back_comes_back_and_a_waving_one_stays_near() -> None:
     np.testing.assert_allclose(joints[:, 5], np.tile(start[5], (len(joints), 1)), atol=1e-3)
 
 
-def tremble(seed: int, kind: str = "dummy", frequency: float = 5.0) -> np.ndarray:
+def tremble(seed: int, kind: Kind = "dummy", frequency: float = 5.0) -> np.ndarray:
     """Returns the left hand (n,3), m, sampled each period, after a second."""
     tremor = TremorParameters(amplitude=0.008, frequency=frequency)
-    s = scene(Behaviour(kind=kind, tremor=tremor, seed=seed))  # type: ignore[arg-type]
+    s = scene(Behaviour(kind=kind, tremor=tremor, seed=seed))
     times, joints = s.record(17.0, PERIOD)
     return joints[times > 1.0, 2]
 
 
 @pytest.mark.parametrize(("kind", "frequency"), [("dummy", 5.0), ("passive", 8.0)])
-def test_hand_trembles_at_its_frequency_by_its_amplitude(kind: str, frequency: float) -> None:
+def test_hand_trembles_at_its_frequency_by_its_amplitude(kind: Kind, frequency: float) -> None:
     hand = tremble(1, kind, frequency)
     hand = hand - hand.mean(axis=0)
     main = hand @ np.linalg.svd(hand, full_matrices=False)[2][0]

@@ -10,7 +10,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from drake_dress.diagrams.person import JointParameters, add_person, joint_positions
 from drake_dress.models.arm.clearance import Capsules, clearance
-from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, Side, body_capsules
+from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, body_capsules
+from drake_dress.models.sides import Side
 
 M = BodyMeasures()
 OPEN: dict[Side, ArmPose] = {

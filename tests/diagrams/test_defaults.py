@@ -51,15 +51,20 @@ def differing(value: Any, seen: set[int]) -> Iterator[tuple[str, Any, Any]]:
         return
     for entry in dataclasses.fields(value):
         own = getattr(value, entry.name, None)
-        default = entry.default
-        if entry.default_factory is not dataclasses.MISSING:
-            default = entry.default_factory()
+        default = default_of(entry)
         if default is dataclasses.MISSING:
             yield from differing(own, seen)
         elif not same(own, default):
             if not dataclasses.is_dataclass(default):
                 yield f"{type(value).__name__}.{entry.name}", default, own
             yield from differing(own, seen)
+
+
+def default_of(entry: dataclasses.Field[Any]) -> Any:
+    """Returns a field's default, MISSING if it has none."""
+    if entry.default_factory is not dataclasses.MISSING:
+        return entry.default_factory()
+    return entry.default
 
 
 def same(a: Any, b: Any) -> bool:
@@ -75,9 +80,11 @@ def scenario_of_everything() -> Scenario:
     scenario.station.arms.model = "panda"
     scenario.controller.method = "full"
     scenario.person.behaviour.kind = "active"
-    moves = (schema.Reach(), schema.Turn(), schema.Withdraw(), schema.Wave())
     scenario.person.behaviour.motions = [
-        schema.Motion(**{type(move).__name__.lower(): move}) for move in moves
+        schema.Motion(reach=schema.Reach()),
+        schema.Motion(turn=schema.Turn()),
+        schema.Motion(withdraw=schema.Withdraw()),
+        schema.Motion(wave=schema.Wave()),
     ]
     scenario.person.behaviour.tremor = schema.Tremor()
     return scenario
@@ -117,6 +124,7 @@ def test_every_setting_of_the_tasks_reaches_the_policy() -> None:
                 continue
             setattr(values, entry.name, old + 1)
             moved = build.controller_policy(scenario, mesh, person).parameters.tasks
+            here: Any
             here, there = (plain, moved) if group == "tasks" else (plain.stages, moved.stages)
             assert getattr(there, entry.name) == getattr(here, entry.name) + 1, entry.name
             assert dataclasses.replace(here, **{entry.name: old + 1}) == there
@@ -128,7 +136,8 @@ def test_a_mirror_has_what_its_model_has_and_leads_back_to_it() -> None:
         """All tasks, with their approaches."""
 
     model = TaskParameters()
-    values = Tasks()
+    # its fields are those of the model, made by the decorator
+    values: Any = Tasks()
     assert [a.tilt for a in values.approaches] == [a.tilt for a in model.approaches]
     assert model_of(values) == model
     values.approaches[2].tilt = 0.7

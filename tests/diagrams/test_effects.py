@@ -1,5 +1,8 @@
 """Effects in a scenario: read, refused, and at work in the station."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -8,6 +11,7 @@ from drake_dress.diagrams.build import effects, plant_station
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, load_scenario, resolved_yaml
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.registry import EFFECTS
 from tests.discrepancy.data import SCENARIO
@@ -16,7 +20,7 @@ from tests.models.effects.own import HemChain, registered
 QUICK = ["plant.spacing=0.06", "plant.time_step=0.01", "plant.body_time_step=0.01"]
 
 
-def test_every_effect_can_be_switched_on_and_loads_again(tmp_path):
+def test_every_effect_can_be_switched_on_and_loads_again(tmp_path: Path) -> None:
     settings = [
         f"effects.{name}.{p.name}={p.typical}"
         for name, kind in EFFECTS.items()
@@ -29,7 +33,7 @@ def test_every_effect_can_be_switched_on_and_loads_again(tmp_path):
     assert effects(load_scenario(copy)) == effects(scenario)
 
 
-def test_what_is_not_given_is_off_and_uncertainties_do_not_matter():
+def test_what_is_not_given_is_off_and_uncertainties_do_not_matter() -> None:
     assert effects(load_scenario(SCENARIO)) == ()
     told = load_scenario(SCENARIO, ["effects.air_drag.coefficient_std=0.3"])
     assert effects(told) == ()
@@ -44,14 +48,14 @@ def test_what_is_not_given_is_off_and_uncertainties_do_not_matter():
         ("effects.wind.x=fast", ["effects.wind.x", "number"]),
     ],
 )
-def test_bad_effects_are_named(setting, words):
+def test_bad_effects_are_named(setting: str, words: list[str]) -> None:
     with pytest.raises(UserError) as error:
         load_scenario(SCENARIO, [setting])
     for word in words:
         assert word in str(error.value)
 
 
-def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path):
+def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path: Path) -> None:
     setting = "effects.hem_chain.mass=0.1"
     with registered():
         scenario = load_scenario(SCENARIO, [setting, "effects.wind.x=1"])
@@ -71,7 +75,7 @@ def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path):
         effects(scenario)
 
 
-def test_effects_set_in_python_are_held_against_the_list():
+def test_effects_set_in_python_are_held_against_the_list() -> None:
     scenario = Scenario()
     scenario.effects["wind"] = {"x": 1.0, "x_std": 0.1}
     assert effects(scenario) == (Wind(x=1.0),)
@@ -83,7 +87,9 @@ def test_effects_set_in_python_are_held_against_the_list():
         effects(scenario)
 
 
-def pulled(settings, seconds=0.5, command=(0.0, 0.0, 0.0)):
+def pulled(
+    settings: Sequence[str], seconds: float = 0.5, command: Sequence[float] = (0.0, 0.0, 0.0)
+) -> tuple[FloatArray, FloatArray]:
     """Returns gripper forces (2,3), N, and the garment (n,3) after a while of hanging."""
     scenario = load_scenario(SCENARIO, [*QUICK, *settings])
     mesh = build_garment(scenario.garment, scenario.plant.spacing, SCENARIO.parent)
@@ -102,27 +108,27 @@ def pulled(settings, seconds=0.5, command=(0.0, 0.0, 0.0)):
     return np.stack(forces), garment.reshape(-1, 3)
 
 
-def test_a_heavier_garment_weighs_on_the_station_s_grippers():
+def test_a_heavier_garment_weighs_on_the_station_s_grippers() -> None:
     plain, _ = pulled([])
     heavy, _ = pulled(["effects.surface_density.added=0.15"])
     assert heavy[:, 2].sum() / plain[:, 2].sum() == pytest.approx(1.5, rel=0.02)
 
 
-def test_an_effect_of_a_users_own_weighs_on_them_too():
+def test_an_effect_of_a_users_own_weighs_on_them_too() -> None:
     plain, _ = pulled([])
     with registered():
         heavy, _ = pulled(["effects.hem_chain.mass=0.2"])
     assert plain[:, 2].sum() - heavy[:, 2].sum() == pytest.approx(0.2 * 9.81, rel=0.02)
 
 
-def test_compliant_grippers_let_the_garment_down():
+def test_compliant_grippers_let_the_garment_down() -> None:
     _, before = pulled([])
     force, after = pulled(["effects.gripper_compliance.compliance=0.02"])
     drop = np.mean(before[:, 2] - after[:, 2])
     assert drop == pytest.approx(-0.02 * force[:, 2].mean(), rel=0.1)
 
 
-def test_late_grippers_move_the_garment_later():
+def test_late_grippers_move_the_garment_later() -> None:
     ways = []
     for delay in (0.0, 0.2):
         setting = [] if delay == 0.0 else [f"effects.gripper_latency.delay={delay}"]

@@ -1,5 +1,6 @@
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.diagrams.scenario.schema import Garment, Mesh
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.load import WholeGarment, read_garment
+from tests.present import present
 
 JACKET = make_coat(COATS["jacket"], 0.06)
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "dummy_standing.yaml"
 
 
-def write(path, y_up=False):
+def write(path: Path, y_up: bool = False) -> None:
     x = JACKET.rest_position[:, [1, 2, 0]] if y_up else JACKET.rest_position
     lines = [f"v {a} {b} {c}" for a, b, c in x]
     lines += [f"f {a} {b} {c}" for a, b, c in JACKET.faces + 1]
@@ -22,21 +25,22 @@ def write(path, y_up=False):
 
 
 @pytest.fixture
-def reads(monkeypatch):
+def reads(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Counts the files that are read."""
     count = []
 
-    def counted(*args):
+    def counted(*args: Any) -> WholeGarment:
         count.append(args[0])
-        return original(*args)
+        return read_garment(*args)
 
-    original = garment.read_garment
     monkeypatch.setattr(garment, "read_garment", counted)
     monkeypatch.setattr(garment, "_kept", type(garment._kept)())
     return count
 
 
-def test_a_file_is_read_once_at_any_spacing_until_it_or_its_keys_change(tmp_path, reads):
+def test_a_file_is_read_once_at_any_spacing_until_it_or_its_keys_change(
+    tmp_path: Path, reads: list[Path]
+) -> None:
     path = tmp_path / "coat.obj"
     write(path)
     wanted = Garment(mesh=Mesh(file="coat.obj"))
@@ -53,7 +57,7 @@ def test_a_file_is_read_once_at_any_spacing_until_it_or_its_keys_change(tmp_path
     assert len(reads) == 3
 
 
-def test_keys_of_a_mesh_reach_the_file(tmp_path, reads):
+def test_keys_of_a_mesh_reach_the_file(tmp_path: Path, reads: list[Path]) -> None:
     write(tmp_path / "coat.obj", y_up=True)
     wanted = Garment(mesh=Mesh(file="coat.obj", up="y"))
     mesh = garment.build_garment(wanted, 0.06, tmp_path)
@@ -74,12 +78,12 @@ def test_keys_of_a_mesh_reach_the_file(tmp_path, reads):
         ("garment.mesh.leave_out=[5]", r"garment.mesh.leave_out\[0\]: is 5, expected text"),
     ],
 )
-def test_wrong_keys_are_told_by_the_scenario(override, reason):
+def test_wrong_keys_are_told_by_the_scenario(override: str, reason: str) -> None:
     with pytest.raises(UserError, match=reason):
         load_scenario(SCENARIO, ["garment.mesh.file=coat.obj", override])
 
 
-def test_a_scenario_with_all_keys_loads():
+def test_a_scenario_with_all_keys_loads() -> None:
     scenario = load_scenario(
         SCENARIO,
         [
@@ -89,5 +93,6 @@ def test_a_scenario_with_all_keys_loads():
             'garment.mesh.leave_out=[Button, "<0.05 m"]',
         ],
     )
-    assert scenario.garment.mesh.up == "-y"
-    assert scenario.garment.mesh.leave_out == ["Button", "<0.05 m"]
+    mesh = present(scenario.garment.mesh)
+    assert mesh.up == "-y"
+    assert mesh.leave_out == ["Button", "<0.05 m"]

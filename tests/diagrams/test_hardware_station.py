@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -99,9 +100,9 @@ class Pair:
         self.simulator.Initialize()
         self.root = self.simulator.get_context()
 
-    def read(self, system: Diagram, port: str) -> np.ndarray:
-        value: np.ndarray = system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self.root))
-        return value
+    def read(self, system: Diagram, port: str) -> Any:
+        """Returns a vector, an image or whatever else the port holds."""
+        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self.root))
 
     def run(self, until: float) -> list[dict[str, np.ndarray]]:
         """Returns what is so every 5 ms until a time of the diagram's, s."""

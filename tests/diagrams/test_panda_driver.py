@@ -1,8 +1,7 @@
 """The simulated driver: what it reports, what it feels, and when it stops by itself."""
 
-from collections.abc import Sequence
-
 import numpy as np
+import numpy.typing as npt
 import pytest
 from pydrake.manipulation import PandaStatusReceiver, PandaStatusSender
 from pydrake.multibody.math import SpatialForce
@@ -60,7 +59,7 @@ class Rig:
             if self.driver.HasInputPort(name):
                 self.driver.GetInputPort(name).FixValue(self.at_driver, value)
 
-    def pull(self, force: Sequence[float]) -> None:
+    def pull(self, force: npt.ArrayLike) -> None:
         applied = ExternallyAppliedSpatialForce()
         applied.body_index = self.arm.tool
         applied.p_BoBq_B = np.zeros(3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,14 +23,13 @@ from drake_dress.diagrams.person import JointParameters, Person, add_person, joi
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
-    SIDES,
     ArmPose,
     BodyMeasures,
     Posture,
-    Side,
     arm_points,
     shoulder_height,
 )
+from drake_dress.models.sides import SIDES, Side
 
 M = BodyMeasures()
 JOINTS = JointParameters(2.0, 1.0, 1.5, 0.4)
@@ -277,7 +277,7 @@ def test_a_pose_past_a_limit_is_kept_as_the_person_holds_it() -> None:
         ({"rotation_limits": (0.0,)}, "person.joints: rotation_limits: is .*, expected two"),
     ],
 )
-def test_unusable_joint_parameters_are_told(change: dict, message: str) -> None:
+def test_unusable_joint_parameters_are_told(change: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         JointParameters(**change)
 

@@ -49,11 +49,11 @@ def test_pictures_are_the_station_s() -> None:
     message = lcmt_image_array.decode(picture)
     assert message.header.utime == 50_000
     assert len(message.images) == 2
-    value: AbstractValue = cpp_serializer(lcmt_image_array).CreateDefaultValue()
-    cpp_serializer(lcmt_image_array).Deserialize(picture, value)
+    sent: AbstractValue = cpp_serializer(lcmt_image_array).CreateDefaultValue()
+    cpp_serializer(lcmt_image_array).Deserialize(picture, sent)
     receiver = LcmImageArrayToImages()
     at = receiver.CreateDefaultContext()
-    receiver.get_input_port().FixValue(at, value)
+    receiver.get_input_port().FixValue(at, sent)
     for kind in ("color", "depth"):
         seen = receiver.GetOutputPort(f"{kind}_image").Eval(at).data
         own = station.diagram.GetOutputPort(f"rear.{kind}_image").Eval(context).data

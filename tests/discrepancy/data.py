@@ -1,13 +1,16 @@
 """A small lab and what it recorded; coarse and short, so that tests are quick."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.discrepancy.generate import Sensors, measured, record
-from drake_dress.discrepancy.lab import Lab
+from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.effects.effect import Effect
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "measured.yaml"
 QUICK = ("plant.spacing=0.06", "plant.time_step=0.008", "plant.tolerance=2e-3")
@@ -15,11 +18,18 @@ SENSORS = Sensors(rate=50.0, markers=24)
 
 
 @lru_cache
-def quick_scenario():
+def quick_scenario() -> Scenario:
     return load_scenario(SCENARIO, QUICK)
 
 
-def recordings(motions=("sway",), effects=(), duration=1.6, seed=0, noise=True, numerics=None):
+def recordings(
+    motions: Sequence[str] = ("sway",),
+    effects: Sequence[Effect] = (),
+    duration: float = 1.6,
+    seed: int = 0,
+    noise: bool = True,
+    numerics: Numerics | None = None,
+) -> list[Recording]:
     """Returns what a lab with effects records; its simulation is the scenario's."""
     rng = np.random.default_rng(seed)
     lab = Lab.of(quick_scenario(), SCENARIO.parent, numerics)

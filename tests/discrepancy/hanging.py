@@ -1,11 +1,19 @@
 """A recording made up without a simulation: a jacket that hangs, sways and sheds no marker."""
 
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
 import h5py
 import numpy as np
 
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.sampling import spread_out
+from tests.present import present
+
+Datasets = dict[str, FloatArray]
 
 MESH = make_coat(COATS["jacket"], 0.06)
 DENSITY = 0.3
@@ -21,7 +29,13 @@ JOINTS = np.array(
 )
 
 
-def hanging(rng, rate=100.0, duration=2.0, markers=24, noise=1e-3):
+def hanging(
+    rng: np.random.Generator,
+    rate: float = 100.0,
+    duration: float = 2.0,
+    markers: int = 24,
+    noise: float = 1e-3,
+) -> Recording:
     """Returns a recording; the garment is at rest for 0.4 s, then sways by about 10 cm at 1 Hz."""
     time = np.arange(round(rate * duration) + 1) / rate
     nodes = spread_out(MESH.rest_position, markers, int(rng.integers(len(MESH.rest_position))))
@@ -54,22 +68,22 @@ def hanging(rng, rate=100.0, duration=2.0, markers=24, noise=1e-3):
     )
 
 
-def arrays(recording):
+def arrays(recording: Recording) -> Datasets:
     """Returns the datasets of a recording by their names."""
     r = recording
     found = {
         "time": r.time,
         "garment/marker_position": r.marker_position,
         "garment/marker_rest_position": r.marker_rest_position,
-        "human/joint_position": r.joint_position,
+        "human/joint_position": present(r.joint_position),
     }
     for k, side in enumerate(("left", "right")):
         found[f"gripper/{side}/position"] = r.gripper_position[:, k]
-        found[f"gripper/{side}/force"] = r.gripper_force[:, k]
+        found[f"gripper/{side}/force"] = present(r.gripper_force)[:, k]
     return {name: np.array(value) for name, value in found.items()}
 
 
-def write_hdf5(path, datasets, compression="gzip"):
+def write_hdf5(path: Path, datasets: Mapping[str, FloatArray], compression: str = "gzip") -> Path:
     """Writes datasets as an HDF5 file with one recording at its root."""
     with h5py.File(path, "w") as file:
         for name, value in datasets.items():
@@ -77,7 +91,15 @@ def write_hdf5(path, datasets, compression="gzip"):
     return path
 
 
-def csv_text(datasets, divider=",", number=repr):
+def write_npz(path: Path, datasets: Mapping[str, Any]) -> Path:
+    """Writes datasets as an NPZ file."""
+    np.savez(path, **datasets)
+    return path
+
+
+def csv_text(
+    datasets: Mapping[str, FloatArray], divider: str = ",", number: Callable[[float], str] = repr
+) -> str:
     """Returns a recording as the text of a CSV, markers' numbers as they stand."""
     columns = {"time": datasets["time"]}
     for name, value in datasets.items():
@@ -92,7 +114,9 @@ def csv_text(datasets, divider=",", number=repr):
     return "".join(divider.join(row) + "\n" for row in rows)
 
 
-def places_text(places, numbers=None, divider=","):
+def places_text(
+    places: FloatArray, numbers: Iterable[object] | None = None, divider: str = ","
+) -> str:
     """Returns the text of `NAME.markers.csv`."""
     numbers = range(len(places)) if numbers is None else numbers
     rows = [["marker", "x", "y", "z"]]

@@ -1,10 +1,17 @@
 """Simulations that are made up: linear, but for cloth that folds otherwise, and a decoy."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
 import numpy as np
 
+from drake_dress.discrepancy.attribution import Comparison
 from drake_dress.discrepancy.candidates import Candidate, Probe
-from drake_dress.discrepancy.experiment import Told
+from drake_dress.discrepancy.experiment import Experiment, Level, Told
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.fabric import StretchStiffness
 
 COUNT, SAMPLES, MARKERS, NOISE = 4, 200, 6, 1e-3
@@ -14,7 +21,7 @@ ASTRAY = 2
 DECOY = 1e4
 
 
-def lasting(rng, memory=20):
+def lasting(rng: np.random.Generator, memory: float = 20) -> FloatArray:
     """Returns errors of variance 1 that stay for so many samples."""
     shape = (COUNT, SAMPLES, MARKERS, 3)
     decay = np.exp(-1.0 / memory)
@@ -25,10 +32,14 @@ def lasting(rng, memory=20):
     return found
 
 
-def probe_of(lab, effects):
+def probe_of(
+    lab: MadeUp, effects: Sequence[Effect]
+) -> Callable[..., list[tuple[Candidate, FloatArray]]]:
     """Returns what takes the place of `search.probe`: a column for each of some effects."""
 
-    def probe(experiment, comparison, progress=None):
+    def probe(
+        experiment: Experiment, comparison: Comparison, progress: Callable[[], None] | None = None
+    ) -> list[tuple[Candidate, FloatArray]]:
         columns = []
         for e in effects:
             (told,) = lab.tell([("screening", [e])])
@@ -40,7 +51,7 @@ def probe_of(lab, effects):
     return probe
 
 
-class MadeUp:
+class MadeUp(Experiment):
     """Simulations that move markers in proportion to what cloth weighs more.
 
     From a weight on, the coarsest one folds the cloth of one recording another way. Finer ones are
@@ -54,18 +65,18 @@ class MadeUp:
 
     def __init__(
         self,
-        rng,
-        folds_from=0.02,
-        steeper=1.0,
-        besides=0.0,
-        during=slice(None),
-        truth=TRUTH,
-        numerics=0.0,
-        off=0.0,
-        apart=0.0,
-    ):
-        time = np.arange(SAMPLES) * 0.02
-        self.told_at = []
+        rng: np.random.Generator,
+        folds_from: float = 0.02,
+        steeper: float = 1.0,
+        besides: float = 0.0,
+        during: slice = slice(None),
+        truth: float = TRUTH,
+        numerics: float = 0.0,
+        off: float = 0.0,
+        apart: float = 0.0,
+    ) -> None:
+        time = np.arange(SAMPLES, dtype=float) * 0.02
+        self.told_at: list[tuple[Level, ...]] = []
         self._folds_from, self._steeper = folds_from, steeper
         self._base = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
         self._slope = rng.normal(0.0, 0.1, (COUNT, SAMPLES, MARKERS, 3))
@@ -75,7 +86,7 @@ class MadeUp:
             * besides
             / TRUTH
         )
-        self._apart = (
+        self._shown_apart = (
             np.random.default_rng(8).normal(0.0, 1.0, (COUNT, SAMPLES, MARKERS, 3)) * apart / TRUTH
         )
         self._touching = np.zeros(SAMPLES)
@@ -101,16 +112,20 @@ class MadeUp:
             )
         self.samples = [np.arange(SAMPLES)] * COUNT
 
-    def slope(self, i):
+    def slope(self, i: int) -> FloatArray:
         return self._slope[i]
 
-    def tell(self, jobs, progress=None):
+    def tell(
+        self,
+        jobs: Sequence[tuple[Level | Sequence[Level], Sequence[Effect]]],
+        progress: Callable[[], None] | None = None,
+    ) -> list[list[Told]]:
         answer = []
         for level, effects in jobs:
-            levels = [level] * COUNT if isinstance(level, str) else level
+            levels: Sequence[Level] = [level] * COUNT if isinstance(level, str) else level
             self.told_at.append(tuple(levels))
-            decoy = sum(e.added for e in effects if isinstance(e, StretchStiffness)) / DECOY
-            added = sum(e.added for e in effects if not isinstance(e, StretchStiffness))
+            decoy = _added(e for e in effects if isinstance(e, StretchStiffness)) / DECOY
+            added = _added(e for e in effects if not isinstance(e, StretchStiffness))
             answer.append(
                 [
                     Told(
@@ -123,10 +138,10 @@ class MadeUp:
             )
         return answer
 
-    def _marker(self, level, i, added, decoy):
+    def _marker(self, level: Level, i: int, added: float, decoy: float) -> FloatArray:
         steeper = 1.0 if level == "screening" else self._steeper
         marker = self._base[i] + steeper * (added + decoy) * self._slope[i]
-        marker = marker + decoy * (self._besides[i] + self._apart[i])
+        marker = marker + decoy * (self._besides[i] + self._shown_apart[i])
         if level == "scenario" and decoy != 0.0:
             marker = marker + 2.0 * self._touching[:, None, None] * self._other
         if level in ("screening", "scenario"):
@@ -136,3 +151,7 @@ class MadeUp:
         if level == "screening" and i == ASTRAY and abs(added) > self._folds_from:
             marker = marker + self._other
         return marker
+
+
+def _added(effects: Iterable[Effect]) -> float:
+    return sum(e.values()["added"] for e in effects)

@@ -1,6 +1,8 @@
 """From recordings to a verdict, on a lab so coarse that it takes seconds."""
 
 import json
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from drake_dress.diagrams.build import effects
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.candidates import candidates
 from drake_dress.discrepancy.experiment import Experiment
-from drake_dress.discrepancy.explanation import explain
+from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.lab import Numerics
 from drake_dress.discrepancy.report import report_page
 from drake_dress.discrepancy.results import as_json, extended_yaml
@@ -17,10 +19,11 @@ from drake_dress.discrepancy.where import spots
 from drake_dress.discrepancy.windows import windows
 from drake_dress.models.effects.mass import SurfaceDensity
 from tests.discrepancy.data import SCENARIO, quick_scenario, recordings
+from tests.present import present
 
 
 @pytest.fixture(scope="module")
-def heavy():
+def heavy() -> Iterator[Experiment]:
     """An experiment whose garment is heavier than the scenario's."""
     finer = Numerics(0.05, 0.004, "projective_dynamics")
     made = recordings(("sway", "lift"), [SurfaceDensity(added=0.06)], 2.4, numerics=finer)
@@ -29,21 +32,23 @@ def heavy():
 
 
 @pytest.fixture(scope="module")
-def found(heavy):
+def found(heavy: Experiment) -> Explanation:
     return explain(heavy)
 
 
-def test_the_cause_is_named_with_its_size(found):
+def test_the_cause_is_named_with_its_size(found: Explanation) -> None:
     assert found.verdict == "named"
     assert found.causes[0].name == "surface_density"
     # on another mesh, with another integrator, and as sure as it says it is
     cause = found.causes[0]
-    assert abs(cause.effect.added - 0.06) < min(3.0 * cause.std["added"], 0.01)
+    assert abs(present(cause.effect).values()["added"] - 0.06) < min(3.0 * cause.std["added"], 0.01)
     assert found.gain[1] <= found.gain[0] <= found.gain[2]
     assert found.after[1] < 0.65 * found.before[1]
 
 
-def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
+def test_what_is_written_can_be_read_and_run_again(
+    found: Explanation, heavy: Experiment, tmp_path: Path
+) -> None:
     scenario = quick_scenario()
     text = extended_yaml(scenario, heavy, found)
     path = tmp_path / "extended.yaml"
@@ -79,20 +84,22 @@ def test_what_is_written_can_be_read_and_run_again(found, heavy, tmp_path):
     assert page.count("data:image/svg+xml") >= 4
 
 
-def test_effects_that_need_contact_are_not_blamed_where_there_is_none(found):
+def test_effects_that_need_contact_are_not_blamed_where_there_is_none(found: Explanation) -> None:
     scored = {s.name: s.screened for s in found.scores}
     assert "friction" not in scored
     assert "surface_density" in scored
 
 
-def test_effects_that_are_on_already_are_not_tried():
+def test_effects_that_are_on_already_are_not_tried() -> None:
     rest = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 3))
     names = {c.name for c in candidates(rest, [SurfaceDensity(added=0.1)])}
     assert "surface_density" not in names
     assert "air_drag" in names
 
 
-def test_the_extended_simulation_strays_less_on_its_own(heavy, found):
+def test_the_extended_simulation_strays_less_on_its_own(
+    heavy: Experiment, found: Explanation
+) -> None:
     alone = windows(heavy, found)
     # what is left is the coarse scenario's own numerics
     assert alone.strayed[1] < 0.9 * alone.strayed[0]

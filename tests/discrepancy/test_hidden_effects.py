@@ -16,8 +16,11 @@ what the few simulated ones would let pass.
 """
 
 import json
+from collections.abc import Callable
 from itertools import count
 from math import comb
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +28,7 @@ import pytest
 from drake_dress.discrepancy import search
 from drake_dress.discrepancy.attribution import compare
 from drake_dress.discrepancy.commands import explain_files, write_dataset
+from drake_dress.discrepancy.explained import Explained
 from drake_dress.discrepancy.search import Search
 from drake_dress.models.effects.fabric import StretchStiffness
 from drake_dress.models.effects.mass import SurfaceDensity
@@ -47,16 +51,16 @@ GOOD, HALF = 0.96, 0.5
 APART = 2e-3
 
 
-def passes(right, enough):
+def passes(right: Callable[[], bool], enough: int) -> bool:
     """Returns whether enough cases are right before too many are wrong; `right` gives the next."""
-    seen = []
+    seen: list[bool] = []
     while seen.count(True) < enough and seen.count(False) < TOO_MANY_WRONG:
         seen.append(right())
     return seen.count(True) == enough
 
 
-def test_the_rules_separate_good_tools_from_bad_ones_as_often_as_is_said():
-    def at_most(wrong, cases, p):
+def test_the_rules_separate_good_tools_from_bad_ones_as_often_as_is_said() -> None:
+    def at_most(wrong: int, cases: int, p: float) -> float:
         return sum(comb(cases, k) * (1 - p) ** k * p ** (cases - k) for k in range(wrong + 1))
 
     nothing, weight = (NOTHING_WRONG, NOTHING_MADE_UP), (WEIGHT_WRONG, WEIGHT_MADE_UP)
@@ -78,7 +82,7 @@ def test_the_rules_separate_good_tools_from_bad_ones_as_often_as_is_said():
     assert not passes(iter([False, False]).__next__, 1)
 
 
-def causes_made_up(lab, monkeypatch):
+def causes_made_up(lab: MadeUp, monkeypatch: pytest.MonkeyPatch) -> set[str]:
     """Returns the names of causes that a search among two effects finds, rivals among them."""
     comparison = compare(lab)
     effects = (SurfaceDensity(added=0.03), StretchStiffness(added=0.03 * DECOY))
@@ -93,7 +97,9 @@ def causes_made_up(lab, monkeypatch):
     [(0.0, NOTHING_MADE_UP, NOTHING_WRONG), (TRUTH, WEIGHT_MADE_UP, WEIGHT_WRONG)],
     ids=["nothing", "weight"],
 )
-def test_of_made_up_cases_nearly_all_are_right(monkeypatch, truth, cases, most_wrong):
+def test_of_made_up_cases_nearly_all_are_right(
+    monkeypatch: pytest.MonkeyPatch, truth: float, cases: int, most_wrong: int
+) -> None:
     seed = drawn_seed()
     wrong = []
     for k in range(cases):
@@ -104,17 +110,18 @@ def test_of_made_up_cases_nearly_all_are_right(monkeypatch, truth, cases, most_w
     assert len(wrong) <= most_wrong, wrong
 
 
-def verdict_and_answer(hide, seed, directory):
+def verdict_and_answer(hide: str, seed: int, directory: Path) -> tuple[Explained, dict[str, Any]]:
     """Returns what was found, and only then what was hidden."""
     print(f"hide {hide}, seed {seed}")
     write_dataset(hide, seed, directory, str(SCENARIO), COARSER, motions=MOTIONS)
-    found = explain_files([directory / "measured.h5"], SCENARIO, COARSER, directory / "out", None)
+    measured = str(directory / "measured.h5")
+    found = explain_files([measured], str(SCENARIO), COARSER, directory / "out", None)
     answer = json.loads((directory / "answer.json").read_text())
     print(f"found {found.verdict} {[c.name for c in found.causes]}, hidden {answer}")
     return found, answer
 
 
-def is_right(found, answer):
+def is_right(found: Explained, answer: dict[str, Any]) -> bool:
     named = {c.name for c in found.causes}
     if answer["effect"] == "nothing":
         return found.verdict == "nothing"
@@ -122,12 +129,12 @@ def is_right(found, answer):
 
 
 @pytest.mark.parametrize("kind", list(ENOUGH_RIGHT))
-def test_simulated_cases_are_judged_right_nearly_always(tmp_path, kind):
+def test_simulated_cases_are_judged_right_nearly_always(tmp_path: Path, kind: str) -> None:
     rng = np.random.default_rng(drawn_seed())
     names = sorted(n for n, kind in EFFECTS.items() if not kind.NEEDS_CONTACT)
     number = count()
 
-    def right():
+    def right() -> bool:
         hide = str(rng.choice(names)) if kind == "an effect" else "nothing"
         directory = tmp_path / str(next(number))
         return is_right(*verdict_and_answer(hide, int(rng.integers(10**6)), directory))

@@ -16,12 +16,12 @@ from tests.discrepancy.data import quick_scenario
 
 
 @pytest.fixture(scope="module")
-def sheet():
+def sheet() -> Sheet:
     mesh = build_garment(quick_scenario().garment, 0.06, Path("."))
     return Sheet(make_elements(mesh.rest_position, mesh.faces), mesh.rest_position, grain(mesh))
 
 
-def test_what_explains_does_not_know_them():
+def test_what_explains_does_not_know_them() -> None:
     assert not set(OUTSIDE) & set(EFFECTS)
     assert set(ALL_SIZES) == set(SIZES) | set(OUTSIDE)
     assert set(SIZES) == set(EFFECTS)
@@ -30,7 +30,7 @@ def test_what_explains_does_not_know_them():
     assert [] in drawn
 
 
-def test_a_magnet_pulls_the_cuff_to_its_post_and_harder_when_near(sheet):
+def test_a_magnet_pulls_the_cuff_to_its_post_and_harder_when_near(sheet: Sheet) -> None:
     x = sheet.rest_position
     magnet = MagnetisedCuff(strength=2.0, x=0.0, y=0.3, z=-0.2)
     force = magnet.apply(sheet, x, np.zeros_like(x))
@@ -44,11 +44,12 @@ def test_a_magnet_pulls_the_cuff_to_its_post_and_harder_when_near(sheet):
     nearer[pulled] += 0.3 * away
     closer = magnet.apply(sheet, nearer, np.zeros_like(x)).sum(axis=0)
     grown = np.linalg.norm(closer) / np.linalg.norm(total)
-    far, near = np.linalg.norm(away), 0.7 * np.linalg.norm(away)
+    far = float(np.linalg.norm(away))
+    near = 0.7 * far
     assert grown == pytest.approx((max(far, 0.08) / max(near, 0.08)) ** 3, rel=1e-6)
 
 
-def test_a_snag_holds_what_is_near_and_nothing_else(sheet):
+def test_a_snag_holds_what_is_near_and_nothing_else(sheet: Sheet) -> None:
     x = sheet.rest_position
     place = x[10] + [0.01, 0.0, 0.0]
     snag = Snag(stiffness=20.0, radius=0.04, x=place[0], y=place[1], z=place[2])
@@ -58,7 +59,7 @@ def test_a_snag_holds_what_is_near_and_nothing_else(sheet):
     assert np.abs(force[far]).max() < 1e-6
 
 
-def test_a_sliding_layer_takes_energy_and_not_more_than_its_stress(sheet):
+def test_a_sliding_layer_takes_energy_and_not_more_than_its_stress(sheet: Sheet) -> None:
     rng = np.random.default_rng(1)
     x = sheet.rest_position
     v = 0.2 * rng.standard_normal(x.shape)

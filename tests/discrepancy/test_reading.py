@@ -1,6 +1,7 @@
 """Measured logs are read, or refused in one line that names file and key."""
 
 import csv
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -8,27 +9,30 @@ import pytest
 from scipy.spatial import cKDTree
 
 from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.coat import COATS, make_coat
 from tests.discrepancy.data import recordings
+from tests.discrepancy.hanging import arrays, write_npz
 
 MESH = make_coat(COATS["jacket"], 0.06)
 
 
 @pytest.fixture(scope="module")
-def made():
+def made() -> list[Recording]:
     return recordings(("sway", "lift"), duration=1.0)
 
 
 @pytest.fixture
-def log(made, tmp_path):
+def log(made: list[Recording], tmp_path: Path) -> Path:
     path = tmp_path / "measured.h5"
     write_recordings(path, made, "scenario: text")
     return path
 
 
-def test_what_was_written_is_read(made, log):
+def test_what_was_written_is_read(made: list[Recording], log: Path) -> None:
     for r, s in zip(made, read_recordings([log], MESH), strict=True):
         np.testing.assert_array_equal(r.time, s.time)
         np.testing.assert_array_equal(r.marker_position, s.marker_position)
@@ -39,14 +43,18 @@ def test_what_was_written_is_read(made, log):
         assert r.name == s.name
 
 
-def test_recordings_of_the_same_motion_are_told_apart(made, tmp_path):
+def test_recordings_of_the_same_motion_are_told_apart(
+    made: list[Recording], tmp_path: Path
+) -> None:
     path = tmp_path / "twice.h5"
     write_recordings(path, [made[0], made[1], made[0]], "scenario: text")
     names = [r.name for r in read_recordings([path], MESH)]
     assert names == ["sway", "lift", "sway 2"]
 
 
-def test_a_file_may_hold_one_recording_at_its_root_and_lack_what_is_not_required(made, tmp_path):
+def test_a_file_may_hold_one_recording_at_its_root_and_lack_what_is_not_required(
+    made: list[Recording], tmp_path: Path
+) -> None:
     r = made[0]
     path = tmp_path / "one.h5"
     with h5py.File(path, "w") as file:
@@ -64,20 +72,12 @@ def test_a_file_may_hold_one_recording_at_its_root_and_lack_what_is_not_required
     assert read.marker_noise == pytest.approx(1e-3, rel=0.25)
 
 
-def test_npz_and_csv_say_the_same_as_hdf5(made, tmp_path):
+def test_npz_and_csv_say_the_same_as_hdf5(made: list[Recording], tmp_path: Path) -> None:
     r = made[0]
-    arrays = {
-        "time": r.time,
-        "garment/marker_position": r.marker_position,
-        "garment/marker_rest_position": r.marker_rest_position,
-        "human/joint_position": r.joint_position,
-    }
-    for k, side in enumerate(("left", "right")):
-        arrays[f"gripper/{side}/position"] = r.gripper_position[:, k]
-        arrays[f"gripper/{side}/force"] = r.gripper_force[:, k]
-    np.savez(tmp_path / "lab.npz", **arrays)
+    datasets = arrays(r)
+    write_npz(tmp_path / "lab.npz", datasets)
     columns = {"time": r.time}
-    for name, value in arrays.items():
+    for name, value in datasets.items():
         if name in ("time", "garment/marker_rest_position"):
             continue
         for index in np.ndindex(value.shape[1:]):
@@ -101,31 +101,31 @@ def test_npz_and_csv_say_the_same_as_hdf5(made, tmp_path):
         np.testing.assert_array_equal(read.marker_rest_position, r.marker_rest_position)
 
 
-def change(path, name, value):
+def change(path: Path, name: str, value: FloatArray | None) -> None:
     with h5py.File(path, "a") as file:
         del file[name]
         if value is not None:
             file[name] = value
 
 
-def shifted_time(path):
+def shifted_time(path: Path) -> None:
     with h5py.File(path) as file:
         time = np.array(file["recording_1/time"])
     time[7] = time[3]
     change(path, "recording_1/time", time)
 
 
-def infinite_force(path):
+def infinite_force(path: Path) -> None:
     with h5py.File(path, "a") as file:
         file["recording_0/gripper/left/force"][3, 1] = np.inf
 
 
-def millimetres(path):
+def millimetres(path: Path) -> None:
     with h5py.File(path, "a") as file:
         file["recording_0/garment/marker_position"][...] *= 1000.0
 
 
-def unseen(path):
+def unseen(path: Path) -> None:
     with h5py.File(path, "a") as file:
         file["recording_0/garment/marker_position"][...] = np.nan
 
@@ -156,7 +156,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_used_is_named(log, case):
+def test_what_cannot_be_used_is_named(log: Path, case: str) -> None:
     spoil, words = BAD[case]
     spoil(log)
     with pytest.raises(UserError) as error:
@@ -168,14 +168,14 @@ def test_what_cannot_be_used_is_named(log, case):
 @pytest.mark.parametrize(
     ("name", "content"), [("lab.txt", "a"), ("lab.h5", "not HDF5"), ("lab.csv", "")]
 )
-def test_files_of_another_kind_are_refused(tmp_path, name, content):
+def test_files_of_another_kind_are_refused(tmp_path: Path, name: str, content: str) -> None:
     path = tmp_path / name
     path.write_text(content)
     with pytest.raises(UserError, match=name):
         read_recordings([path], MESH)
 
 
-def test_a_csv_says_which_line_is_no_number(tmp_path):
+def test_a_csv_says_which_line_is_no_number(tmp_path: Path) -> None:
     path = tmp_path / "lab.csv"
     path.write_text("time,gripper/left/position/x\n0.0,1.0\n0.1,far\n")
     with pytest.raises(UserError, match="line 3"):

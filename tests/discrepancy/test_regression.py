@@ -1,16 +1,21 @@
 """Least squares over recordings whose simulation is a little off."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.discrepancy.regression import (
     Extrapolation,
+    Solution,
     misleading,
     solve_bounded,
     solve_pooled,
 )
+from drake_dress.models.arrays import FloatArray, IndexArray
 
 RECORDINGS, SAMPLES = 5, 400
 # What the module's docstrings say: a voice alone knows a parameter to 30 sizes that matter, and
@@ -21,16 +26,16 @@ seeds = st.integers(0, 2**31)
 
 
 @pytest.fixture
-def rng():
+def rng() -> np.random.Generator:
     return np.random.default_rng(0)
 
 
 @pytest.fixture
-def recording():
+def recording() -> IndexArray:
     return np.repeat(np.arange(RECORDINGS), SAMPLES)
 
 
-def test_bounded_least_squares_keeps_its_bounds():
+def test_bounded_least_squares_keeps_its_bounds() -> None:
     rng = np.random.default_rng(0)
     columns = rng.standard_normal((200, 3))
     truth = np.array([1.0, -2.0, 0.5])
@@ -42,7 +47,9 @@ def test_bounded_least_squares_keeps_its_bounds():
     assert bound[1] == pytest.approx(0.0)
 
 
-def test_what_is_left_of_the_step_does_not_move_parameters(rng, recording):
+def test_what_is_left_of_the_step_does_not_move_parameters(
+    rng: np.random.Generator, recording: IndexArray
+) -> None:
     count = len(recording)
     column, noise = rng.standard_normal((count, 1)), rng.standard_normal(count)
     # halving the step does half of what the effect does, and something else
@@ -58,7 +65,9 @@ def test_what_is_left_of_the_step_does_not_move_parameters(rng, recording):
     assert abs(misled[0] - 0.8) > 0.2
 
 
-def test_a_factor_is_found_by_the_rows_that_train(rng, recording):
+def test_a_factor_is_found_by_the_rows_that_train(
+    rng: np.random.Generator, recording: IndexArray
+) -> None:
     direction = rng.standard_normal(len(recording))
     factor = np.arange(RECORDINGS)[recording] / 4.0
     train = np.arange(len(recording)) % 2 == 0
@@ -70,7 +79,9 @@ def test_a_factor_is_found_by_the_rows_that_train(rng, recording):
     )
 
 
-def test_recordings_that_agree_are_pooled_as_least_squares_pools_them(rng, recording):
+def test_recordings_that_agree_are_pooled_as_least_squares_pools_them(
+    rng: np.random.Generator, recording: IndexArray
+) -> None:
     columns = rng.standard_normal((len(recording), 2))
     residual = columns @ [0.5, -1.0] + rng.standard_normal(len(recording))
     found = solve_pooled(columns, columns, residual, recording, -np.inf, np.inf)
@@ -80,7 +91,9 @@ def test_recordings_that_agree_are_pooled_as_least_squares_pools_them(rng, recor
     np.testing.assert_allclose(found.std, 1.0 / np.sqrt(len(recording)), rtol=0.3)
 
 
-def test_one_recording_that_misleads_is_one_voice_among_five(rng, recording):
+def test_one_recording_that_misleads_is_one_voice_among_five(
+    rng: np.random.Generator, recording: IndexArray
+) -> None:
     columns = rng.standard_normal((len(recording), 1))
     loud = recording == 1
     columns[loud] *= 10.0
@@ -95,7 +108,9 @@ def test_one_recording_that_misleads_is_one_voice_among_five(rng, recording):
     assert 0.1 < found.scatter < 0.5
 
 
-def test_a_recording_that_knows_nothing_has_no_voice(rng, recording):
+def test_a_recording_that_knows_nothing_has_no_voice(
+    rng: np.random.Generator, recording: IndexArray
+) -> None:
     columns = rng.standard_normal((len(recording), 2))
     columns[recording >= 2] = 0.0
     columns[recording == 1, 1] = 0.0
@@ -105,7 +120,9 @@ def test_a_recording_that_knows_nothing_has_no_voice(rng, recording):
     assert np.all(found.std < 0.3)
 
 
-def voices_that_say(estimates, information):
+def voices_that_say(
+    estimates: npt.ArrayLike, information: Sequence[float]
+) -> tuple[FloatArray, FloatArray, IndexArray]:
     """Returns a column, a residual and voices (N,), an entry each, that say what is asked for.
 
     Args:
@@ -113,17 +130,19 @@ def voices_that_say(estimates, information):
         information: of each, 1 / variance.
     """
     column = np.sqrt(np.asarray(information, dtype=float))
-    return column[:, None], column * estimates, np.arange(len(column))
+    return column[:, None], column * np.asarray(estimates), np.arange(len(column))
 
 
-def pooled(estimates, information):
+def pooled(estimates: npt.ArrayLike, information: Sequence[float]) -> Solution:
     column, residual, voice = voices_that_say(estimates, information)
     return solve_pooled(column, column, residual, voice, -np.inf, np.inf)
 
 
 @given(seed=seeds, count=st.integers(1, 4))
 @settings(max_examples=30)
-def test_a_direction_that_is_free_is_noise_of_standard_deviation_one_along_it(seed, count):
+def test_a_direction_that_is_free_is_noise_of_standard_deviation_one_along_it(
+    seed: int, count: int
+) -> None:
     rng = np.random.default_rng(seed)
     voice = rng.permutation(np.repeat(np.arange(count), 3))
     direction, values = rng.standard_normal(3 * count), rng.standard_normal((3 * count, 2))
@@ -147,7 +166,9 @@ def test_a_direction_that_is_free_is_noise_of_standard_deviation_one_along_it(se
     is_pooled=st.booleans(),
 )
 @settings(max_examples=60)
-def test_a_bounded_solution_meets_its_conditions_of_optimality(seed, k, size, is_pooled):
+def test_a_bounded_solution_meets_its_conditions_of_optimality(
+    seed: int, k: int, size: float, is_pooled: bool
+) -> None:
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((30, k)) * size ** rng.uniform(-1.0, 1.0, k)
     residual = columns @ rng.standard_normal(k) + np.linalg.norm(columns) * rng.standard_normal(30)
@@ -169,7 +190,7 @@ def test_a_bounded_solution_meets_its_conditions_of_optimality(seed, k, size, is
 
 @given(seed=seeds)
 @settings(max_examples=20)
-def test_what_nothing_is_known_of_stays_as_near_to_zero_as_its_bounds_allow(seed):
+def test_what_nothing_is_known_of_stays_as_near_to_zero_as_its_bounds_allow(seed: int) -> None:
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((50, 3))
     columns[:, 1] = 0.0
@@ -188,7 +209,9 @@ def test_what_nothing_is_known_of_stays_as_near_to_zero_as_its_bounds_allow(seed
 
 
 @pytest.mark.parametrize("between", [0.3, 1.0, 2.0, 2.5])
-def test_two_voices_scatter_by_what_of_their_difference_noise_does_not_explain(between):
+def test_two_voices_scatter_by_what_of_their_difference_noise_does_not_explain(
+    between: float,
+) -> None:
     information = 50.0
     off = np.sqrt(2.0 * (between**2 + 1.0 / information))
     found = pooled([0.0, off], [information] * 2)
@@ -197,7 +220,7 @@ def test_two_voices_scatter_by_what_of_their_difference_noise_does_not_explain(b
     assert found.std[0] == pytest.approx(0.5 * off, rel=1e-3)
 
 
-def test_voices_scatter_no_more_than_the_most():
+def test_voices_scatter_no_more_than_the_most() -> None:
     found = pooled([0.0, 40.0], [50.0] * 2)
     assert found.scatter == MOST_SCATTER
     assert found.std[0] == pytest.approx(np.sqrt((MOST_SCATTER**2 + 1 / 50.0) / 2.0))
@@ -205,7 +228,7 @@ def test_voices_scatter_no_more_than_the_most():
 
 @given(seed=seeds, k=st.integers(1, 3))
 @settings(max_examples=20)
-def test_one_voice_alone_does_not_scatter_and_is_least_squares(seed, k):
+def test_one_voice_alone_does_not_scatter_and_is_least_squares(seed: int, k: int) -> None:
     rng = np.random.default_rng(seed)
     columns, residual = rng.standard_normal((40, k)), 9.0 * rng.standard_normal(40)
     found = solve_pooled(columns, columns, residual, np.full(40, 3), -np.inf, np.inf)
@@ -215,7 +238,7 @@ def test_one_voice_alone_does_not_scatter_and_is_least_squares(seed, k):
     np.testing.assert_allclose(found.std, np.sqrt(np.diag(covariance)), rtol=1e-6)
 
 
-def test_voices_that_differ_by_no_more_than_noise_do_not_scatter():
+def test_voices_that_differ_by_no_more_than_noise_do_not_scatter() -> None:
     information = 50.0
     # the square of what they differ by, in its standard deviation, is just below 1 and just above
     for share, scatters in ((0.98, False), (1.02, True)):
@@ -223,7 +246,7 @@ def test_voices_that_differ_by_no_more_than_noise_do_not_scatter():
         assert (found.scatter > 0.0) == scatters
 
 
-def test_a_voice_that_knows_no_more_than_is_known_of_any_is_half_a_voice():
+def test_a_voice_that_knows_no_more_than_is_known_of_any_is_half_a_voice() -> None:
     """It may disagree by half as much again as the other two may by themselves."""
     estimates, vague = [0.0, 1.5], 1.0 / VAGUE**2
     found = pooled([*estimates, 0.0], [1e6, 1e6, vague])
@@ -236,7 +259,7 @@ def test_a_voice_that_knows_no_more_than_is_known_of_any_is_half_a_voice():
 
 @given(seed=seeds, k=st.integers(1, 3), count=st.integers(2, 6))
 @settings(max_examples=30)
-def test_voices_are_pooled_by_the_random_effects_model(seed, k, count):
+def test_voices_are_pooled_by_the_random_effects_model(seed: int, k: int, count: int) -> None:
     """Each voice has an estimate of its own, of covariance N⁻¹ + τ² I, with Q(τ²) = dof.
 
     Q is lower where voices agree, with τ = 0, and higher where they disagree by more than τ may be.
@@ -269,7 +292,9 @@ def test_voices_are_pooled_by_the_random_effects_model(seed, k, count):
 
 @given(seed=seeds, k=st.integers(1, 3), shift=st.sampled_from([-5.0, 0.1, 5.0]))
 @settings(max_examples=20)
-def test_how_far_voices_are_misled_is_the_mean_square_weighted_by_what_they_know(seed, k, shift):
+def test_how_far_voices_are_misled_is_the_mean_square_weighted_by_what_they_know(
+    seed: int, k: int, shift: float
+) -> None:
     rng = np.random.default_rng(seed)
     voice = np.repeat(np.arange(3), 20)
     columns = rng.standard_normal((60, k)) * np.array([1.0, 5.0, 20.0])[voice, None]
@@ -285,7 +310,7 @@ def test_how_far_voices_are_misled_is_the_mean_square_weighted_by_what_they_know
     )
 
 
-def test_a_voice_that_knows_next_to_nothing_is_misled_by_half_of_what_it_says():
+def test_a_voice_that_knows_next_to_nothing_is_misled_by_half_of_what_it_says() -> None:
     column, residual, voice = voices_that_say([4.0], [1.0 / VAGUE**2])
     assert misleading(column, column, residual, voice)[0] == pytest.approx(2.0)
     nothing = np.zeros((1, 1))

@@ -8,17 +8,18 @@ from drake_dress.discrepancy.lab import Lab
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.where import KINDS, Spot, limbs_touched, spots, worst
 from drake_dress.discrepancy.whitening import whiten
+from drake_dress.models.arrays import FloatArray
 from tests.discrepancy.data import SCENARIO, quick_scenario
 
 _NOISE = 1e-3
 
 
 @pytest.fixture(scope="module")
-def lab():
+def lab() -> Lab:
     return Lab.of(quick_scenario(), SCENARIO.parent)
 
 
-def recording(lab, joints=None):
+def recording(lab: Lab, joints: FloatArray | None = None) -> Recording:
     """Returns markers that stay where they are: on the right forearm, on the left upper arm,
     and far from everyone; the first two are 1 cm over the skin."""
     posed = lab.person(()).posed
@@ -44,7 +45,7 @@ def recording(lab, joints=None):
     )
 
 
-def test_markers_are_of_the_limb_whose_skin_they_are_near(lab):
+def test_markers_are_of_the_limb_whose_skin_they_are_near(lab: Lab) -> None:
     person = lab.person(())
     samples = np.arange(0, 41, 10)
     r = recording(lab)
@@ -56,13 +57,13 @@ def test_markers_are_of_the_limb_whose_skin_they_are_near(lab):
     assert limbs_touched(r, samples, person)[1, 0] == -1
 
 
-def test_limbs_are_where_their_joints_were_measured(lab):
+def test_limbs_are_where_their_joints_were_measured(lab: Lab) -> None:
     person = lab.person(())
     away = np.tile(person.posed + np.array([0.0, 0.0, 0.5]), (41, 1, 1))
     assert (limbs_touched(recording(lab, away), np.arange(41), person) == -1).all()
 
 
-def test_what_is_off_on_one_limb_is_told_of_that_limb_marker_and_time(lab):
+def test_what_is_off_on_one_limb_is_told_of_that_limb_marker_and_time(lab: Lab) -> None:
     r = recording(lab)
     samples = [np.arange(41)]
     forces, touching = np.zeros((41, 2, 3)), np.ones(41)
@@ -83,7 +84,7 @@ def test_what_is_off_on_one_limb_is_told_of_that_limb_marker_and_time(lab):
     assert [s.whitened for s in found] == sorted((s.whitened for s in found), reverse=True)
 
 
-def test_short_lists_name_every_kind():
+def test_short_lists_name_every_kind() -> None:
     found = [Spot("time", f"{k}", 0.0, 0.0, 9.0 - k) for k in range(5)]
     found.append(Spot("limb", "left forearm", 0.0, 0.0, 1.0))
     assert [s.name for s in worst(found, 2)] == ["left forearm", "0", "1"]

@@ -79,7 +79,7 @@ def test_experiments_that_are_open_at_once_tell_what_each_tells_alone() -> None:
         ((found,),) = experiment.tell([("screening", ())])
         return np.concatenate([found.marker.ravel(), found.force.ravel()])
 
-    hidden = ([], [SurfaceDensity(added=0.1)])
+    hidden: tuple[list[SurfaceDensity], ...] = ([], [SurfaceDensity(added=0.1)])
     with opened(hidden[0]) as one, opened(hidden[1]) as other:
         together = [told(one), told(other)]
     alone = []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
-from drake_dress.models.sides import SIDES
+from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.arms import arm_capsules, measure_arms
 from drake_dress.report.log import RunLog
@@ -22,8 +22,8 @@ HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 STILL = np.zeros(7)
 
 
-def bases(spread: float = 1.0) -> dict[str, np.ndarray]:
-    both = {}
+def bases(spread: float = 1.0) -> dict[Side, np.ndarray]:
+    both: dict[Side, np.ndarray] = {}
     for side, y in zip(SIDES, (0.5 * spread, -0.5 * spread), strict=True):
         both[side] = np.eye(4)
         both[side][:3, 3] = [-1.3, y, 0.9]
@@ -39,13 +39,16 @@ def summary(
         path / "run.h5",
         synthetic.content(
             garment,
-            capsule_radius=synthetic.capsules(samples[0].joint_position)[2],
+            capsule_radius=synthetic.capsules(np.asarray(samples[0].joint_position))[2],
             bases=bases(spread),
         ),
     ) as writer:
         for i, sample in enumerate(samples):
             odd = arm if i == 3 else ArmSample(HOME, STILL, HOME, STILL)
-            both = {"left": odd, "right": ArmSample(HOME, STILL, HOME, STILL)}
+            both: dict[Side, ArmSample] = {
+                "left": odd,
+                "right": ArmSample(HOME, STILL, HOME, STILL),
+            }
             writer.append(replace(sample, arms=both, clearance=np.zeros(3)))
     with RunLog.open(path / "run.h5") as log:
         # the made-up garment goes through the made-up trunk

@@ -6,38 +6,42 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NoReturn
 
 import h5py
 import numpy as np
 import pytest
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report import disk, log_writer
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import JOINT_NAMES
-from drake_dress.report.log_writer import RunLogWriter
+from drake_dress.report.log_writer import RunLogWriter, Sample
+from tests.present import present
 from tests.report import synthetic
 
 
 @pytest.fixture(scope="module")
-def garment():
+def garment() -> GarmentMesh:
     return synthetic.coat(0.06)
 
 
 @pytest.fixture
-def samples(garment):
+def samples(garment: GarmentMesh) -> list[Sample]:
     return synthetic.dressing(garment, count=6)
 
 
 @pytest.fixture
-def path(tmp_path, garment, samples):
+def path(tmp_path: Path, garment: GarmentMesh, samples: list[Sample]) -> Path:
     return synthetic.write(tmp_path / "run.h5", garment, samples)
 
 
-def eager_writer(path, garment):
+def eager_writer(path: Path, garment: GarmentMesh) -> RunLogWriter:
     """Returns one that flushes every sample."""
     return RunLogWriter(
         path,
@@ -46,7 +50,9 @@ def eager_writer(path, garment):
     )
 
 
-def test_what_is_read_is_what_was_written(path, garment, samples):
+def test_what_is_read_is_what_was_written(
+    path: Path, garment: GarmentMesh, samples: list[Sample]
+) -> None:
     with RunLog.open(path) as log:
         assert len(log) == len(samples)
         assert log.time.tolist() == [s.time for s in samples]  # to the last bit
@@ -56,8 +62,12 @@ def test_what_is_read_is_what_was_written(path, garment, samples):
         for name, loop in garment.loops.items():
             np.testing.assert_array_equal(log.loops[name], loop)
         for i, s in enumerate(samples):
-            np.testing.assert_allclose(log.garment_position(i), s.garment_position, atol=1e-6)
-            np.testing.assert_allclose(log.contact_force(i), s.contact_force, atol=1e-6)
+            np.testing.assert_allclose(
+                log.garment_position(i), np.asarray(s.garment_position), atol=1e-6
+            )
+            np.testing.assert_allclose(
+                present(log.contact_force(i)), np.asarray(s.contact_force), atol=1e-6
+            )
             np.testing.assert_array_equal(log.contact(i), s.contact)
             np.testing.assert_array_equal(log.joint_position[i], s.joint_position)
             np.testing.assert_array_equal(log.capsules[0][i], s.capsule_a)
@@ -77,7 +87,9 @@ def test_what_is_read_is_what_was_written(path, garment, samples):
         np.testing.assert_array_equal(log.solves("local"), [3 for _ in samples])
 
 
-def test_layout_is_the_published_one(path, garment, samples):
+def test_layout_is_the_published_one(
+    path: Path, garment: GarmentMesh, samples: list[Sample]
+) -> None:
     count, n, f = len(samples), len(garment.rest_position), len(garment.faces)
     expected = {
         "time": (count,),
@@ -113,7 +125,7 @@ def test_layout_is_the_published_one(path, garment, samples):
         assert file["garment/position"].attrs["frame"] == "world"
 
 
-def test_log_without_verdicts_is_still_a_log(path):
+def test_log_without_verdicts_is_still_a_log(path: Path) -> None:
     with RunLog.open(path) as log:
         np.testing.assert_array_equal(log.safety, 0)
     _edit(path, _delete_safety)
@@ -125,10 +137,15 @@ def _delete_safety(file: h5py.File) -> None:
     del file["control/safety"]
 
 
-def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):
+def test_interrupt_leaves_whole_samples(
+    tmp_path: Path,
+    garment: GarmentMesh,
+    samples: list[Sample],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     path = tmp_path / "run.h5"
 
-    def interrupted(rows):
+    def interrupted(rows: Mapping[str, Any]) -> dict[str, Any]:
         # The signal comes after some datasets of the sample have grown.
         rows = dict(rows)
         last = list(rows)[3]
@@ -143,18 +160,18 @@ def test_interrupt_leaves_whole_samples(tmp_path, garment, samples):
             for sample in samples[:3]:
                 writer.append(sample)
             original = writer._rows
-            writer._rows = lambda s: interrupted(original(s))  # type: ignore[method-assign]
+            monkeypatch.setattr(writer, "_rows", lambda s: interrupted(original(s)))
             writer.append(samples[3])
     with RunLog.open(path) as log:
         assert log.time.tolist() == [s.time for s in samples[:3]]
 
 
 class _Interrupt:
-    def __array__(self, dtype=None, copy=None):
+    def __array__(self, dtype: object = None, copy: object = None) -> NoReturn:
         raise KeyboardInterrupt
 
 
-def test_killed_process_leaves_what_was_flushed(tmp_path):
+def test_killed_process_leaves_what_was_flushed(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     root = Path(__file__).resolve().parents[2]
     script = f"""
@@ -198,7 +215,9 @@ for i in range(10**6):
         assert np.isfinite(log.garment_position(len(log) - 1)).all()
 
 
-def test_memory_does_not_grow_with_samples(tmp_path, garment, samples, monkeypatch):
+def test_memory_does_not_grow_with_samples(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What HDF5 keeps of a file until it is closed, 1 kB a sample, is 100 MB an hour."""
     monkeypatch.setattr(log_writer, "_MOST_OPEN", 50)
     path = tmp_path / "run.h5"
@@ -221,7 +240,9 @@ def test_memory_does_not_grow_with_samples(tmp_path, garment, samples, monkeypat
             np.testing.assert_allclose(log.garment_position(k), first + k, atol=1e-4)
 
 
-def test_a_file_that_cannot_be_opened_again_ends_the_log(tmp_path, garment, samples, monkeypatch):
+def test_a_file_that_cannot_be_opened_again_ends_the_log(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(log_writer, "_MOST_OPEN", 2)
     path = tmp_path / "run.h5"
     writer = eager_writer(path, garment)
@@ -241,14 +262,14 @@ def test_a_file_that_cannot_be_opened_again_ends_the_log(tmp_path, garment, samp
 
 
 def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
-    tmp_path, garment, samples, monkeypatch
-):
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Nor in between, when it is opened anew."""
     monkeypatch.setattr(log_writer, "_MOST_OPEN", 1)
     path = tmp_path / "run.h5"
     opened = log_writer._open
 
-    def refused(*words):
+    def refused(*words: Any) -> h5py.File:
         with pytest.raises(UserError, match="still being written"):
             RunLog.open(path)
         return opened(*words)
@@ -265,7 +286,7 @@ def test_a_log_that_is_being_written_is_neither_read_nor_replaced(
         assert len(log) == 3
 
 
-def test_time_must_increase(tmp_path, garment, samples):
+def test_time_must_increase(tmp_path: Path, garment: GarmentMesh, samples: list[Sample]) -> None:
     with RunLogWriter(
         tmp_path / "run.h5",
         synthetic.content(garment),
@@ -275,7 +296,7 @@ def test_time_must_increase(tmp_path, garment, samples):
             writer.append(samples[1])
 
 
-def test_wrong_shape_is_told(tmp_path, garment, samples):
+def test_wrong_shape_is_told(tmp_path: Path, garment: GarmentMesh, samples: list[Sample]) -> None:
     bad = replace(samples[0], joint_position=np.zeros((5, 3)))
     with RunLogWriter(
         tmp_path / "run.h5",
@@ -288,7 +309,7 @@ def test_wrong_shape_is_told(tmp_path, garment, samples):
         assert len(log) == 1
 
 
-def _edit(path: Path, change) -> None:
+def _edit(path: Path, change: Callable[[h5py.File], None]) -> None:
     with h5py.File(path, "r+") as file:
         change(file)
 
@@ -333,7 +354,9 @@ def _wild_face(file: h5py.File) -> None:
         (_wild_face, "/garment/faces"),
     ],
 )
-def test_unusable_log_names_file_and_key(path, change, key):
+def test_unusable_log_names_file_and_key(
+    path: Path, change: Callable[[h5py.File], None], key: str
+) -> None:
     _edit(path, change)
     with pytest.raises(UserError) as error:
         RunLog.open(path)
@@ -341,7 +364,7 @@ def test_unusable_log_names_file_and_key(path, change, key):
     assert "\n" not in str(error.value)
 
 
-def test_what_is_no_log_is_refused(tmp_path):
+def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     text = tmp_path / "text.h5"
     text.write_text("no HDF5\n")
     cut = tmp_path / "cut.h5"
@@ -351,7 +374,9 @@ def test_what_is_no_log_is_refused(tmp_path):
             RunLog.open(path)
 
 
-def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, monkeypatch):
+def test_a_full_disk_ends_a_log_that_can_be_read(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Full but for what the log keeps back."""
     path = tmp_path / "run.h5"
     writer = eager_writer(path, garment)
@@ -360,7 +385,7 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
     # waits for what is being written
     writer.note("note", "")
 
-    def full(*words):
+    def full(*words: object) -> NoReturn:
         monkeypatch.setattr(log_writer, "keep_room", disk.keep_room)
         raise OSError(28, "No space left on device")
 
@@ -375,7 +400,9 @@ def test_a_full_disk_ends_a_log_that_can_be_read(tmp_path, garment, samples, mon
     assert [p.name for p in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_a_disk_without_any_room_keeps_what_was_written(tmp_path, garment, samples, monkeypatch):
+def test_a_disk_without_any_room_keeps_what_was_written(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Another one took what the log had kept back."""
     path = tmp_path / "run.h5"
     writer = eager_writer(path, garment)
@@ -383,7 +410,7 @@ def test_a_disk_without_any_room_keeps_what_was_written(tmp_path, garment, sampl
         writer.append(sample)
         writer._drain()
 
-    def full(*words):
+    def full(*words: object) -> NoReturn:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(log_writer, "keep_room", full)
@@ -441,7 +468,7 @@ for after in np.random.default_rng(0).uniform(0.1, 0.5, 6):
 """
 
 
-def test_a_disk_that_is_filled_meanwhile_does_not_crash_hdf5(tmp_path):
+def test_a_disk_that_is_filled_meanwhile_does_not_crash_hdf5(tmp_path: Path) -> None:
     """A disk of its own, filled at any moment of a write."""
     mount = f"mount -t tmpfs -o size=48m tmpfs {tmp_path}"
     alone = ["unshare", "-m", "sh", "-c"]
@@ -464,8 +491,10 @@ def test_a_disk_that_is_filled_meanwhile_does_not_crash_hdf5(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
-    def none(*_):
+def test_a_log_without_room_is_not_begun(
+    tmp_path: Path, garment: GarmentMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object) -> NoReturn:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", none)
@@ -478,9 +507,9 @@ def test_a_log_without_room_is_not_begun(tmp_path, garment, monkeypatch):
 
 
 def test_a_run_for_which_there_is_no_room_costs_nothing_of_the_one_before(
-    tmp_path, garment, monkeypatch
-):
-    def none(*_):
+    tmp_path: Path, garment: GarmentMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object) -> NoReturn:
         raise OSError(28, "No space left on device")
 
     before = {"run.h5": b"a log", "summary.json": b"a summary"}

@@ -11,18 +11,19 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.report.log import RunLog
 from drake_dress.report.replay import MeshcatReplay, show_replay
 from tests.report import synthetic
 
 
 @pytest.fixture
-def path(tmp_path):
+def path(tmp_path: Path) -> Path:
     garment = synthetic.coat(0.06)
     return synthetic.write(tmp_path / "run.h5", garment, synthetic.dressing(garment, count=5))
 
 
-def test_slider_chooses_the_sample(path):
+def test_slider_chooses_the_sample(path: Path) -> None:
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     with RunLog.open(path) as log:
         replay = MeshcatReplay(meshcat, log)
@@ -36,13 +37,13 @@ def test_slider_chooses_the_sample(path):
         assert not _draws(meshcat, log.garment_position(0))
 
 
-def _draws(meshcat, position):
+def _draws(meshcat: Meshcat, position: FloatArray) -> bool:
     # Meshcat sends vertices as float32.
     packed = meshcat._GetPackedObject("dressing/garment/outside")
     return position.astype("<f4").tobytes() in packed
 
 
-def test_interrupt_ends_the_replay_well(path):
+def test_interrupt_ends_the_replay_well(path: Path) -> None:
     root = Path(__file__).resolve().parents[2]
     script = (
         "import sys; from drake_dress.report.replay import show_replay;"
@@ -58,6 +59,6 @@ def test_interrupt_ends_the_replay_well(path):
     process.stdout.close()
 
 
-def test_missing_log_is_told(tmp_path):
+def test_missing_log_is_told(tmp_path: Path) -> None:
     with pytest.raises(UserError):
         show_replay(tmp_path / "absent.h5")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +13,13 @@ import pytest
 from drake_dress.errors import UserError
 from drake_dress.report.log import RunLog
 from drake_dress.report.replay_html import _encode, _frames, write_replay_html
+from tests.present import present
 from tests.report import synthetic
 from tests.report.browser import needs_chromium, screenshot
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("replay")
     garment = synthetic.coat(0.05)
     path = synthetic.write(folder / "run.h5", garment, synthetic.dressing(garment))
@@ -26,7 +28,7 @@ def page(tmp_path_factory):
     return folder / "replay.html"
 
 
-def test_nothing_is_loaded_from_elsewhere(page):
+def test_nothing_is_loaded_from_elsewhere(page: Path) -> None:
     text = page.read_text()
     assert not re.search(r"https?://|src=|@import|<link", text)
     assert "@positions@" not in text
@@ -34,7 +36,7 @@ def test_nothing_is_loaded_from_elsewhere(page):
 
 
 @needs_chromium
-def test_garment_moves_and_the_rest_stays(page, tmp_path):
+def test_garment_moves_and_the_rest_stays(page: Path, tmp_path: Path) -> None:
     first = screenshot(f"{page.as_uri()}#t=0", tmp_path, "first")
     again = screenshot(f"{page.as_uri()}#t=0", tmp_path, "again")
     later = screenshot(f"{page.as_uri()}#t=10", tmp_path, "later")
@@ -57,7 +59,7 @@ def test_garment_moves_and_the_rest_stays(page, tmp_path):
 
 
 @needs_chromium
-def test_plays_by_itself(page, tmp_path):
+def test_plays_by_itself(page: Path, tmp_path: Path) -> None:
     opened = screenshot(f"{page.as_uri()}#t=0", tmp_path, "opened")
     playing = screenshot(page.as_uri(), tmp_path, "playing")
     moved = np.abs(opened - playing).max(axis=2) > 0.1
@@ -65,7 +67,7 @@ def test_plays_by_itself(page, tmp_path):
     assert moved[170:530].mean() > 1e-3
 
 
-def test_encoding_is_undone_exactly():
+def test_encoding_is_undone_exactly() -> None:
     steps = np.random.default_rng(0).integers(0, 65001, size=(4, 5, 3))
     raw = np.frombuffer(zlib.decompress(base64.b64decode(_encode(steps))), dtype=np.uint8)
     half = len(raw) // 2
@@ -75,7 +77,7 @@ def test_encoding_is_undone_exactly():
     np.testing.assert_array_equal(decoded.transpose(0, 2, 1), steps)
 
 
-def test_frames_keep_first_and_last():
+def test_frames_keep_first_and_last() -> None:
     time = np.arange(0.0, 2.0, 0.013)
     frames = _frames(time, 15.0)
     assert frames[0] == 0
@@ -85,21 +87,21 @@ def test_frames_keep_first_and_last():
     assert _frames(time[:1], 15.0).tolist() == [0]
 
 
-def test_size_is_kept_below_its_limit(page, tmp_path):
+def test_size_is_kept_below_its_limit(page: Path, tmp_path: Path) -> None:
     limit = page.stat().st_size - 2_000
     with RunLog.open(page.parent / "run.h5") as log:
         write_replay_html(log, tmp_path / "small.html", max_bytes=limit)
     assert (tmp_path / "small.html").stat().st_size <= limit
 
 
-def test_long_logs_have_fewer_frames_a_second(page, tmp_path):
+def test_long_logs_have_fewer_frames_a_second(page: Path, tmp_path: Path) -> None:
     """Half of them, and half of that, until as many are left as may be."""
 
-    def count(**limits):
+    def count(**limits: int) -> tuple[int, int]:
         with RunLog.open(page.parent / "run.h5") as log:
             write_replay_html(log, tmp_path / "some.html", **limits)
             meta = re.search(r'"frames": (\d+)', (tmp_path / "some.html").read_text())
-            return int(meta.group(1)), len(log.rest_position)
+            return int(present(meta).group(1)), len(log.rest_position)
 
     every, nodes = count()
     few, _ = count(max_nodes=every * nodes // 3)
@@ -107,7 +109,7 @@ def test_long_logs_have_fewer_frames_a_second(page, tmp_path):
     assert count(max_nodes=1)[0] >= 1
 
 
-def test_empty_log_is_refused(tmp_path):
+def test_empty_log_is_refused(tmp_path: Path) -> None:
     path = synthetic.write(tmp_path / "run.h5", synthetic.coat(0.06), [])
     with RunLog.open(path) as log, pytest.raises(UserError):
         write_replay_html(log, tmp_path / "replay.html")

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.models.control.safety import Verdict
 from drake_dress.report.log import RunLog
+from drake_dress.report.log_writer import Sample
 from drake_dress.report.report_html import write_report
 from drake_dress.report.summary import summarize, write_summary
 from tests.report import synthetic
 
 
-def _run(folder, samples):
+def _run(folder: Path, samples: list[Sample]) -> str:
     path = synthetic.write(folder / "run.h5", synthetic.coat(0.06), samples)
     with RunLog.open(path) as log:
         write_summary(summarize(log, wall_time=5.0), folder / "summary.json")
     return write_report(folder).read_text()
 
 
-def test_report_of_a_success_shows_course_and_pictures(tmp_path):
+def test_report_of_a_success_shows_course_and_pictures(tmp_path: Path) -> None:
     text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06), travel=0.0))
     assert "Both sleeves are on" in text
     assert text.count("data:image/svg+xml") == 6
@@ -31,13 +33,13 @@ def test_report_of_a_success_shows_course_and_pictures(tmp_path):
     assert "http" not in re.sub(r"base64,[^\"]*", "", text)
 
 
-def test_report_of_a_failure_says_the_reason(tmp_path):
+def test_report_of_a_failure_says_the_reason(tmp_path: Path) -> None:
     text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06), beside=True))
     assert "The dressing failed" in text
     assert "left arm outside the sleeve: linking number 0" in text
 
 
-def test_report_tells_what_safety_cut_and_only_then(tmp_path):
+def test_report_tells_what_safety_cut_and_only_then(tmp_path: Path) -> None:
     samples = synthetic.dressing(synthetic.coat(0.06), travel=0.0)
     assert "safety governor" not in _run(tmp_path, samples)
     samples[3] = replace(samples[3], safety=[0, int(Verdict.FORCE | Verdict.STOPPED)])
@@ -45,17 +47,17 @@ def test_report_tells_what_safety_cut_and_only_then(tmp_path):
     assert "cut by the safety governor. right: force 0.5 s, stopped 0.5 s." in text
 
 
-def test_insertion_of_each_sleeve_is_pictured(tmp_path):
+def test_insertion_of_each_sleeve_is_pictured(tmp_path: Path) -> None:
     text = _run(tmp_path, synthetic.dressing(synthetic.coat(0.06)))
     assert "insertion of the first sleeve" in text
     assert "insertion of the second sleeve" in text
 
 
-def test_empty_run_has_a_report(tmp_path):
+def test_empty_run_has_a_report(tmp_path: Path) -> None:
     assert "nothing was logged" in _run(tmp_path, [])
 
 
-def test_missing_or_broken_summary_is_told(tmp_path):
+def test_missing_or_broken_summary_is_told(tmp_path: Path) -> None:
     synthetic.write(tmp_path / "run.h5", synthetic.coat(0.06), [])
     with pytest.raises(UserError):
         write_report(tmp_path)

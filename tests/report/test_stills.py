@@ -22,7 +22,7 @@ def _picture(offset: float) -> np.ndarray:
     ).astype(float)
 
 
-def test_coat_is_where_it_is():
+def test_coat_is_where_it_is() -> None:
     left, right = _picture(0.4), _picture(-0.4)
 
     def middle(picture: np.ndarray) -> float:
@@ -34,14 +34,14 @@ def test_coat_is_where_it_is():
     assert middle(left) > middle(right) + 40.0
 
 
-def test_person_is_skin_coloured_and_background_light():
+def test_person_is_skin_coloured_and_background_light() -> None:
     picture = _picture(0.0)
     skin = (picture[:, :, 0] > picture[:, :, 2] + 40.0) & (picture[:, :, 0] > 120.0)
     assert skin.mean() > 0.005
     assert picture[:20].mean() > 220.0
 
 
-def test_normals_of_a_flat_sheet_are_its_normal():
+def test_normals_of_a_flat_sheet_are_its_normal() -> None:
     x = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
     np.testing.assert_allclose(node_normals(faces, x), np.tile([0.0, 0.0, 1.0], (4, 1)))

@@ -25,7 +25,7 @@ def draped_station(**changes: Any) -> SimulatedStation:
 def draped(**changes: Any) -> StationParameters:
     """Returns its parameters."""
     pose = ArmPose(np.deg2rad(40.0), np.deg2rad(40.0), 0.0, np.deg2rad(10.0))
-    values = {
+    values: dict[str, Any] = {
         "mesh": make_coat(CoatParameters(), 0.05),
         "material": Material(stretch_stiffness=300.0),
         "time_step": H,

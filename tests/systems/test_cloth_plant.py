@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.station import Station
+from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.cloth.contact.detection import find_proximity
 from tests.systems.draped import H, draped_station
 
@@ -14,12 +14,14 @@ from tests.systems.draped import H, draped_station
     params=[("implicit", False), ("implicit", True), ("projective_dynamics", False)],
     ids=["implicit", "layered", "projective"],
 )
-def station(request: pytest.FixtureRequest) -> Station:
+def station(request: pytest.FixtureRequest) -> SimulatedStation:
     integrator, layered = request.param
     return draped_station(integrator=integrator, self_collision=layered)
 
 
-def test_forces_on_grippers_and_person_are_what_moves_the_garment(station: Station) -> None:
+def test_forces_on_grippers_and_person_are_what_moves_the_garment(
+    station: SimulatedStation,
+) -> None:
     simulator = Simulator(station.diagram)
     context = simulator.get_mutable_context()
     for i, side in enumerate(("left", "right")):
@@ -49,7 +51,7 @@ def test_forces_on_grippers_and_person_are_what_moves_the_garment(station: Stati
     assert np.linalg.norm(missing) < 0.01 * np.linalg.norm(weight) * 240 * H
 
 
-def test_garment_moves_the_arms(station: Station, request: pytest.FixtureRequest) -> None:
+def test_garment_moves_the_arms(station: SimulatedStation, request: pytest.FixtureRequest) -> None:
     if "projective" in request.node.name:
         pytest.skip("contact at nodes only: a mesh of 5 cm hardly touches an arm")
     simulator = Simulator(station.diagram)
@@ -94,7 +96,9 @@ def test_an_arm_is_pushed_by_what_a_gripper_holds_and_not_passed_through() -> No
 
 
 @pytest.mark.parametrize("speed", [30.0, np.nan])
-def test_a_garment_that_moves_as_none_does_ends_the_run(station: Station, speed: float) -> None:
+def test_a_garment_that_moves_as_none_does_ends_the_run(
+    station: SimulatedStation, speed: float
+) -> None:
     context = station.diagram.CreateDefaultContext()
     assert station.fault(context) is None
     velocity = station.cloth.GetMyMutableContextFromRoot(context).get_mutable_discrete_state(1)

@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, System
 
 from drake_dress.diagrams.station import SimulatedStation
-from drake_dress.models.control.policy import PolicyParameters
+from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.systems.global_mpc import GlobalMpc
 from tests.systems.draped import H, draped_station
 
@@ -93,7 +93,7 @@ def _garment(station: SimulatedStation, context: Context) -> np.ndarray:
 
 
 @dataclass
-class _Policy:
+class _Policy(DressingPolicy):
     """Asks for what it sees, and for what it has seen before."""
 
     parameters: PolicyParameters = PolicyParameters(time_step=0.1, horizon=8)
@@ -102,13 +102,15 @@ class _Policy:
     def initial_state(self) -> Any:
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)), before=0.0)
 
-    def decide(self, memory: Any, x: Any, v: Any, joints: Any, now: float, steps: float) -> Any:
+    def decide(
+        self, state: Any, x: Any, v: Any, joints: Any, time: float, elapsed_steps: float = 5.0
+    ) -> Any:
         n = self.parameters.horizon
         if x[0, 0] < 0.0:
             raise ValueError("the garment is gone")
-        asked = 0.5 * memory.before + x[0, 0] + 10.0 * now + 100.0 * steps
+        asked = 0.5 * state.before + x[0, 0] + 10.0 * time + 100.0 * elapsed_steps
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), asked), armhole=np.zeros((n, 2, 3)))
-        after = SimpleNamespace(stages=memory.stages, before=asked)
+        after = SimpleNamespace(stages=state.stages, before=asked)
         return after, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
 
 

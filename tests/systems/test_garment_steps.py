@@ -56,7 +56,9 @@ def copied(state: ClothState) -> ClothState:
 
 def test_surroundings_stand_in_one_array() -> None:
     rng = np.random.default_rng(2)
-    bodies = Obstacles(*rng.normal(size=(2, 3, 3)), np.ones(3), *rng.normal(size=(2, 3, 3)))
+    a, b = rng.normal(size=(2, 3, 3))
+    velocity, angular_velocity = rng.normal(size=(2, 3, 3))
+    bodies = Obstacles(a, b, np.ones(3), velocity, angular_velocity)
     velocity = rng.normal(size=(5, 3))
     around = Surroundings(bodies.radius, 5)
     flat = around.flat(bodies, velocity)
@@ -177,7 +179,9 @@ def test_a_station_does_the_same_either_way() -> None:
     try:
         _, there = advanced(made)
     finally:
-        made.cloth._steps._process.kill()
+        steps = made.cloth._steps
+        assert isinstance(steps, StepsBeside)
+        steps._process.kill()
     _, here = advanced(draped_station(beside=False))
     np.testing.assert_array_equal(there, here)
 

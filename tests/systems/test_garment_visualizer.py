@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
@@ -9,22 +12,24 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from tests.report import synthetic
 from tests.report.browser import live_screenshot, needs_chromium
 
 
 @pytest.fixture
-def meshcat():
+def meshcat() -> Meshcat:
     return Meshcat(MeshcatParams(host="localhost"))
 
 
 @pytest.fixture
-def garment():
+def garment() -> GarmentMesh:
     return synthetic.coat(0.05)
 
 
-def _publisher(meshcat, garment):
+def _publisher(meshcat: Meshcat, garment: GarmentMesh) -> Callable[..., FloatArray]:
     system = GarmentVisualizer(meshcat, garment.faces, len(garment.rest_position))
     context = system.CreateDefaultContext()
 
@@ -41,7 +46,7 @@ def _publisher(meshcat, garment):
     return publish
 
 
-def test_garment_grippers_and_targets_are_drawn(meshcat, garment):
+def test_garment_grippers_and_targets_are_drawn(meshcat: Meshcat, garment: GarmentMesh) -> None:
     publish = _publisher(meshcat, garment)
     publish(0.0, target=0.3)
     for path in ("garment/outside", "garment/lining", "gripper/left", "target/right"):
@@ -51,7 +56,7 @@ def test_garment_grippers_and_targets_are_drawn(meshcat, garment):
     assert position.astype("<f4").tobytes() in packed
 
 
-def test_stage_is_written_and_follows(meshcat, garment):
+def test_stage_is_written_and_follows(meshcat: Meshcat, garment: GarmentMesh) -> None:
     publish = _publisher(meshcat, garment)
     publish(0.0, stage=(0, 1))
     first = meshcat._GetPackedObject("dressing/stage/front")
@@ -61,7 +66,7 @@ def test_stage_is_written_and_follows(meshcat, garment):
     assert meshcat._GetPackedObject("dressing/stage/front") != first
 
 
-def test_garment_alone_suffices(meshcat, garment):
+def test_garment_alone_suffices(meshcat: Meshcat, garment: GarmentMesh) -> None:
     builder = DiagramBuilder()
     position = garment.rest_position.ravel()
     source = builder.AddSystem(ConstantVectorSource(position))
@@ -73,7 +78,9 @@ def test_garment_alone_suffices(meshcat, garment):
 
 
 @needs_chromium
-def test_live_page_shows_the_garment_move(meshcat, garment, tmp_path):
+def test_live_page_shows_the_garment_move(
+    meshcat: Meshcat, garment: GarmentMesh, tmp_path: Path
+) -> None:
     publish = _publisher(meshcat, garment)
     meshcat.SetCameraPose([1.9, 0.0, 1.3], [0.0, 0.0, 1.1])
     meshcat.SetProperty("/Background", "top_color", [1.0, 1.0, 1.0])

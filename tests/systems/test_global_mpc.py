@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
 from dataclasses import dataclass, field
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.models.control.local_control import GlobalPlan
-from drake_dress.models.control.policy import PolicyParameters
+from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.systems.global_mpc import GlobalMpc
 
 pytestmark = pytest.mark.alone
@@ -23,7 +23,7 @@ _PERIOD, _DELAY, _FAILS = 0.5, 0.2, 0.9
 
 
 @dataclass
-class _Policy:
+class _Policy(DressingPolicy):
     """Asks for motion, and stops to do so at a time."""
 
     ends: str
@@ -34,16 +34,18 @@ class _Policy:
     def initial_state(self) -> Any:
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
 
-    def decide(self, memory: Any, x: Any, v: Any, joints: Any, now: float, steps: float) -> Any:
+    def decide(
+        self, state: Any, x: Any, v: Any, joints: Any, time: float, elapsed_steps: float = 5.0
+    ) -> Any:
         n = self.parameters.horizon
-        if now > _FAILS:
+        if time > _FAILS:
             if self.ends == "raises":
                 raise ValueError("the garment is gone")
             if self.ends == "dies":
                 os._exit(3)
-            time.sleep({"hangs": 600.0, "is late": 1.3}[self.ends])
+            sleep({"hangs": 600.0, "is late": 1.3}[self.ends])
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), 0.1), armhole=np.zeros((n, 2, 3)))
-        return memory, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
+        return state, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
 
 
 def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:

@@ -5,7 +5,11 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
-from drake_dress.models.human.prediction import ConstantVelocityPredictor, StillPredictor
+from drake_dress.models.human.prediction import (
+    ConstantVelocityPredictor,
+    MotionPredictor,
+    StillPredictor,
+)
 from drake_dress.systems.human_predictor import HumanPredictor
 
 VELOCITY = np.array([0.1, -0.2, 0.05])
@@ -27,7 +31,9 @@ class Carried(LeafSystem):
         output.SetFromVector(joints.ravel())
 
 
-def predicted(predictor, time: float, step: float, steps: int, since: float = 0.0) -> np.ndarray:
+def predicted(
+    predictor: MotionPredictor, time: float, step: float, steps: int, since: float = 0.0
+) -> np.ndarray:
     builder = DiagramBuilder()
     source = builder.AddSystem(Carried(since))
     system = builder.AddSystem(HumanPredictor(predictor, step, steps))

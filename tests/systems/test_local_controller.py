@@ -9,6 +9,7 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.models.control.local_control import GlobalPlan, LocalController
 from drake_dress.models.control.local_model import LocalParameters
+from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.stages import SleeveFacts, Task
@@ -27,11 +28,11 @@ def controller() -> LocalController:
     return LocalController(planner, LocalParameters())
 
 
-def simulator(  # type: ignore[no-untyped-def]
+def simulator(
     controller: LocalController, feedback: bool = True, beside: bool = False
-):
+) -> tuple[LocalCompensation, Simulator, list[LocalProblem]]:
     """Returns a simulator of the system alone: a coat behind a person, and a plan to rest."""
-    problems: list = []
+    problems: list[LocalProblem] = []
     system = LocalCompensation(controller, PERIOD, DELAY, 0.2, 5, feedback, problems, beside)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()

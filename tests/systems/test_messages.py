@@ -251,7 +251,8 @@ def test_points_go_from_sender_to_receiver() -> None:
     [("stale", 0), ("bus_lost", 0), ("malformed", 5), ("nan", 5), ("time_back", 5)],
 )
 def test_an_outbox_spoils_what_it_sends_while_a_fault_is_on(kind: str, expected: int) -> None:
-    lcm, heard = DrakeLcm("memq://"), []
+    lcm = DrakeLcm("memq://")
+    heard: list[bytes] = []
     lcm.Subscribe("G", heard.append)
     builder = DiagramBuilder()
     sender = builder.AddSystem(PointSender(2, False))

@@ -33,12 +33,10 @@ def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
 
 def typed(source: str, key: str, value: Any, schema: Any) -> Any:
     """Holds a value read from YAML against a type; returns it, numbers as numbers."""
+    if value is None and _takes_none(schema):
+        return None
+    schema = _without_none(schema)
     origin = typing.get_origin(schema)
-    if origin in (typing.Union, types.UnionType):
-        if value is None:
-            return None
-        schema = _without_none(schema)
-        origin = typing.get_origin(schema)
     if dataclasses.is_dataclass(schema):
         if not isinstance(value, dict):
             raise UserError(source, key, f"is {kind_of(value)}, expected keys with values")
@@ -57,6 +55,12 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
             raise UserError(source, key, f"is {kind_of(value)}, expected a list")
         below = typing.get_args(schema)[0]
         return [typed(source, f"{key}[{i}]", item, below) for i, item in enumerate(value)]
+    _check_plain(source, key, value, schema)
+    return value
+
+
+def _check_plain(source: str, key: str, value: Any, schema: Any) -> None:
+    """Holds a number or a text against its type."""
     if schema is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise UserError(source, key, f"is {kind_of(value)}, expected a number")
@@ -69,7 +73,6 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
             raise UserError(source, key, f"is {kind_of(value)}, expected {' or '.join(choices)}")
         if not isinstance(value, str):
             raise UserError(source, key, f"is {kind_of(value)}, expected text")
-    return value
 
 
 def check_ranges(source: str, key: str, value: Any) -> None:
@@ -92,8 +95,12 @@ def check_ranges(source: str, key: str, value: Any) -> None:
             raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
 
 
+def _takes_none(schema: Any) -> bool:
+    return typing.get_origin(schema) in (typing.Union, types.UnionType)
+
+
 def _without_none(schema: Any) -> Any:
-    if typing.get_origin(schema) in (typing.Union, types.UnionType):
+    if _takes_none(schema):
         return next(t for t in typing.get_args(schema) if t is not type(None))
     return schema
 

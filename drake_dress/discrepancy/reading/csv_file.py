@@ -64,11 +64,8 @@ def read_csv(path: Path) -> list[RawRecording]:
         order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints, "joint")
         labels[JOINTS] = JOINT_NAMES
         arrays[JOINTS] = arrays[JOINTS][:, order]
-    beside = path.with_suffix(".markers.csv")
-    if beside.is_file() and MARKERS in arrays:
-        arrays[PLACES] = _places(beside, labels[MARKERS])
-    elif MARKERS in arrays:
-        raise UserError(str(beside), "", "no such file, expected columns marker, x, y, z")
+    if MARKERS in arrays:
+        arrays[PLACES] = _places(path.with_suffix(".markers.csv"), labels[MARKERS])
     unused = [h for h in header if h and h not in used]
     stems = tuple(dict.fromkeys(h.rsplit("/", 1)[0] if "/" in h else h for h in unused))
     return [RawRecording(source, "", "", arrays, {}, labels, stems, tuple(unused_note(unused)))]
@@ -96,6 +93,8 @@ def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
 def _places(path: Path, wanted: tuple[str, ...]) -> FloatArray:
     """Returns (m,3) where the markers sit, in the order of the labels wanted, m."""
     source = str(path)
+    if not path.is_file():
+        raise UserError(source, "", "no such file, expected columns marker, x, y, z")
     header, rows, lines = read_table(path)
     for name in ("marker", "x", "y", "z"):
         if name not in header:

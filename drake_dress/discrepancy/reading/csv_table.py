@@ -51,15 +51,20 @@ def read_table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
     if len(rows) < 2:
         raise UserError(source, "", "is empty, expected a header and a row a sample")
     header = [h.strip().lstrip("/") for h in rows[0]]
+    _check_shape(source, header, rows[1:], lines[1:])
+    return header, rows[1:], lines[1:]
+
+
+def _check_shape(source: str, header: list[str], rows: list[list[str]], lines: list[int]) -> None:
+    """Refuses columns of one name, and rows that are not as long as the header."""
     for k, name in enumerate(header):
         if name and name in header[:k]:
             raise UserError(source, name, "column stands twice, expected each name once")
-    for row, line in zip(rows[1:], lines[1:], strict=True):
+    for row, line in zip(rows, lines, strict=True):
         if len(row) != len(header):
             raise UserError(
                 source, f"line {line}", f"has {len(row)} values, expected {len(header)}"
             )
-    return header, rows[1:], lines[1:]
 
 
 def numbers(

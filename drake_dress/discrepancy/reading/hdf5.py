@@ -88,14 +88,8 @@ def _recording(
     labels: dict[str, tuple[str, ...]] = {}
     used = set()
     for name in (*UNITS, MARKER_NAMES):
-        # what does not change between recordings may stand once, at the root
-        key = next((k for k in (group + name, name) if k in content), None)
+        key = _key_of(source, file, content, group, name)
         if key is None:
-            near = next((k for k in content if (group + name).startswith(k + "/")), None)
-            if near is not None and content[near] is None:
-                raise UserError(source, near, "is a link that leads nowhere, expected a group")
-            if group and isinstance(file.get(group + name), h5py.Group):
-                raise UserError(source, group + name, "is a group, expected a dataset")
             continue
         data = content[key]
         if data is None:
@@ -106,13 +100,7 @@ def _recording(
             continue
         arrays[name] = _read(source, key, data)
         attributes = _attributes(source, key, data)
-        for unit in ("unit", "units"):
-            if unit in attributes:
-                check_unit(source, key, name, _text(attributes[unit]))
-        frame = _text(attributes.get("frame", "")).strip().lower()
-        expected = _FRAMES.get(name, "world")
-        if frame not in ("", expected, expected[0]):
-            raise UserError(source, key, f"is in the frame {frame!r}, expected {expected}")
+        _check_meaning(source, key, name, attributes)
         if "noise_std" in attributes:
             noise[name], note = noise_std(source, key, attributes["noise_std"])
             notes += [note] if note else []
@@ -135,6 +123,37 @@ def _recording(
         (*names, *others),
         (*notes, *unused_note(unused)),
     )
+
+
+def _key_of(
+    source: str,
+    file: h5py.File,
+    content: dict[str, h5py.Dataset | None],
+    group: str,
+    name: str,
+) -> str | None:
+    """Returns where a dataset of a recording stands; None where there is none."""
+    # what does not change between recordings may stand once, at the root
+    key = next((k for k in (group + name, name) if k in content), None)
+    if key is not None:
+        return key
+    near = next((k for k in content if (group + name).startswith(k + "/")), None)
+    if near is not None and content[near] is None:
+        raise UserError(source, near, "is a link that leads nowhere, expected a group")
+    if group and isinstance(file.get(group + name), h5py.Group):
+        raise UserError(source, group + name, "is a group, expected a dataset")
+    return None
+
+
+def _check_meaning(source: str, key: str, name: str, attributes: dict[str, Any]) -> None:
+    """Refuses another unit or frame than that of the layout."""
+    for unit in ("unit", "units"):
+        if unit in attributes:
+            check_unit(source, key, name, _text(attributes[unit]))
+    frame = _text(attributes.get("frame", "")).strip().lower()
+    expected = _FRAMES.get(name, "world")
+    if frame not in ("", expected, expected[0]):
+        raise UserError(source, key, f"is in the frame {frame!r}, expected {expected}")
 
 
 def _read(source: str, key: str, data: h5py.Dataset) -> np.ndarray:

@@ -34,6 +34,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
@@ -197,7 +198,7 @@ class ExplicitBiasCloth:
         elements: Elements,
         material: Material,
         time_step: float,
-        held: IntArray,
+        held: npt.NDArray[np.integer],
         gravity: FloatArray = GRAVITY,
         tolerance: float = 1e-4,
         iterations: int = 1,

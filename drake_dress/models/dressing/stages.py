@@ -199,11 +199,34 @@ def advance_stages(
         state = replace(state, first=_choose_first(facts, parameters))
     if on_arm[1 - state.first] and not on_arm[state.first]:
         state = replace(state, first=1 - state.first)
+    if all(stage == Stage.DONE for stage in state.stage):
+        return state, (Task.HOLD, Task.HOLD)
+    tasks = _tasks(state, facts, on_arm, parameters, target_distance)
+    if tasks[1 - state.first] == Task.REST and not any(on_arm):
+        # its time to be prepared in, after which it counts as having missed its hand, has not begun
+        state = _with(state, 1 - state.first, since=time)
+    return state, tasks
+
+
+def _tasks(
+    state: StageState,
+    facts: tuple[SleeveFacts, SleeveFacts],
+    on_arm: list[bool],
+    parameters: StageParameters,
+    target_distance: float,
+) -> tuple[Task, Task]:
+    """Returns the tasks of left and right sleeve, of which not both are done.
+
+    Args:
+        state: stages, with the sleeve that goes first.
+        facts: of left and right sleeve.
+        on_arm: of each, whether it is on its arm.
+        parameters: thresholds.
+        target_distance: between where both sleeves would be if they were treated apart, m.
+    """
     n = state.first
     f = 1 - n
     tasks = [Task.REST, Task.REST]
-    if all(stage == Stage.DONE for stage in state.stage):
-        return state, (Task.HOLD, Task.HOLD)
     if all(on_arm) or target_distance < parameters.reach:
         for side in (0, 1):
             tasks[side] = Task.PREPARE if state.stage[side] == Stage.PREPARE else Task.DRESS
@@ -215,10 +238,7 @@ def advance_stages(
         tasks[n] = Task.WAIT
         if facts[n].s >= 0.6 * parameters.waiting_progress:
             tasks[f] = Task.PREPARE if state.stage[f] == Stage.PREPARE else Task.DRESS
-    if tasks[f] == Task.REST and not any(on_arm):
-        # its time to be prepared in, after which it counts as having missed its hand, has not begun
-        state = _with(state, f, since=time)
-    return state, (tasks[0], tasks[1])
+    return tasks[0], tasks[1]
 
 
 def look(

@@ -1,11 +1,17 @@
 """CSV in the dialects of spreadsheets, and markers that are matched by their numbers."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.discrepancy.recording import Recording
 from drake_dress.errors import UserError
 from tests.discrepancy.hanging import DENSITY, MESH, arrays, csv_text, hanging, places_text
+
+Read = Callable[..., Recording]
 
 SOUND = arrays(hanging(np.random.default_rng(0), duration=0.6, markers=8))
 PLACES = SOUND["garment/marker_rest_position"]
@@ -13,13 +19,13 @@ TEXT = csv_text(SOUND)
 LINES = TEXT.splitlines(keepends=True)
 
 
-def comma(value):
+def comma(value: float) -> str:
     return repr(value).replace(".", ",")
 
 
 @pytest.fixture
-def read(tmp_path):
-    def run(content, places=None):
+def read(tmp_path: Path) -> Read:
+    def run(content: str | bytes, places: str | bytes | None = None) -> Recording:
         places = places_text(PLACES) if places is None else places
         for name, value in (("lab.csv", content), ("lab.markers.csv", places)):
             (tmp_path / name).write_bytes(value if isinstance(value, bytes) else value.encode())
@@ -29,7 +35,7 @@ def read(tmp_path):
     return run
 
 
-def assert_sound(found):
+def assert_sound(found: Recording) -> None:
     np.testing.assert_array_equal(found.time, SOUND["time"])
     np.testing.assert_array_equal(found.marker_position, SOUND["garment/marker_position"])
     np.testing.assert_array_equal(found.marker_rest_position, PLACES)
@@ -56,11 +62,11 @@ DIALECTS = {
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_dialects_say_the_same(read, dialect):
+def test_dialects_say_the_same(read: Read, dialect: str) -> None:
     assert_sound(read(DIALECTS[dialect]))
 
 
-def with_cell(text):
+def with_cell(text: str) -> str:
     return LINES[0] + LINES[1].replace("0.0", text, 1) + "".join(LINES[2:])
 
 
@@ -96,7 +102,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_is_no_table_of_numbers_is_refused(read, tmp_path, case):
+def test_what_is_no_table_of_numbers_is_refused(read: Read, tmp_path: Path, case: str) -> None:
     content, words = BAD[case]
     with pytest.raises(UserError) as error:
         read(content)
@@ -116,7 +122,7 @@ NUMBERS = {
 
 
 @pytest.mark.parametrize("case", NUMBERS)
-def test_numbers_of_markers_are_those_of_the_columns(read, tmp_path, case):
+def test_numbers_of_markers_are_those_of_the_columns(read: Read, tmp_path: Path, case: str) -> None:
     numbers, word = NUMBERS[case]
     with pytest.raises(UserError) as error:
         read(TEXT, places_text(PLACES, numbers))
@@ -126,20 +132,20 @@ def test_numbers_of_markers_are_those_of_the_columns(read, tmp_path, case):
 
 
 @pytest.mark.parametrize("places", ["", "marker,x,y,z\n", places_text(PLACES[:-1]), b"\xff\xfe\0"])
-def test_places_that_lack_are_told(read, tmp_path, places):
+def test_places_that_lack_are_told(read: Read, tmp_path: Path, places: str | bytes) -> None:
     with pytest.raises(UserError) as error:
         read(TEXT, places)
     assert str(tmp_path / "lab.markers.csv") in str(error.value)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_order_of_places_says_nothing(read, seed):
+def test_the_order_of_places_says_nothing(read: Read, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(8)
     assert_sound(read(TEXT, places_text(PLACES[order], order)))
 
 
-def test_markers_may_have_names_and_begin_at_any_number(read):
-    def renamed(name):
+def test_markers_may_have_names_and_begin_at_any_number(read: Read) -> None:
+    def renamed(name: Callable[[int], str]) -> str:
         text = TEXT
         for k in reversed(range(8)):
             text = text.replace(f"marker_position/{k}/", f"marker_position/{name(k)}/")

@@ -2,6 +2,9 @@
 
 import io
 import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -11,26 +14,26 @@ from hypothesis import strategies as st
 
 from drake_dress.discrepancy.reading import read_recordings
 from drake_dress.errors import UserError
-from tests.discrepancy.hanging import DENSITY, MESH, arrays, hanging, write_hdf5
+from tests.discrepancy.hanging import DENSITY, MESH, Datasets, arrays, hanging, write_hdf5
 
 MARKERS = "garment/marker_position"
 
 
 @pytest.fixture(scope="module")
-def sound():
+def sound() -> Datasets:
     return arrays(hanging(np.random.default_rng(0), duration=1.0, markers=8))
 
 
 @pytest.fixture(scope="module")
-def whole(sound, tmp_path_factory):
+def whole(sound: Datasets, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """The bytes of a sound file of each kind."""
     directory = tmp_path_factory.mktemp("whole")
     write_hdf5(directory / "a.h5", sound)
-    np.savez_compressed(directory / "a.npz", **sound)
+    np.savez_compressed(directory / "a.npz", **dict[str, Any](sound))
     return {kind: (directory / f"a.{kind}").read_bytes() for kind in ("h5", "npz")}
 
 
-def refusal(path):
+def refusal(path: Path) -> str:
     with pytest.raises(UserError) as error:
         read_recordings([path], MESH, DENSITY)
     text = str(error.value)
@@ -42,7 +45,12 @@ def refusal(path):
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 @given(data=st.data())
 @settings(max_examples=40)
-def test_flipped_and_missing_bytes_are_told_or_do_no_harm(whole, tmp_path_factory, kind, data):
+def test_flipped_and_missing_bytes_are_told_or_do_no_harm(
+    whole: dict[str, bytes],
+    tmp_path_factory: pytest.TempPathFactory,
+    kind: str,
+    data: st.DataObject,
+) -> None:
     content = bytearray(whole[kind])
     begin = data.draw(st.integers(0, len(content) - 1))
     for k in range(begin, min(begin + data.draw(st.integers(1, 300)), len(content))):
@@ -62,13 +70,15 @@ def test_flipped_and_missing_bytes_are_told_or_do_no_harm(whole, tmp_path_factor
 
 @pytest.mark.parametrize("kind", ["h5", "npz"])
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
-def test_a_file_that_is_cut_short_is_refused(whole, tmp_path, kind, share):
+def test_a_file_that_is_cut_short_is_refused(
+    whole: dict[str, bytes], tmp_path: Path, kind: str, share: float
+) -> None:
     path = tmp_path / f"lab.{kind}"
     path.write_bytes(whole[kind][: int(share * len(whole[kind]))])
     refusal(path)
 
 
-def damaged_chunk(file):
+def damaged_chunk(file: h5py.File) -> None:
     offset = file[MARKERS].id.get_chunk_info(0).byte_offset
     name = file.filename
     file.close()
@@ -77,7 +87,7 @@ def damaged_chunk(file):
         raw.write(b"\xff" * 40)
 
 
-def blosc(file):
+def blosc(file: h5py.File) -> None:
     shape = file[MARKERS].shape
     del file[MARKERS]
     plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -90,25 +100,25 @@ def blosc(file):
     data.write_direct_chunk((0, 0, 0), b"abcdefgh", 0)
 
 
-def replaced(name, value):
-    def spoil(file):
+def replaced(name: str, value: object) -> Callable[[h5py.File], None]:
+    def spoil(file: h5py.File) -> None:
         del file[name]
         file[name] = value
 
     return spoil
 
 
-def huge(file):
+def huge(file: h5py.File) -> None:
     del file[MARKERS]
     file.create_dataset(MARKERS, shape=(10**6, 10**5, 3), dtype="f8", chunks=(100, 100, 3))
 
 
-def a_group(file):
+def a_group(file: h5py.File) -> None:
     del file[MARKERS]
     file.create_group(MARKERS)
 
 
-def attribute(name, value):
+def attribute(name: str, value: object) -> Callable[[h5py.File], None]:
     return lambda file: file[MARKERS].attrs.__setitem__(name, value)
 
 
@@ -136,7 +146,9 @@ HDF5 = {
 
 
 @pytest.mark.parametrize("case", HDF5)
-def test_what_cannot_be_read_of_hdf5_names_the_dataset(sound, tmp_path, case):
+def test_what_cannot_be_read_of_hdf5_names_the_dataset(
+    sound: Datasets, tmp_path: Path, case: str
+) -> None:
     spoil, words = HDF5[case]
     path = write_hdf5(tmp_path / "lab.h5", sound)
     with h5py.File(path, "a") as file:
@@ -146,12 +158,12 @@ def test_what_cannot_be_read_of_hdf5_names_the_dataset(sound, tmp_path, case):
         assert word in text
 
 
-def an_npy(path, sound):
+def an_npy(path: Path, sound: Datasets) -> None:
     with path.open("wb") as file:
         np.save(file, np.zeros(3))
 
 
-def bomb(path, sound):
+def bomb(path: Path, sound: Datasets) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         header = io.BytesIO()
         what = {"descr": "<f8", "fortran_order": False, "shape": (10**9, 10**3)}
@@ -159,7 +171,7 @@ def bomb(path, sound):
         archive.writestr("time.npy", header.getvalue() + bytes(10**6))
 
 
-def texts(path, sound):
+def texts(path: Path, sound: Datasets) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("time.npy", "hello")
 
@@ -177,7 +189,9 @@ NPZ = {
 
 
 @pytest.mark.parametrize("case", NPZ)
-def test_what_cannot_be_read_of_npz_names_the_array(sound, tmp_path, case):
+def test_what_cannot_be_read_of_npz_names_the_array(
+    sound: Datasets, tmp_path: Path, case: str
+) -> None:
     write, words = NPZ[case]
     path = tmp_path / "lab.npz"
     write(path, sound)
@@ -186,20 +200,20 @@ def test_what_cannot_be_read_of_npz_names_the_array(sound, tmp_path, case):
         assert word in text
 
 
-def test_paths_that_are_no_files_are_refused(tmp_path):
+def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "lab.h5").mkdir()
     assert "directory" in refusal(tmp_path / "lab.h5")
     assert "no such file" in refusal(tmp_path / "none.h5")
     refusal(tmp_path / ("x" * 300 + ".h5"))
 
 
-def test_a_file_given_twice_is_refused(sound, tmp_path):
+def test_a_file_given_twice_is_refused(sound: Datasets, tmp_path: Path) -> None:
     path = write_hdf5(tmp_path / "lab.h5", sound)
     with pytest.raises(UserError, match="twice"):
         read_recordings([path, path.parent / "." / path.name], MESH)
 
 
-def test_groups_that_hold_each_other_are_read_once(sound, tmp_path):
+def test_groups_that_hold_each_other_are_read_once(sound: Datasets, tmp_path: Path) -> None:
     path = write_hdf5(tmp_path / "lab.h5", sound)
     with h5py.File(path, "a") as file:
         file["garment/again"] = file["/"]
@@ -207,7 +221,7 @@ def test_groups_that_hold_each_other_are_read_once(sound, tmp_path):
     assert read.notes == ()
 
 
-def test_recording_2_comes_before_recording_10(sound, tmp_path):
+def test_recording_2_comes_before_recording_10(sound: Datasets, tmp_path: Path) -> None:
     path = tmp_path / "lab.h5"
     with h5py.File(path, "w") as file:
         for name in ("recording_10", "recording_2"):
@@ -216,7 +230,9 @@ def test_recording_2_comes_before_recording_10(sound, tmp_path):
     assert [r.name for r in read_recordings([path], MESH)] == ["recording_2", "recording_10"]
 
 
-def test_what_is_not_used_is_told_and_what_may_be_meant_is_asked(sound, tmp_path):
+def test_what_is_not_used_is_told_and_what_may_be_meant_is_asked(
+    sound: Datasets, tmp_path: Path
+) -> None:
     more = {**sound, "arm/left/q": np.zeros((5, 7))}
     (read,) = read_recordings([write_hdf5(tmp_path / "more.h5", more)], MESH, DENSITY)
     assert read.notes == ("not used: arm/left/q",)

@@ -25,7 +25,9 @@ HIDDEN = [
 
 @pytest.mark.parametrize(("effects", "motion"), HIDDEN)
 @pytest.mark.parametrize("size", [1.5])
-def test_hidden_effects_are_read_as_they_are(tmp_path, effects, motion, size):
+def test_hidden_effects_are_read_as_they_are(
+    tmp_path: Path, effects: str, motion: str, size: float
+) -> None:
     seed = len(effects)
     hidden = draw_hidden(effects, np.random.default_rng(seed), size)
     (made,) = recordings((motion,), hidden, duration=4.0, seed=seed)

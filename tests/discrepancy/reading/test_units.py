@@ -1,11 +1,22 @@
 """Every signal is held against the others: units, rate, axes, sides and signs."""
 
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from drake_dress.discrepancy.reading import read_recordings
+from drake_dress.discrepancy.recording import Recording
 from drake_dress.errors import UserError
-from tests.discrepancy.hanging import DENSITY, MESH, arrays, hanging
+from drake_dress.models.arrays import FloatArray
+from tests.discrepancy.hanging import DENSITY, MESH, Datasets, arrays, hanging, write_npz
+
+Change = Callable[[Datasets], None]
+
+Read = Callable[..., Recording]
 
 MARKERS, PLACES = "garment/marker_position", "garment/marker_rest_position"
 JOINTS = "human/joint_position"
@@ -14,29 +25,31 @@ FORCES = [f"gripper/{side}/force" for side in ("left", "right")]
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(tmp_path: Path) -> Read:
     """Returns what is read of a recording that was changed."""
 
-    def run(change, rng=None, density=DENSITY):
+    def run(
+        change: Change, rng: np.random.Generator | None = None, density: float | None = DENSITY
+    ) -> Recording:
         datasets = arrays(hanging(rng or np.random.default_rng(1)))
         change(datasets)
-        np.savez(tmp_path / "lab.npz", **datasets)
+        write_npz(tmp_path / "lab.npz", datasets)
         (found,) = read_recordings([tmp_path / "lab.npz"], MESH, density)
         return found
 
     return run
 
 
-def scaled(names, factor):
-    def change(datasets):
+def scaled(names: Sequence[str], factor: float) -> Change:
+    def change(datasets: Datasets) -> None:
         for name in names:
             datasets[name] = datasets[name] * factor
 
     return change
 
 
-def y_up(names):
-    def change(datasets):
+def y_up(names: Sequence[str]) -> Change:
+    def change(datasets: Datasets) -> None:
         for name in names:
             x, y, z = np.moveaxis(datasets[name], -1, 0)
             datasets[name] = np.stack([x, z, -y], axis=-1)
@@ -44,24 +57,24 @@ def y_up(names):
     return change
 
 
-def mirrored(datasets):
+def mirrored(datasets: Datasets) -> None:
     for name in (MARKERS, JOINTS, *GRIPPERS):
         datasets[name] = datasets[name] * [1.0, -1.0, 1.0]
 
 
-def exchanged(datasets):
+def exchanged(datasets: Datasets) -> None:
     datasets[GRIPPERS[0]], datasets[GRIPPERS[1]] = datasets[GRIPPERS[1]], datasets[GRIPPERS[0]]
 
 
-def clock(change):
-    def changed(datasets):
+def clock(change: Callable[[FloatArray], npt.NDArray[Any]]) -> Change:
+    def changed(datasets: Datasets) -> None:
         datasets["time"] = change(datasets["time"])
 
     return changed
 
 
-def lost(name, at, value=0.0):
-    def change(datasets):
+def lost(name: str, at: int | tuple[int, int], value: float | FloatArray = 0.0) -> Change:
+    def change(datasets: Datasets) -> None:
         datasets[name][at] = value
 
     return change
@@ -104,7 +117,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_cannot_be_is_refused_with_what_it_may_be(read, case):
+def test_what_cannot_be_is_refused_with_what_it_may_be(read: Read, case: str) -> None:
     change, words = WRONG[case]
     with pytest.raises(UserError) as error:
         read(change)
@@ -113,12 +126,12 @@ def test_what_cannot_be_is_refused_with_what_it_may_be(read, case):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_is_sound_is_read_without_a_word(read, seed):
+def test_what_is_sound_is_read_without_a_word(read: Read, seed: int) -> None:
     found = read(lambda d: None, np.random.default_rng(seed), DENSITY if seed % 2 else None)
     assert found.notes == ()
 
 
-def test_a_clock_may_count_from_1970(read):
+def test_a_clock_may_count_from_1970(read: Read) -> None:
     found = read(clock(lambda t: 1.7e9 + t))
     assert found.time[0] == 0.0
     assert found.duration == pytest.approx(2.0)
@@ -127,18 +140,20 @@ def test_a_clock_may_count_from_1970(read):
 
 @pytest.mark.parametrize("share", [0.4, 2.5])
 @pytest.mark.parametrize("tilt", [-15.0, 15.0])
-def test_a_garment_may_be_lighter_or_heavier_and_the_world_not_level(read, share, tilt):
+def test_a_garment_may_be_lighter_or_heavier_and_the_world_not_level(
+    read: Read, share: float, tilt: float
+) -> None:
     c, s = np.cos(np.deg2rad(tilt)), np.sin(np.deg2rad(tilt))
 
-    def change(datasets):
+    def change(datasets: Datasets) -> None:
         for name in FORCES:
             datasets[name] = share * datasets[name] @ [[1, 0, 0], [0, c, s], [0, -s, c]]
 
     assert read(change).notes == ()
 
 
-def test_noise_that_the_data_do_not_have_is_told(read):
-    def change(datasets):
+def test_noise_that_the_data_do_not_have_is_told(read: Read) -> None:
+    def change(datasets: Datasets) -> None:
         datasets[f"{MARKERS}/noise_std"] = np.array(1e-5)
 
     found = read(change)
@@ -146,8 +161,8 @@ def test_noise_that_the_data_do_not_have_is_told(read):
     assert "scatter by 0.00" in found.notes[0]
 
 
-def test_markers_that_are_mixed_up_are_told(read):
-    def change(datasets):
+def test_markers_that_are_mixed_up_are_told(read: Read) -> None:
+    def change(datasets: Datasets) -> None:
         order = np.random.default_rng(0).permutation(len(datasets[PLACES]))
         datasets[PLACES] = datasets[PLACES][order]
 

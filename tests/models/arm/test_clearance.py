@@ -66,8 +66,10 @@ def test_rates_are_what_finite_differences_say(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = panda(np.eye(4))
     link = np.arange(8)
-    shape = ArmShape(link, Capsules(*rng.normal(0.0, 0.1, (2, 8, 3)), rng.uniform(0.02, 0.06, 8)))
-    person = Capsules(*rng.normal(0.0, 0.5, (2, 3, 3)), rng.uniform(0.05, 0.1, 3))
+    first, second = rng.normal(0.0, 0.1, (2, 8, 3))
+    shape = ArmShape(link, Capsules(first, second, rng.uniform(0.02, 0.06, 8)))
+    first, second = rng.normal(0.0, 0.5, (2, 3, 3))
+    person = Capsules(first, second, rng.uniform(0.05, 0.1, 3))
     pairs = np.stack(np.meshgrid(link, np.arange(3), indexing="ij"), axis=-1).reshape(-1, 2)
     q, e = rng.uniform(LIMITS.lower, LIMITS.upper), 1e-6
     way = rng.normal(size=7)

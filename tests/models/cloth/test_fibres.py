@@ -1,19 +1,24 @@
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.fibres import Fibres, filtered_product
 from tests.models.effects.scene import sheet_mesh
 
 
-def fibres(direction=(0.0, 0.3, -1.0), stiffness=200.0):
+def fibres(
+    direction: Sequence[float] = (0.0, 0.3, -1.0), stiffness: float = 200.0
+) -> tuple[FloatArray, Elements, Fibres]:
     x, faces = sheet_mesh()
     elements = make_elements(x, faces)
     warp = np.tile(direction, (len(faces), 1))
     return x, elements, Fibres.along(elements, x, warp, stiffness)
 
 
-def test_at_rest_there_is_neither_energy_nor_force():
+def test_at_rest_there_is_neither_energy_nor_force() -> None:
     x, _, f = fibres()
     force = np.zeros_like(x)
     f.add_force(x, force)
@@ -21,13 +26,13 @@ def test_at_rest_there_is_neither_energy_nor_force():
     np.testing.assert_allclose(force, 0.0, atol=1e-10)
 
 
-def test_a_stretched_fibre_stores_half_k_strain_squared_a_area():
+def test_a_stretched_fibre_stores_half_k_strain_squared_a_area() -> None:
     x, elements, f = fibres((0.0, 0.0, 1.0))
     area = elements.triangle_area.sum()
     assert f.energy(1.1 * x) == pytest.approx(0.5 * 200.0 * 0.1**2 * area)
 
 
-def test_force_is_minus_the_derivative_of_energy_and_rigid_motion_is_free():
+def test_force_is_minus_the_derivative_of_energy_and_rigid_motion_is_free() -> None:
     x, _, f = fibres()
     rng = np.random.default_rng(0)
     bent = x + 0.01 * rng.standard_normal(x.shape)
@@ -41,7 +46,7 @@ def test_force_is_minus_the_derivative_of_energy_and_rigid_motion_is_free():
     assert f.energy(bent @ turn.T + 1.0) == pytest.approx(f.energy(bent))
 
 
-def test_filtered_stiffness_is_exact_in_tension_and_never_negative():
+def test_filtered_stiffness_is_exact_in_tension_and_never_negative() -> None:
     x, _, f = fibres((0.0, 0.0, 1.0))
     rng = np.random.default_rng(1)
     d = rng.standard_normal(x.shape)
@@ -60,6 +65,6 @@ def test_filtered_stiffness_is_exact_in_tension_and_never_negative():
         assert np.sum(d * out) <= np.sum(d * bound) + 1e-9
 
 
-def test_a_triangle_that_the_direction_is_normal_to_gets_no_fibre():
+def test_a_triangle_that_the_direction_is_normal_to_gets_no_fibre() -> None:
     _, _, f = fibres((0.0, 1.0, 0.0))
     np.testing.assert_array_equal(f.weight, 0.0)

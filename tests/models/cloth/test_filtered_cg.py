@@ -44,14 +44,14 @@ class System:
         self.across = normal_response(self.elements, self.block, H**2, self.linear.diagonal())
 
 
-def test_product_is_that_of_the_matrix():
+def test_product_is_that_of_the_matrix() -> None:
     s = System()
     z = s.rng.normal(size=(s.n, 3))
     found = s.system.product(z, s.block)
     np.testing.assert_allclose(found.ravel(), s.matrix @ z.ravel(), rtol=1e-9, atol=1e-12)
 
 
-def test_normal_response_is_that_of_the_diagonal_blocks():
+def test_normal_response_is_that_of_the_diagonal_blocks() -> None:
     s = System()
     normal, give = s.across
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-12)
@@ -62,7 +62,7 @@ def test_normal_response_is_that_of_the_diagonal_blocks():
 
 @pytest.mark.parametrize("helped", [False, True])
 @pytest.mark.parametrize("resisted", [False, True])
-def test_solution_is_that_of_the_free_motions(helped, resisted):
+def test_solution_is_that_of_the_free_motions(helped: bool, resisted: bool) -> None:
     s = System(1)
     mode = np.zeros(s.n, dtype=np.int32)
     mode[:6], mode[20:24], mode[30:42] = HELD, STICK, SLIP
@@ -105,7 +105,7 @@ def test_solution_is_that_of_the_free_motions(helped, resisted):
 
 
 @pytest.mark.parametrize("drive", [0.0, 1e-18])
-def test_what_nothing_but_prescribed_motion_drives_is_solved(drive):
+def test_what_nothing_but_prescribed_motion_drives_is_solved(drive: float) -> None:
     """A right-hand side of rounding errors alone: no tolerance of it can be met, nor need be."""
     s = System(3)
     mode = np.zeros(s.n, dtype=np.int32)
@@ -125,11 +125,11 @@ def test_what_nothing_but_prescribed_motion_drives_is_solved(drive):
         assert iterations < 100
         assert residual <= 1e-6
         found.append(z)
-    np.testing.assert_array_equal(*found)
+    np.testing.assert_array_equal(found[0], found[1])
     assert 0.05 < np.abs(found[0]).max() < 0.2
 
 
-def test_motion_across_the_cloth_costs_fewer_iterations():
+def test_motion_across_the_cloth_costs_fewer_iterations() -> None:
     s = System(2)
     mode = np.zeros(s.n, dtype=np.int32)
     mode[:9] = HELD

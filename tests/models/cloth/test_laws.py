@@ -37,7 +37,7 @@ class Run:
         self.h, self.x = h, x.copy()
         self.v = np.zeros_like(x) if v is None else v.copy()
         self.reaction = np.zeros_like(x)
-        self._explicit: ExplicitBiasCloth | None = None
+        self.cloth: ImplicitCloth | ExplicitBiasCloth
         if scheme in ("implicit", "second_order"):
             self.cloth = ImplicitCloth(
                 elements,
@@ -53,17 +53,14 @@ class Run:
             self._state = replace(ClothState.at_rest(x), v=self.v)
         else:
             iterations = 1 if scheme == "one_step" else 30
-            self._explicit = ExplicitBiasCloth(
+            self.cloth = ExplicitBiasCloth(
                 elements, material, h, held, gravity, iterations=iterations
             )
-            self.cloth = self._explicit  # type: ignore[assignment]
 
     def advance(self, held_velocity: FloatArray, obstacles: Obstacles) -> None:
-        if self._explicit is not None:
+        if isinstance(self.cloth, ExplicitBiasCloth):
             motion = self.h * held_velocity
-            self.x, self.v, self.reaction, _ = self._explicit.step(
-                self.x, self.v, motion, obstacles
-            )
+            self.x, self.v, self.reaction, _ = self.cloth.step(self.x, self.v, motion, obstacles)
             return
         self._state, _ = self.cloth.step(self._state, obstacles, held_velocity)
         self.x, self.v, self.reaction = self._state.x, self._state.v, self._state.reaction

@@ -1,10 +1,12 @@
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.rollout import roll_back, roll_out
+from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.rollout import Rollout, Seeds, roll_back, roll_out
 from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb
 
 STEPS = 9
@@ -18,8 +20,8 @@ def _scene(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatAr
     return cloth, x, 0.2 * v, motions
 
 
-def _loss_seeds(weight: FloatArray, wr: FloatArray):  # type: ignore[no-untyped-def]
-    def seeds(j: int, x: FloatArray, v: FloatArray, r: FloatArray):  # type: ignore[no-untyped-def]
+def _loss_seeds(weight: FloatArray, wr: FloatArray) -> Callable[..., Seeds | None]:
+    def seeds(j: int, x: FloatArray, v: FloatArray, r: FloatArray) -> Seeds | None:
         if j % 2:
             return None
         return weight[j], 0.01 * weight[j], wr[j]
@@ -27,7 +29,15 @@ def _loss_seeds(weight: FloatArray, wr: FloatArray):  # type: ignore[no-untyped-
     return seeds
 
 
-def _loss(cloth, x, v, motions, bodies, weight, wr):  # type: ignore[no-untyped-def]
+def _loss(
+    cloth: ExplicitBiasCloth,
+    x: FloatArray,
+    v: FloatArray,
+    motions: FloatArray,
+    bodies: Sequence[Obstacles],
+    weight: FloatArray,
+    wr: FloatArray,
+) -> tuple[float, Rollout]:
     total = 0.0
 
     def observe(j: int, x: FloatArray, v: FloatArray, r: FloatArray) -> None:
@@ -119,7 +129,8 @@ def test_gradient_through_twenty_steps_in_contact_matches_finite_differences(h: 
     rng = np.random.default_rng(6)
     motion = h * np.tile([0.05, 0.02, -0.1], (4, 1))
     weight = rng.normal(size=x.shape)
-    types, tapes = [], []
+    types: list[ContactTypes] = []
+    tapes: list[Tape] = []
     x1, v1 = x, v
     for _ in range(20):
         x1, v1, _, tape = cloth.step(x1, v1, motion, limb())
@@ -157,7 +168,7 @@ def test_arrays_written_to_after_a_rollout_do_not_change_its_derivative() -> Non
     found = []
     for written in (False, True):
         given = [a.copy() for a in (x, v, motions)]
-        run = roll_out(cloth, *given, [limb()] * STEPS)
+        run = roll_out(cloth, given[0], given[1], given[2], [limb()] * STEPS)
         if written:
             for array in given:
                 array[...] = 7.0

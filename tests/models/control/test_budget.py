@@ -21,7 +21,9 @@ class Clock:
 
 
 @given(st.integers(0, 300), st.integers(0, 300), parts)
-def test_what_is_allowed_keeps_the_budget(iterations: int, seconds: int, took: list) -> None:
+def test_what_is_allowed_keeps_the_budget(
+    iterations: int, seconds: int, took: list[tuple[int, int]]
+) -> None:
     clock = Clock()
     spending = Spending(Budget(iterations, float(seconds)), clock)
     for work, time in took:
@@ -37,7 +39,7 @@ def test_what_is_allowed_keeps_the_budget(iterations: int, seconds: int, took: l
 
 
 @given(parts)
-def test_no_budget_allows_everything(took: list) -> None:
+def test_no_budget_allows_everything(took: list[tuple[int, int]]) -> None:
     spending = Spending(Budget(), Clock())
     for work, time in took:
         assert spending.allows(Cost(work, float(time)))

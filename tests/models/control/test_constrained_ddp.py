@@ -19,6 +19,7 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.norm_bounds import NormBounds
 from drake_dress.models.control.solution import Solution
 from drake_dress.solvers.cone_programme import solve_cone_programme
+from tests.present import present
 
 seeds = st.integers(0, 2**31)
 
@@ -427,16 +428,16 @@ def test_whatever_it_ends_with_is_reported_as_it_is(
     rng = np.random.default_rng(seed)
     p = drawn(seed)
     guess = rng.normal(0.0, 0.1, p.input_weight.shape) if has_guess else None
-    multipliers = [
+    on_x, on_v = (
         rng.uniform(0.0, 1.0, b.radius.shape) if is_warm else None
         for b in (p.state_bounds, p.input_bounds)
-    ]
-    given_ones = [p.state_bounds.radius, p.input_bounds.radius, guess, *multipliers]
+    )
+    given_ones = [p.state_bounds.radius, p.input_bounds.radius, guess, on_x, on_v]
     before = [None if a is None else a.copy() for a in given_ones]
-    s = solve_constrained_ddp(p, guess, *multipliers, limits)
+    s = solve_constrained_ddp(p, guess, on_x, on_v, limits)
     # what was handed in is as it was
     for a, was in zip(given_ones, before, strict=True):
-        assert a is None or np.array_equal(a, was)
+        assert a is None or np.array_equal(a, present(was))
     assert s.v.shape == p.input_weight.shape
     assert np.isfinite(s.v).all()
     np.testing.assert_array_equal(s.x, p.states(s.v))

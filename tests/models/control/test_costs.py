@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,11 +90,10 @@ def drawn(seed: int) -> PlannedStep:
 
 
 def alone(cost: SleeveCost | GarmentCost, of_sleeve: bool) -> StageCosts:
-    return replace(
-        COSTS,
-        of_sleeves=(cost,) if of_sleeve else (),
-        of_garment=() if of_sleeve else (cost,),
-    )
+    some: Any = (cost,)
+    if of_sleeve:
+        return replace(COSTS, of_sleeves=some, of_garment=())
+    return replace(COSTS, of_sleeves=(), of_garment=some)
 
 
 ALL = [

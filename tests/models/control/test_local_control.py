@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control import constrained_ddp
 from drake_dress.models.control.local_control import (
     GlobalPlan,
     LocalController,
+    LocalOutcome,
     LocalState,
     continued,
 )
@@ -54,7 +56,13 @@ def plan_of(controller: LocalController, velocity: np.ndarray, armholes: np.ndar
     return GlobalPlan(0.0, 0.1, np.tile(velocity, (n, 1, 1)), armholes + moved, given, joints)
 
 
-def solve(controller: LocalController, plan: GlobalPlan, joints=STILL, shift=0.0, time=0.0):  # type: ignore[no-untyped-def]
+def solve(
+    controller: LocalController,
+    plan: GlobalPlan,
+    joints: FloatArray = STILL,
+    shift: float | FloatArray = 0.0,
+    time: float = 0.0,
+) -> LocalOutcome:
     x, grippers, _ = seen(controller)
     return controller.solve(LocalState(), plan, x + shift, grippers + shift, joints, 0.2, time)
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.constrained_ddp import solve_constrained_ddp
 from drake_dress.models.control.local_model import (
     LocalParameters,
@@ -17,6 +18,7 @@ from drake_dress.models.control.local_model import (
     is_coupled,
     local_problem,
 )
+from drake_dress.models.control.solution import Solution
 from drake_dress.models.garment.geodesics import Reach
 
 REACH = Reach(0.59, (0.54, 0.54), (0.15, 0.15), 0.5)
@@ -40,7 +42,9 @@ def goal(nominal: Nominal, side: int, way: np.ndarray, on_arm: bool = False) -> 
     return SleeveGoal(target, 1.0, on_arm, target, axis)
 
 
-def solved(nominal: Nominal, goals: tuple[SleeveGoal, SleeveGoal], coupled: bool = False):  # type: ignore[no-untyped-def]
+def solved(
+    nominal: Nominal, goals: tuple[SleeveGoal, SleeveGoal], coupled: bool = False
+) -> tuple[Solution, FloatArray, FloatArray]:
     p = local_problem(nominal, goals, coupled, REACH, P)
     s = solve_constrained_ddp(p)
     assert s.converged

@@ -87,7 +87,7 @@ def test_without_any_cost_the_name_is_told() -> None:
 
 
 def test_a_class_that_is_defined_again_takes_the_place_of_the_first() -> None:
-    again = dataclass(frozen=True)(
+    again: type = dataclass(frozen=True)(
         type("Height", (), {**_members(Height), "__module__": __name__, "__qualname__": "Height"})
     )
     assert register_cost(again) is again

@@ -15,7 +15,7 @@ def sets_around(rng: np.random.Generator, planes: int) -> tuple[list[Ball], list
     balls, half_spaces = [], []
     for _ in range(2):
         center = shared + 0.2 * rng.normal(size=3)
-        balls.append(Ball(center, np.linalg.norm(center - shared) + rng.uniform(0.0, 0.1)))
+        balls.append(Ball(center, float(np.linalg.norm(center - shared)) + rng.uniform(0.0, 0.1)))
     for _ in range(planes):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
@@ -32,7 +32,8 @@ def test_no_point_of_the_sets_is_nearer(planes: int) -> None:
         point = rng.normal(size=3)
         found = nearest(point, balls, half_spaces)
         assert found is not None
-        assert all(s.excess(found) <= 1e-10 for s in [*balls, *half_spaces])
+        sets: list[Ball | HalfSpace] = [*balls, *half_spaces]
+        assert all(s.excess(found) <= 1e-10 for s in sets)
         other = minimize(
             lambda x, p=point: np.sum((x - p) ** 2),
             found + 1e-3,
@@ -46,7 +47,7 @@ def test_no_point_of_the_sets_is_nearer(planes: int) -> None:
             method="SLSQP",
             options={"ftol": 1e-14, "maxiter": 300},
         )
-        worst = max(s.excess(other.x) for s in [*balls, *half_spaces])
+        worst = max(s.excess(other.x) for s in sets)
         if other.success and worst < 1e-8:
             nearer = np.linalg.norm(found - point) - np.linalg.norm(other.x - point)
             assert nearer < 1e-6
@@ -83,4 +84,5 @@ def test_sets_that_do_not_meet_have_no_nearest_point() -> None:
 def test_sets_that_touch_meet_in_that_point() -> None:
     x = np.array([1.0, 0.0, 0.0])
     found = nearest(np.ones(3), [Ball(np.zeros(3), 0.5)], [HalfSpace(x, -0.5)])
+    assert found is not None
     np.testing.assert_allclose(found, [-0.5, 0.0, 0.0], atol=1e-9)

@@ -1,8 +1,10 @@
 """Limits hold whatever is asked and measured; what is within them passes unchanged."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -43,7 +45,7 @@ class Arms:
     def ask(
         self,
         velocity: np.ndarray,
-        force: np.ndarray = NOTHING,
+        force: npt.ArrayLike = NOTHING,
         duration: float = DT,
         stamp: float | None = None,
         position: np.ndarray | None = None,
@@ -211,7 +213,7 @@ def test_stale_request_comes_to_rest_by_ordinary_braking() -> None:
     arms.ask(LIMITS.max_speed * X, duration=0.5)
     last = arms.time - DT
     arms.ask(LIMITS.max_speed * X, duration=LIMITS.stale_time, stamp=last)
-    assert arms.verdicts[0] == Verdict.NONE
+    assert not arms.verdicts[0]
     braking = LIMITS.max_speed / LIMITS.max_acceleration
     velocity = arms.ask(LIMITS.max_speed * X, duration=braking + DT, stamp=last)
     assert np.linalg.norm(velocity[0], axis=1).max() < LIMITS.max_speed
@@ -253,7 +255,8 @@ def test_one_side_unmeasured_stops_both_until_it_is_measured(quantity: str) -> N
     arms.ask(0.2 * X, duration=0.5)
     hidden = np.array([[np.nan, 0.0, 0.0], [0.0, 0.0, 0.0]])
     hidden = hidden + (arms.state.position if quantity == "position" else 0.0)
-    arms.ask(0.2 * X, duration=0.2 / LIMITS.max_braking + DT, **{quantity: hidden})
+    unmeasured: dict[str, Any] = {quantity: hidden}
+    arms.ask(0.2 * X, duration=0.2 / LIMITS.max_braking + DT, **unmeasured)
     np.testing.assert_allclose(arms.state.velocity, 0.0, atol=1e-12)
     assert Verdict.UNMEASURED in arms.verdicts[0]
     assert Verdict.UNMEASURED not in arms.verdicts[1]
@@ -322,7 +325,7 @@ def test_full_speed_lasts_until_ordinary_braking_stops_at_the_border() -> None:
     ],
 )
 def test_a_limit_of_place_that_is_broken_is_made_good_slowly(
-    limits: dict[str, object], measured: np.ndarray, back: np.ndarray, flag: str
+    limits: dict[str, Any], measured: np.ndarray, back: np.ndarray, flag: str
 ) -> None:
     arms = Arms(replace(LIMITS, **limits))
     for _ in range(20):
@@ -334,8 +337,11 @@ def test_a_limit_of_place_that_is_broken_is_made_good_slowly(
 
 
 def test_distances_that_are_broken_end_where_they_may_be() -> None:
-    for limits, apart in (({"largest_distance": 0.55}, 0.55), ({"least_distance": 0.65}, 0.65)):
-        arms = Arms(replace(LIMITS, **limits))
+    for limits, apart in (
+        (replace(LIMITS, largest_distance=0.55), 0.55),
+        (replace(LIMITS, least_distance=0.65), 0.65),
+    ):
+        arms = Arms(limits)
         arms.ask(NOTHING, duration=8.0)
         left, right = arms.state.position
         assert np.linalg.norm(left - right) == pytest.approx(apart, abs=1e-3)
@@ -446,7 +452,7 @@ def test_state_survives_being_packed() -> None:
         {"workspace": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])},
     ],
 )
-def test_limits_that_contradict_each_other_are_refused(bad: dict[str, float]) -> None:
+def test_limits_that_contradict_each_other_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=next(reversed(bad)).split("_")[-1]):
         SafetyLimits(**bad)
 

@@ -443,7 +443,7 @@ def test_a_waiting_sleeve_stays_while_the_other_is_at_its_hand(
             # no further up, and the other one in reach or all that is allowed done for it
             assert np.linalg.norm(place - to) < np.linalg.norm(axis.G(stays) - to)
             lowest = axis.G(p.stages.waiting_progress)
-            short = np.linalg.norm(lowest - to) - longest
+            short = float(np.linalg.norm(lowest - to)) - longest
             assert np.linalg.norm(place - to) < longest + max(0.0, short) + 1e-6
         if apart == 0.1 and s < 1.0:
             # from further off it is drawn up, to where it lets the other one be

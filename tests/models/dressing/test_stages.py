@@ -316,7 +316,8 @@ def test_a_sleeve_that_stalls_just_before_the_shoulder_gives_way_too() -> None:
 
 def eased_for(s_of: Callable[[int, bool], float], cycles: int) -> list[float]:
     """Returns when a sleeve at `s_of` (cycle, whether it gives way) begins to give way, s."""
-    state, began, gives_way, cycle, time = StageState(), [], False, 0, 0.0
+    state, gives_way, cycle, time = StageState(), False, 0, 0.0
+    began: list[float] = []
     while len(began) < cycles:
         pair = (facts(linked=True, s=s_of(cycle, gives_way)), facts(linked=True, s=1.95))
         state, _ = advance_stages(state, pair, P, FAR, time)

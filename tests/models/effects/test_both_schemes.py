@@ -1,17 +1,20 @@
 """Effects act alike in the two schemes that simulate a plant."""
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.air import AirDrag
 from drake_dress.models.effects.composition import GarmentWithEffects
 from drake_dress.models.effects.contact import Adhesion, VelocityDependentFriction
+from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.fabric import (
     AnisotropicStiffness,
     InternalDamping,
@@ -24,7 +27,9 @@ SCHEMES = ("implicit", "projective")
 SOFT = replace(MATERIAL, stretch_stiffness=60.0)
 
 
-def swung(effects, scheme, duration=0.3, step=1e-3):
+def swung(
+    effects: Sequence[Effect], scheme: str, duration: float = 0.3, step: float = 1e-3
+) -> FloatArray:
     """Returns a sheet that hangs from its top row, after the row has been drawn aside."""
     x, faces = sheet_mesh()
     top = np.flatnonzero(x[:, 2] == 0.0).astype(np.int32)
@@ -60,7 +65,7 @@ def swung(effects, scheme, duration=0.3, step=1e-3):
     ],
     ids=lambda e: e[0].NAME,
 )
-def test_an_effect_moves_a_swung_sheet_alike(effects):
+def test_an_effect_moves_a_swung_sheet_alike(effects: Sequence[Effect]) -> None:
     changes = [swung(effects, scheme) - swung([], scheme) for scheme in SCHEMES]
     size = np.abs(changes[0]).max()
     assert size > 5e-4
@@ -71,7 +76,9 @@ def test_an_effect_moves_a_swung_sheet_alike(effects):
 @pytest.mark.parametrize(
     "effect", [Adhesion(strength=10.0), VelocityDependentFriction(rate=5.0)], ids=lambda e: e.NAME
 )
-def test_contact_effects_slow_a_sheet_that_slides(scheme, effect):
+def test_contact_effects_slow_a_sheet_that_slides(
+    scheme: str, effect: Adhesion | VelocityDependentFriction
+) -> None:
     x, faces = sheet_mesh(4, 4)
     x = np.stack([x[:, 0], -x[:, 2], np.full(len(x), MATERIAL.margin)], axis=1)
     none = np.zeros(0, dtype=np.int32)
@@ -90,7 +97,7 @@ def test_contact_effects_slow_a_sheet_that_slides(scheme, effect):
         speeds.append(float(state.v[:, 0].mean()))
     g, rho, t = 9.81, MATERIAL.surface_density, 20 * step
     mu = MATERIAL.friction
-    if effect.NAME == "adhesion":
+    if isinstance(effect, Adhesion):
         expected = 0.5 - mu * (g + effect.strength / rho) * t
     else:
         # dv/dt = −g (μ + c v)

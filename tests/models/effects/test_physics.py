@@ -1,20 +1,24 @@
 """Each effect does what physics says."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
 from drake_dress.models.effects.air import AIR_DENSITY, PLATE_DRAG, AirDrag, Wind
-from drake_dress.models.effects.composition import largest_strain, world_points
+from drake_dress.models.effects.composition import GarmentWithEffects, largest_strain, world_points
 from drake_dress.models.effects.contact import (
     Adhesion,
     AnisotropicFriction,
     Friction,
     VelocityDependentFriction,
 )
+from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.fabric import (
     AnisotropicStiffness,
     BendingStiffness,
@@ -30,18 +34,27 @@ from drake_dress.models.effects.person import LimbCompliance, LimbRadius
 from drake_dress.models.effects.sensing import CameraRotation, CameraTranslation, TimeOffset
 from drake_dress.models.human.body import BodyMeasures
 from tests.models.effects.scene import MATERIAL, STEP, cloth, sheet_mesh
+from tests.present import present
 
 G = 9.81
 NONE = np.zeros((0, 3))
 
 
-def flat_mesh(columns=6, rows=6, spacing=0.04):
+def flat_mesh(
+    columns: int = 6, rows: int = 6, spacing: float = 0.04
+) -> tuple[FloatArray, IntArray]:
     """Returns a horizontal sheet; its warp is along −z, so give it another where that matters."""
     x, faces = sheet_mesh(columns, rows, spacing)
     return np.stack([x[:, 0], -x[:, 2], np.zeros(len(x))], axis=1), faces[:, ::-1]
 
 
-def fall(garment, x, steps, v=None, obstacles=None):
+def fall(
+    garment: GarmentWithEffects,
+    x: FloatArray,
+    steps: int,
+    v: FloatArray | None = None,
+    obstacles: Obstacles | None = None,
+) -> ClothState:
     state = ClothState.at_rest(x)
     if v is not None:
         state = dataclasses.replace(state, v=np.array(v))
@@ -51,7 +64,9 @@ def fall(garment, x, steps, v=None, obstacles=None):
     return state
 
 
-def hung(effects, seconds=1.2, damping=0.05, **options):
+def hung(
+    effects: Sequence[Effect], seconds: float = 1.2, damping: float = 0.05, **options: Any
+) -> tuple[ClothState, GarmentWithEffects]:
     """Returns a sheet at rest that hangs from its top row, and its garment."""
     x, _ = sheet_mesh()
     top = np.flatnonzero(x[:, 2] == 0.0)
@@ -60,7 +75,7 @@ def hung(effects, seconds=1.2, damping=0.05, **options):
     return fall(garment, x, round(seconds / 0.005)), garment
 
 
-def test_a_flat_sheet_falls_at_the_terminal_speed_of_a_plate():
+def test_a_flat_sheet_falls_at_the_terminal_speed_of_a_plate() -> None:
     x, faces = flat_mesh()
     drag = AirDrag(coefficient=4.0)
     terminal = np.sqrt(2.0 * MATERIAL.surface_density * G / (AIR_DENSITY * drag.coefficient))
@@ -71,14 +86,14 @@ def test_a_flat_sheet_falls_at_the_terminal_speed_of_a_plate():
     np.testing.assert_allclose(mean, [0.0, 0.0, -terminal], rtol=2e-3, atol=1e-6)
 
 
-def test_a_sheet_that_moves_in_its_own_plane_feels_no_air():
+def test_a_sheet_that_moves_in_its_own_plane_feels_no_air() -> None:
     x, faces = flat_mesh()
     garment = cloth([AirDrag(coefficient=4.0)], mesh=(x, faces))
     after = fall(garment, x, 1, np.tile([2.0, 0.0, 0.0], (len(x), 1)))
     np.testing.assert_allclose(after.v[:, :2], np.tile([2.0, 0.0], (len(x), 1)), atol=1e-9)
 
 
-def test_wind_pushes_a_resting_plate_with_its_stagnation_pressure():
+def test_wind_pushes_a_resting_plate_with_its_stagnation_pressure() -> None:
     x, faces = sheet_mesh()
     garment = cloth([Wind(y=2.0)], mesh=(x, faces))
     after = fall(garment, x, 1)
@@ -87,7 +102,7 @@ def test_wind_pushes_a_resting_plate_with_its_stagnation_pressure():
     assert mean[1] == pytest.approx(STEP * pressure / MATERIAL.surface_density, rel=1e-3)
 
 
-def test_density_adds_weight_to_the_grippers_and_no_stretch_law():
+def test_density_adds_weight_to_the_grippers_and_no_stretch_law() -> None:
     added = 0.1
     state, garment = hung([SurfaceDensity(added=added)])
     area = garment.elements.triangle_area.sum()
@@ -95,7 +110,7 @@ def test_density_adds_weight_to_the_grippers_and_no_stretch_law():
     assert weight[2] == pytest.approx((MATERIAL.surface_density + added) * area * G, rel=2e-3)
 
 
-def test_a_local_mass_pulls_with_its_weight_where_it_sits():
+def test_a_local_mass_pulls_with_its_weight_where_it_sits() -> None:
     x, _ = sheet_mesh()
     place = x[10]
     mass = LocalMass(mass=0.05, x=place[0], y=place[1], z=place[2])
@@ -108,7 +123,7 @@ def test_a_local_mass_pulls_with_its_weight_where_it_sits():
     assert np.linalg.norm(added @ x / added.sum() - place) < 0.04
 
 
-def test_stretch_halves_where_stiffness_doubles():
+def test_stretch_halves_where_stiffness_doubles() -> None:
     soft, _garment = hung([])
     hard, _ = hung([StretchStiffness(added=MATERIAL.stretch_stiffness)])
     x, _ = sheet_mesh()
@@ -116,7 +131,7 @@ def test_stretch_halves_where_stiffness_doubles():
     assert drop[0] / drop[1] == pytest.approx(2.0, rel=0.02)
 
 
-def test_warp_stiffness_adds_along_the_warp_only():
+def test_warp_stiffness_adds_along_the_warp_only() -> None:
     """Down the warp k + k_a bears the load, across it k alone."""
     plain, _garment = hung([])
     warp, stiff = hung([AnisotropicStiffness(warp=MATERIAL.stretch_stiffness)])
@@ -124,13 +139,14 @@ def test_warp_stiffness_adds_along_the_warp_only():
     drop = x[:, 2].min() - plain.x[:, 2].min(), x[:, 2].min() - warp.x[:, 2].min()
     assert drop[0] / drop[1] == pytest.approx(2.0, rel=0.05)
     # a sheet of fibres stretched across them feels nothing of them
-    fibres = stiff._inner._fibres
+    assert isinstance(stiff._inner, ImplicitCloth)
+    fibres = present(stiff._inner._fibres)
     force = np.zeros_like(x)
     fibres.add_force(x * np.array([1.1, 1.0, 1.0]), force)
     np.testing.assert_allclose(force, 0.0, atol=1e-10)
 
 
-def test_stiffening_takes_the_secant_stiffness_of_its_strain():
+def test_stiffening_takes_the_secant_stiffness_of_its_strain() -> None:
     """A strip under the tension t is strained by ε with k ε (1 + c ε) = t."""
     rate = 20.0
     soft = dataclasses.replace(MATERIAL, stretch_stiffness=40.0)
@@ -151,7 +167,7 @@ def test_stiffening_takes_the_secant_stiffness_of_its_strain():
     assert largest_strain(garment.elements, x).max() < 1e-12
 
 
-def test_bending_stiffness_scales_the_couple_of_a_bent_strip():
+def test_bending_stiffness_scales_the_couple_of_a_bent_strip() -> None:
     from drake_dress.models.cloth.forces import internal_force
 
     x, _ = sheet_mesh()
@@ -166,7 +182,7 @@ def test_bending_stiffness_scales_the_couple_of_a_bent_strip():
     np.testing.assert_allclose(forces[1], 2.0 * forces[0], rtol=1e-12, atol=1e-15)
 
 
-def test_internal_damping_takes_energy_from_deformation_and_none_from_rigid_motion():
+def test_internal_damping_takes_energy_from_deformation_and_none_from_rigid_motion() -> None:
     x, _ = sheet_mesh()
     rng = np.random.default_rng(0)
     wave = 0.3 * np.sin(25.0 * x[:, 2:]) * np.array([0.0, 1.0, 0.0])
@@ -185,7 +201,7 @@ def test_internal_damping_takes_energy_from_deformation_and_none_from_rigid_moti
     )
 
 
-def test_a_shrunken_garment_keeps_its_mass():
+def test_a_shrunken_garment_keeps_its_mass() -> None:
     plain, small = cloth([]), cloth([RestSize(strain=-0.05)])
     assert small.mass.sum() == pytest.approx(plain.mass.sum())
     np.testing.assert_allclose(
@@ -193,7 +209,13 @@ def test_a_shrunken_garment_keeps_its_mass():
     )
 
 
-def slide(effects, tilt, steps=250, direction=(1.0, 0.0), speed=0.0):
+def slide(
+    effects: Sequence[Effect],
+    tilt: float,
+    steps: int = 250,
+    direction: Sequence[float] = (1.0, 0.0),
+    speed: float = 0.0,
+) -> tuple[float, GarmentWithEffects]:
     """Returns mean velocity along a slope after `steps`, of a sheet that lies on it."""
     x, faces = flat_mesh(4, 4)
     x = x + [0.0, 0.0, MATERIAL.margin]
@@ -214,7 +236,7 @@ def slide(effects, tilt, steps=250, direction=(1.0, 0.0), speed=0.0):
 
 
 @pytest.mark.parametrize("added", [-0.15, 0.0, 0.2])
-def test_a_sheet_slides_where_the_slope_is_steeper_than_friction(added):
+def test_a_sheet_slides_where_the_slope_is_steeper_than_friction(added: float) -> None:
     mu = MATERIAL.friction + added
     held, _ = slide([Friction(added=added)], 0.85 * mu)
     moving, _ = slide([Friction(added=added)], 1.2 * mu)
@@ -224,14 +246,14 @@ def test_a_sheet_slides_where_the_slope_is_steeper_than_friction(added):
     assert moving == pytest.approx(expected, rel=0.05)
 
 
-def test_viscous_friction_leaves_the_speed_at_which_it_bears_the_slope():
+def test_viscous_friction_leaves_the_speed_at_which_it_bears_the_slope() -> None:
     rate = 2.0
     tilt = MATERIAL.friction + 0.2
     speed, _ = slide([VelocityDependentFriction(rate=rate)], tilt, steps=1500)
     assert speed == pytest.approx(0.2 / rate, rel=0.05)
 
 
-def test_friction_across_and_along_the_warp_differ_as_the_contrast_says():
+def test_friction_across_and_along_the_warp_differ_as_the_contrast_says() -> None:
     """The warp of a flat sheet whose rest frame has it along −z is projected: along y here."""
     x, faces = flat_mesh(4, 4)
     from drake_dress.models.cloth.scheme import Scheme
@@ -264,7 +286,7 @@ def test_friction_across_and_along_the_warp_differ_as_the_contrast_says():
 
 
 @pytest.mark.parametrize(("strength", "stays"), [(1.2, True), (0.8, False)])
-def test_cloth_hangs_from_a_ceiling_it_clings_to(strength, stays):
+def test_cloth_hangs_from_a_ceiling_it_clings_to(strength: float, stays: bool) -> None:
     from drake_dress.models.cloth.contact.obstacles import HalfSpaces
 
     x, faces = flat_mesh(4, 4)
@@ -281,7 +303,7 @@ def test_cloth_hangs_from_a_ceiling_it_clings_to(strength, stays):
     assert (abs(state.x[:, 2].mean() - x[0, 2]) < 1e-3) == stays
 
 
-def test_limbs_grow_and_the_trunk_does_not():
+def test_limbs_grow_and_the_trunk_does_not() -> None:
     before = BodyMeasures()
     after = LimbRadius(added=0.01).apply(before)
     assert after.forearm_radius == pytest.approx(before.forearm_radius + 0.01)
@@ -291,7 +313,9 @@ def test_limbs_grow_and_the_trunk_does_not():
 @pytest.mark.parametrize(
     ("kind", "name"), [(GripperCompliance, "gripper"), (LimbCompliance, "limb")]
 )
-def test_a_compliant_mount_comes_to_rest_at_compliance_times_force(kind, name):
+def test_a_compliant_mount_comes_to_rest_at_compliance_times_force(
+    kind: type[GripperCompliance] | type[LimbCompliance], name: str
+) -> None:
     force = np.array([[1.0, 0.0, -3.0], [0.0, 2.0, 0.0]])
     limbs = np.vstack([force, force])
     mounts = Mounts([kind(compliance=0.01)])
@@ -308,7 +332,9 @@ def test_a_compliant_mount_comes_to_rest_at_compliance_times_force(kind, name):
 
 @pytest.mark.parametrize("h", [0.001, 0.004, 0.01])
 @pytest.mark.parametrize("share", [1.0, 2.0])
-def test_a_compliant_gripper_that_is_lighter_than_its_load_comes_to_rest(h, share):
+def test_a_compliant_gripper_that_is_lighter_than_its_load_comes_to_rest(
+    h: float, share: float
+) -> None:
     """With the load's force a step late; what it moves is known, or taken for too much."""
     load, compliance, weight = 0.3, 0.02, np.array([0.0, 0.0, -9.81])
     assert load > 5.0 * GRIPPER_TIME**2 / compliance
@@ -328,7 +354,7 @@ def test_a_compliant_gripper_that_is_lighter_than_its_load_comes_to_rest(h, shar
     assert min(path) == pytest.approx(most, rel=0.1)
 
 
-def test_a_gripper_moves_more_of_a_garment_in_a_longer_step_and_never_more_than_all():
+def test_a_gripper_moves_more_of_a_garment_in_a_longer_step_and_never_more_than_all() -> None:
     x, _ = sheet_mesh()
     top = np.flatnonzero(x[:, 2] == 0.0)
     mounts, moved = Mounts([GripperCompliance(compliance=0.01)]), []
@@ -341,7 +367,7 @@ def test_a_gripper_moves_more_of_a_garment_in_a_longer_step_and_never_more_than_
     assert not Mounts([]).moved_mass(garment, np.zeros(len(top), dtype=np.int32)).any()
 
 
-def test_cloth_creeps_out_of_a_gripper_along_the_pull_beyond_the_threshold():
+def test_cloth_creeps_out_of_a_gripper_along_the_pull_beyond_the_threshold() -> None:
     mounts = Mounts([GripperSlip(rate=0.01, threshold=1.0)])
     force = np.array([[0.0, 0.0, -3.0], [0.5, 0.0, 0.0]])
     state = MountState.at_rest(4)
@@ -350,13 +376,13 @@ def test_cloth_creeps_out_of_a_gripper_along_the_pull_beyond_the_threshold():
     np.testing.assert_allclose(state.slip, [[0.0, 0.0, -0.02], [0.0, 0.0, 0.0]], atol=1e-12)
 
 
-def test_clocks_let_things_have_happened_earlier():
+def test_clocks_let_things_have_happened_earlier() -> None:
     t = np.linspace(0.0, 1.0, 3)
     np.testing.assert_allclose(GripperLatency(delay=0.1).apply(t), t - 0.1)
     np.testing.assert_allclose(TimeOffset(offset=-0.2).apply(t), t + 0.2)
 
 
-def test_cameras_move_points_rigidly_and_back():
+def test_cameras_move_points_rigidly_and_back() -> None:
     points = np.random.default_rng(1).standard_normal((7, 3))
     effects = [CameraTranslation(x=0.1, z=-0.2), CameraRotation(x=0.1, y=-0.2, z=0.3)]
     seen = points
@@ -367,7 +393,7 @@ def test_cameras_move_points_rigidly_and_back():
     np.testing.assert_allclose(world_points(seen, effects), points, atol=1e-12)
 
 
-def test_tilted_gravity_keeps_its_size_and_leans_as_the_angle_says():
+def test_tilted_gravity_keeps_its_size_and_leans_as_the_angle_says() -> None:
     g = GravityTilt(about_y=0.1).apply(np.array([0.0, 0.0, -G]))
     assert np.linalg.norm(g) == pytest.approx(G)
     assert g[0] == pytest.approx(-G * np.sin(0.1))

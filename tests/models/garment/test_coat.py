@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,20 +9,21 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import IntArray
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
 from drake_dress.models.garment.edges import boundary_loops
-from drake_dress.models.garment.mesh import edge_lengths, loop_length
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, loop_length
 
 SPACINGS = (0.01, 0.02, 0.03, 0.045, 0.06)
 MODELS = {"default": CoatParameters(), **COATS}
 
 
-def smallest_angle(mesh):
+def smallest_angle(mesh: GarmentMesh) -> float:
     triangles = mesh.rest_position[mesh.faces]
     return np.rad2deg(trimesh.triangles.angles(triangles).min())
 
 
-def bust(mesh, side_nodes):
+def bust(mesh: GarmentMesh, side_nodes: IntArray) -> float:
     """The girth of the cut just below the armholes, closed over the open front."""
     level = mesh.rest_position[side_nodes, 2].min() - 0.02
     body = np.flatnonzero((mesh.region[mesh.faces] == 0).all(axis=1))
@@ -33,7 +35,7 @@ def bust(mesh, side_nodes):
     return np.linalg.norm(segments[:, 0] - segments[:, 1], axis=1).sum() + gap
 
 
-def check_sound(mesh, spacing):
+def check_sound(mesh: GarmentMesh, spacing: float) -> None:
     mesh.validate()
     length = edge_lengths(mesh.rest_position, mesh.faces)
     assert 0.75 * spacing < length.mean() < 1.25 * spacing
@@ -48,7 +50,7 @@ def check_sound(mesh, spacing):
         assert not border & set(mesh.loops[f"{side}_armhole"].tolist())
 
 
-def check_measures(mesh, p):
+def check_measures(mesh: GarmentMesh, p: CoatParameters) -> None:
     x = mesh.rest_position
     tips = {}
     for side in ("left", "right"):
@@ -68,7 +70,7 @@ def check_measures(mesh, p):
 
 @pytest.mark.parametrize("spacing", SPACINGS)
 @pytest.mark.parametrize("name", MODELS)
-def test_coat_is_sound_and_meets_its_measures_at_every_spacing(name, spacing):
+def test_coat_is_sound_and_meets_its_measures_at_every_spacing(name: str, spacing: float) -> None:
     mesh = make_coat(MODELS[name], spacing)
     check_sound(mesh, spacing)
     check_measures(mesh, MODELS[name])
@@ -76,8 +78,8 @@ def test_coat_is_sound_and_meets_its_measures_at_every_spacing(name, spacing):
 
 @settings(max_examples=12, derandomize=True)
 @given(data=st.data())
-def test_any_coat_is_sound_and_meets_its_measures(data):
-    def draw(low, high):
+def test_any_coat_is_sound_and_meets_its_measures(data: st.DataObject) -> None:
+    def draw(low: float, high: float) -> float:
         return data.draw(st.floats(low, high))
 
     p = CoatParameters(
@@ -95,7 +97,7 @@ def test_any_coat_is_sound_and_meets_its_measures(data):
     check_measures(mesh, p)
 
 
-def test_coat_is_its_own_mirror_image():
+def test_coat_is_its_own_mirror_image() -> None:
     mesh = make_coat(CoatParameters(), 0.03)
     x = mesh.rest_position
     mirrored = x * [1.0, -1.0, 1.0]
@@ -110,7 +112,7 @@ def test_coat_is_its_own_mirror_image():
     assert set(image[mesh.grasp["left"]]) == set(mesh.grasp["right"].tolist())
 
 
-def test_normals_point_outward():
+def test_normals_point_outward() -> None:
     mesh = make_coat(CoatParameters(), 0.03)
     t = mesh.rest_position[mesh.faces]
     normal = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
@@ -126,12 +128,12 @@ def test_normals_point_outward():
         assert ((normal * radial)[sleeve].sum(axis=1) > 0).all()
 
 
-def test_node_count_is_what_plant_and_controller_plan_for():
+def test_node_count_is_what_plant_and_controller_plan_for() -> None:
     assert 3000 <= len(make_coat(CoatParameters(), 0.02).rest_position) <= 4500
     assert 1500 <= len(make_coat(CoatParameters(), 0.028).rest_position) <= 2200
 
 
-def test_regions_and_grasp_lie_where_their_names_say():
+def test_regions_and_grasp_lie_where_their_names_say() -> None:
     p = CoatParameters()
     mesh = make_coat(p, 0.02)
     x = mesh.rest_position
@@ -147,7 +149,7 @@ def test_regions_and_grasp_lie_where_their_names_say():
         )
 
 
-def test_presets_differ_clearly():
+def test_presets_differ_clearly() -> None:
     overcoat, jacket = (COATS[name] for name in ("overcoat", "jacket"))
     assert overcoat.body_length > 1.3 * jacket.body_length
     assert overcoat.armhole_girth > 1.1 * jacket.armhole_girth
@@ -170,7 +172,7 @@ def test_presets_differ_clearly():
         ({"chest": "wide"}, "chest"),
     ],
 )
-def test_bad_measure_is_named(change, key):
+def test_bad_measure_is_named(change: dict[str, Any], key: str) -> None:
     with pytest.raises(UserError) as caught:
         make_coat(replace(CoatParameters(), **change), 0.03, source="coat.yaml")
     assert caught.value.key == key
@@ -179,6 +181,6 @@ def test_bad_measure_is_named(change, key):
 
 
 @pytest.mark.parametrize("spacing", [0.0, 0.009, 0.07, np.nan, 1.0])
-def test_bad_spacing_is_named(spacing):
+def test_bad_spacing_is_named(spacing: float) -> None:
     with pytest.raises(UserError, match="spacing"):
         make_coat(CoatParameters(), spacing)

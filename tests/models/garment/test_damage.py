@@ -1,6 +1,7 @@
 """A damaged file is refused in one line, or still gives a garment: nothing in between."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.files import RawMesh
 from drake_dress.models.garment.load import load_garment
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.plausible import check_plausible
 
 COATS_AT = {(name, s): make_coat(COATS[name], s) for name in COATS for s in (0.03, 0.06)}
@@ -19,7 +21,7 @@ LINES = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in JACKET.rest_position]
 LINES += [f"f {a} {b} {c}" for a, b, c in JACKET.faces + 1]
 
 
-def mesh_or_refusal(path):
+def mesh_or_refusal(path: Path) -> GarmentMesh | None:
     begin = time.perf_counter()
     try:
         mesh = load_garment(path, unit="m")
@@ -37,7 +39,9 @@ def mesh_or_refusal(path):
 
 @settings(max_examples=60)
 @given(st.data())
-def test_damaged_lines_are_refused_or_do_no_harm(tmp_path_factory, data):
+def test_damaged_lines_are_refused_or_do_no_harm(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
     lines = list(LINES)
     for _ in range(data.draw(st.integers(1, 3))):
         if not lines:
@@ -68,7 +72,7 @@ def test_damaged_lines_are_refused_or_do_no_harm(tmp_path_factory, data):
 
 @pytest.mark.parametrize("by", [1, -1, 2])
 @pytest.mark.parametrize("coat", COATS_AT)
-def test_shifted_node_numbers_are_told(coat, by):
+def test_shifted_node_numbers_are_told(coat: tuple[str, float], by: int) -> None:
     mesh = COATS_AT[coat]
     shifted = RawMesh.of("coat", np.roll(mesh.rest_position, by, axis=0), mesh.faces.astype(int))
     with pytest.raises(UserError, match="node numbers shifted by a missing line"):
@@ -78,7 +82,7 @@ def test_shifted_node_numbers_are_told(coat, by):
 
 @settings(max_examples=40)
 @given(st.integers(0, len(JACKET.rest_position) - 1), st.floats(0.4, 50.0), st.integers(0, 2))
-def test_a_node_that_is_thrown_off_is_named(node, far, axis):
+def test_a_node_that_is_thrown_off_is_named(node: int, far: float, axis: int) -> None:
     position = JACKET.rest_position.copy()
     position[node, axis] += far
     with pytest.raises(UserError, match=rf"node {node} "):

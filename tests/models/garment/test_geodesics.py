@@ -19,7 +19,7 @@ def sheet(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_on_a_flat_sheet_they_are_straight() -> None:
     x, faces = sheet(0)
-    a, b = np.arange(5), np.arange(40, 90)
+    a, b = np.arange(5, dtype=np.int32), np.arange(40, 90, dtype=np.int32)
     straight = np.linalg.norm(x[a][:, None] - x[b], axis=2)
     np.testing.assert_allclose(geodesic_distances(x, faces, a, b), straight, rtol=1e-9)
 

@@ -1,39 +1,44 @@
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.load import load_garment
-from drake_dress.models.garment.mesh import edge_lengths, loop_length
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, loop_length
 
 
 @pytest.fixture(scope="module")
-def coat():
+def coat() -> GarmentMesh:
     return make_coat(CoatParameters(), 0.03)
 
 
-def write(path, position, faces):
+def write(path: Path, position: FloatArray, faces: IntArray) -> Path:
     trimesh.Trimesh(position, faces, process=False).export(path)
     return path
 
 
-def write_obj(path, position, faces):
+def write_obj(path: Path, position: FloatArray, faces: IntArray) -> Path:
     lines = [f"v {a} {b} {c}" for a, b, c in position] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
-def named(mesh):
+def named(mesh: GarmentMesh) -> dict[str, list[int]]:
     return {name: loop.tolist() for name, loop in mesh.loops.items()}
 
 
 @pytest.mark.parametrize("extension", ["obj", "ply", "stl"])
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
-def test_every_format_and_unit_gives_the_same_garment(tmp_path, coat, extension, unit, factor):
+def test_every_format_and_unit_gives_the_same_garment(
+    tmp_path: Path, coat: GarmentMesh, extension: str, unit: str, factor: float
+) -> None:
     path = write(tmp_path / f"coat.{extension}", factor * coat.rest_position, coat.faces)
     mesh = load_garment(path, unit=unit)
     assert len(mesh.rest_position) == len(coat.rest_position)
@@ -49,7 +54,9 @@ def test_every_format_and_unit_gives_the_same_garment(tmp_path, coat, extension,
         assert np.linalg.norm(armhole.mean(axis=0) - true.mean(axis=0)) < 0.05
 
 
-def test_scale_beside_the_unit_brings_any_file_to_life_size(tmp_path, coat):
+def test_scale_beside_the_unit_brings_any_file_to_life_size(
+    tmp_path: Path, coat: GarmentMesh
+) -> None:
     path = write(tmp_path / "coat.obj", 39.37 * coat.rest_position, coat.faces)
     mesh = load_garment(path, unit="m", scale=1.0 / 39.37)
     size = np.ptp(coat.rest_position, axis=0)
@@ -61,7 +68,7 @@ def test_scale_beside_the_unit_brings_any_file_to_life_size(tmp_path, coat):
     assert "expected 0.0001 to 10000" in refusal(path, unit="m", scale=0.0)
 
 
-def test_named_loops_and_grasp_are_kept_exactly(tmp_path, coat):
+def test_named_loops_and_grasp_are_kept_exactly(tmp_path: Path, coat: GarmentMesh) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces)
     grasp = {side: nodes.tolist() for side, nodes in coat.grasp.items()}
     mesh = load_garment(path, unit="m", loops=named(coat), grasp=grasp)
@@ -74,13 +81,15 @@ def test_named_loops_and_grasp_are_kept_exactly(tmp_path, coat):
     assert np.array_equal(mesh.region == 1, sleeve)
 
 
-def test_file_in_another_place_lands_between_the_shoulder_tips(tmp_path, coat):
+def test_file_in_another_place_lands_between_the_shoulder_tips(
+    tmp_path: Path, coat: GarmentMesh
+) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position + [5.0, 1.0, 2.0], coat.faces)
     mesh = load_garment(path, unit="m", loops=named(coat))
     assert np.allclose(mesh.rest_position, coat.rest_position)
 
 
-def test_faces_that_point_inward_are_turned(tmp_path, coat):
+def test_faces_that_point_inward_are_turned(tmp_path: Path, coat: GarmentMesh) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces[:, ::-1])
     mesh = load_garment(path, unit="m", loops=named(coat))
     assert np.array_equal(np.sort(mesh.faces), np.sort(coat.faces))
@@ -90,7 +99,7 @@ def test_faces_that_point_inward_are_turned(tmp_path, coat):
 
 
 @pytest.mark.parametrize("spacing", [0.02, 0.045, 0.06])
-def test_spacing_is_met_and_loops_stay(tmp_path, coat, spacing):
+def test_spacing_is_met_and_loops_stay(tmp_path: Path, coat: GarmentMesh, spacing: float) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces)
     mesh = load_garment(path, unit="m", spacing=spacing, loops=named(coat))
     mesh.validate()
@@ -104,7 +113,7 @@ def test_spacing_is_met_and_loops_stay(tmp_path, coat, spacing):
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_found_armhole_is_a_loop_that_parts_the_sleeve(tmp_path, scale):
+def test_found_armhole_is_a_loop_that_parts_the_sleeve(tmp_path: Path, scale: float) -> None:
     coat = make_coat(CoatParameters(), 0.02 * scale)
     mesh = load_garment(write(tmp_path / "c.ply", coat.rest_position, coat.faces), unit="m")
     for side, code in (("left", 1), ("right", 2)):
@@ -114,7 +123,7 @@ def test_found_armhole_is_a_loop_that_parts_the_sleeve(tmp_path, scale):
         assert np.mean(mesh.region == code) == pytest.approx(np.mean(coat.region == code), rel=0.3)
 
 
-def refusal(path, **kwargs):
+def refusal(path: Path, **kwargs: Any) -> str:
     with pytest.raises(UserError) as caught:
         load_garment(path, **{"unit": "m", **kwargs})
     message = str(caught.value)
@@ -123,7 +132,7 @@ def refusal(path, **kwargs):
     return message
 
 
-def test_unreadable_file_is_named(tmp_path):
+def test_unreadable_file_is_named(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "none.obj")
     assert "expected .obj, .ply, .stl" in refusal(tmp_path / "coat.fbx")
     for extension in ("obj", "ply", "stl"):
@@ -142,7 +151,7 @@ def test_unreadable_file_is_named(tmp_path):
     assert "empty" in refusal(path)
 
 
-def test_unusable_mesh_is_named(tmp_path, coat):
+def test_unusable_mesh_is_named(tmp_path: Path, coat: GarmentMesh) -> None:
     x, faces = coat.rest_position, coat.faces
     path = tmp_path / "coat.obj"
     broken = x.copy()
@@ -157,7 +166,7 @@ def test_unusable_mesh_is_named(tmp_path, coat):
     assert "separate parts" in refusal(write_obj(path, np.vstack([x, x + [0, 0, 0.3]]), two))
 
 
-def test_wrong_unit_is_named_with_the_one_that_fits(tmp_path, coat):
+def test_wrong_unit_is_named_with_the_one_that_fits(tmp_path: Path, coat: GarmentMesh) -> None:
     path = write_obj(tmp_path / "coat.obj", 100 * coat.rest_position, coat.faces)
     message = refusal(path, unit="m")
     assert "unit" in message
@@ -165,7 +174,7 @@ def test_wrong_unit_is_named_with_the_one_that_fits(tmp_path, coat):
     assert "expected one of m, cm, mm" in refusal(path, unit="inch")
 
 
-def test_garment_without_findable_loops_is_named(tmp_path, coat):
+def test_garment_without_findable_loops_is_named(tmp_path: Path, coat: GarmentMesh) -> None:
     sphere = trimesh.creation.icosphere(3, radius=0.4)
     path = write(tmp_path / "sphere.obj", sphere.vertices, sphere.faces)
     assert "no cuffs found" in refusal(path)
@@ -173,7 +182,7 @@ def test_garment_without_findable_loops_is_named(tmp_path, coat):
     assert "face +x" in refusal(write_obj(tmp_path / "coat.obj", turned, coat.faces))
 
 
-def test_bad_indices_are_named(tmp_path, coat):
+def test_bad_indices_are_named(tmp_path: Path, coat: GarmentMesh) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces)
     loop = named(coat)["left_cuff"]
     assert "loops.left_cuff" in refusal(path, loops={"left_cuff": [*loop, 10**6]})

@@ -2,6 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.files import RawMesh
@@ -13,10 +14,11 @@ X = JACKET.rest_position
 FACES = JACKET.faces.astype(np.int64)
 
 
-def in_panels(panel, gap, seed):
+def in_panels(panel: IndexArray, gap: float, seed: int) -> tuple[RawMesh, IndexArray]:
     """The jacket cut into panels, each with nodes of its own, moved by up to half the gap."""
     rng = np.random.default_rng(seed)
-    position, faces, origin = [], [], []
+    faces, origin = [], []
+    position: list[FloatArray] = []
     for k in np.unique(panel):
         own, local = np.unique(FACES[panel == k], return_inverse=True)
         faces.append(local.reshape(-1, 3) + sum(map(len, position)))
@@ -28,14 +30,14 @@ def in_panels(panel, gap, seed):
     return mesh, np.concatenate(origin)
 
 
-def quadrants():
+def quadrants() -> IndexArray:
     middle = X[FACES].mean(axis=1)
     return (middle[:, 1] > 0.01) + 2 * (middle[:, 0] > 0.0)
 
 
 @settings(max_examples=25)
 @given(st.floats(1e-7, 5e-3), st.integers(0, 2**32 - 1))
-def test_seams_within_the_distance_are_sewn_and_nothing_else(gap, seed):
+def test_seams_within_the_distance_are_sewn_and_nothing_else(gap: float, seed: int) -> None:
     mesh, origin = in_panels(quadrants(), gap, seed)
     sewn = seams_sewn(mesh, gap)
     # nodes are one if and only if they were before the jacket was cut
@@ -51,7 +53,7 @@ def test_seams_within_the_distance_are_sewn_and_nothing_else(gap, seed):
 
 @settings(max_examples=25)
 @given(st.floats(0.0, 0.02))
-def test_a_sound_mesh_stays_as_it_is(distance):
+def test_a_sound_mesh_stays_as_it_is(distance: float) -> None:
     mesh = RawMesh.of("coat", X, FACES)
     sewn = seams_sewn(duplicates_merged(mesh), distance)
     assert np.array_equal(sewn.position, X)
@@ -59,7 +61,7 @@ def test_a_sound_mesh_stays_as_it_is(distance):
     assert np.array_equal(sewn.became, np.arange(len(X)))
 
 
-def test_a_narrow_ribbon_is_not_sewn_to_itself():
+def test_a_narrow_ribbon_is_not_sewn_to_itself() -> None:
     along = np.arange(20.0) * 0.02
     x = np.concatenate([np.stack([along, 0 * along + y, 0 * along], axis=1) for y in (0, 0.004)])
     quads = [(i, i + 1, i + 21, i + 20) for i in range(19)]
@@ -70,7 +72,7 @@ def test_a_narrow_ribbon_is_not_sewn_to_itself():
 
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
-def test_equal_nodes_are_merged_in_any_order(seed):
+def test_equal_nodes_are_merged_in_any_order(seed: int) -> None:
     soup = X[FACES].reshape(-1, 3)
     order = np.random.default_rng(seed).permutation(len(soup))
     new = np.empty(len(order), dtype=np.int64)

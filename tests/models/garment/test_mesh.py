@@ -1,7 +1,11 @@
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import IndexArray
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.manifold import check_manifold
@@ -11,11 +15,11 @@ TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
 @pytest.fixture(scope="module")
-def coat():
+def coat() -> GarmentMesh:
     return make_coat(CoatParameters(), 0.06)
 
 
-def changed(mesh, **kwargs):
+def changed(mesh: GarmentMesh, **kwargs: Any) -> GarmentMesh:
     parts = {
         "rest_position": mesh.rest_position.copy(),
         "faces": mesh.faces.copy(),
@@ -26,7 +30,7 @@ def changed(mesh, **kwargs):
     return GarmentMesh(**{**parts, **kwargs})
 
 
-def refusal(mesh):
+def refusal(mesh: GarmentMesh) -> str:
     with pytest.raises(UserError) as caught:
         mesh.validate("coat.obj")
     assert str(caught.value).startswith("coat.obj: ")
@@ -34,18 +38,18 @@ def refusal(mesh):
     return str(caught.value)
 
 
-def test_closed_surface_has_no_boundary_and_obeys_euler():
+def test_closed_surface_has_no_boundary_and_obeys_euler() -> None:
     check_manifold(TETRAHEDRON, 4)
     assert boundary_loops(TETRAHEDRON) == []
     assert 4 - len(unique_edges(TETRAHEDRON)) + 4 == 2
 
 
-def test_boundary_keeps_the_surface_to_its_left():
+def test_boundary_keeps_the_surface_to_its_left() -> None:
     (loop,) = boundary_loops(np.array([[0, 1, 2], [0, 2, 3]]))
     assert loop.tolist() == [0, 1, 2, 3]
 
 
-def test_scaling_scales_every_length(coat):
+def test_scaling_scales_every_length(coat: GarmentMesh) -> None:
     larger = coat.scaled(1.05)
     for name, loop in coat.loops.items():
         girth = loop_length(coat.rest_position, loop)
@@ -58,7 +62,7 @@ def test_scaling_scales_every_length(coat):
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, np.inf])
-def test_scale_must_be_positive(coat, factor):
+def test_scale_must_be_positive(coat: GarmentMesh, factor: float) -> None:
     with pytest.raises(UserError, match="scale"):
         coat.scaled(factor)
 
@@ -78,12 +82,12 @@ def test_scale_must_be_positive(coat, factor):
         (np.array([[0, 1, 2], [0, 3, 4]]), 5, "two sheets only touch"),
     ],
 )
-def test_broken_topology_is_named(faces, count, reason):
+def test_broken_topology_is_named(faces: IndexArray, count: int, reason: str) -> None:
     with pytest.raises(UserError, match=reason):
         check_manifold(faces, count)
 
 
-def test_unusable_garment_is_named(coat):
+def test_unusable_garment_is_named(coat: GarmentMesh) -> None:
     coat.validate()
     x = coat.rest_position.copy()
     x[7, 1] = np.nan
@@ -98,8 +102,8 @@ def test_unusable_garment_is_named(coat):
     assert "region" in refusal(changed(coat, region=coat.region + 7))
 
 
-def test_unusable_loop_is_named(coat):
-    def with_loop(loop):
+def test_unusable_loop_is_named(coat: GarmentMesh) -> None:
+    def with_loop(loop: npt.NDArray[np.integer]) -> GarmentMesh:
         return changed(coat, loops={**coat.loops, "left_cuff": np.asarray(loop)})
 
     loop = coat.loops["left_cuff"]

@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.manifold import check_manifold
@@ -15,7 +16,7 @@ JACKET = make_coat(COATS["jacket"], 0.06)
 LOOPS = list(JACKET.loops.values())
 
 
-def with_fan(corners):
+def with_fan(corners: int) -> tuple[FloatArray, IntArray]:
     """The jacket with a polygon at its hem, cut as a fan from one of its corners."""
     x, faces = JACKET.rest_position, JACKET.faces
     rim = boundary_loops(faces)[0]
@@ -28,7 +29,7 @@ def with_fan(corners):
 
 @settings(max_examples=25)
 @given(st.floats(0.012, 0.2), st.integers(0, 8))
-def test_refined_mesh_is_the_same_surface_with_short_edges(longest, corners):
+def test_refined_mesh_is_the_same_surface_with_short_edges(longest: float, corners: int) -> None:
     x, faces = with_fan(corners) if corners >= 3 else (JACKET.rest_position, JACKET.faces)
     fine, cut, loops = refine(x, faces, LOOPS, longest)
     n = len(fine)
@@ -51,7 +52,7 @@ def test_refined_mesh_is_the_same_surface_with_short_edges(longest, corners):
     assert n - len(x) <= 4.0 * cells.sum()
 
 
-def test_only_edges_that_are_too_long_are_cut():
+def test_only_edges_that_are_too_long_are_cut() -> None:
     x, faces = with_fan(8)
     plain = edge_lengths(JACKET.rest_position, JACKET.faces).max()
     assert edge_lengths(x, faces).max() > 2.0 * plain
@@ -62,14 +63,14 @@ def test_only_edges_that_are_too_long_are_cut():
     assert len(old & {tuple(face) for face in cut.tolist()}) > 0.97 * len(old)
 
 
-def test_mesh_that_would_become_too_large_is_refused():
+def test_mesh_that_would_become_too_large_is_refused() -> None:
     with pytest.raises(UserError, match="over 5,000 nodes"):
         refine(JACKET.rest_position, JACKET.faces, LOOPS, 0.002, most_nodes=5000)
 
 
 @settings(max_examples=8)
 @given(st.floats(0.02, 0.08))
-def test_spacing_is_met_beside_a_long_fan(spacing):
+def test_spacing_is_met_beside_a_long_fan(spacing: float) -> None:
     x, faces = with_fan(8)
     position, cut, loops, became = to_spacing(x, faces, LOOPS, spacing)
     check_manifold(cut, len(position))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.active import ActiveArm, ActiveParameters, ArmState, Want
 from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.armhole import Armhole, find_armhole
@@ -34,7 +38,10 @@ def hole(angles: np.ndarray, center: np.ndarray, into: np.ndarray) -> Armhole:
 
 
 def play(
-    motions: list[Motion], duration: float, center=lambda t: FAR, into=(-0.3, 0.8, -0.5)
+    motions: list[Motion],
+    duration: float,
+    center: Callable[[float], FloatArray] = lambda t: FAR,
+    into: npt.ArrayLike = (-0.3, 0.8, -0.5),
 ) -> tuple[list[ArmState], np.ndarray]:
     """Returns states, and the hand (n,3), of an arm that is where its set-point is."""
     active = ActiveArm(ARM, REST, LIMITS, STIFFNESS, motions, P)

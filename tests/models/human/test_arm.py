@@ -1,8 +1,11 @@
 """An arm's kinematics and weight, held against finite differences of its own energy."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import GRAVITY, Arm
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
 from drake_dress.models.sides import SIDES, Side
@@ -22,7 +25,7 @@ def potential(arm: Arm, angles: np.ndarray) -> float:
     return float(GRAVITY * (M.upper_arm_mass * upper[2] + M.forearm_mass * fore[2]))
 
 
-def slope(of, angles: np.ndarray) -> np.ndarray:
+def slope(of: Callable[[FloatArray], FloatArray | float], angles: np.ndarray) -> np.ndarray:
     return np.array([(of(angles + EPS * e) - of(angles - EPS * e)) / (2 * EPS) for e in np.eye(4)])
 
 

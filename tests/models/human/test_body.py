@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,17 +11,16 @@ from scipy.spatial.transform import Rotation
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
-    SIDES,
     ArmPose,
     BodyMeasures,
     Posture,
-    Side,
     arm_points,
     arm_rotations,
     body_capsules,
     shoulder_height,
     shoulder_joint,
 )
+from drake_dress.models.sides import SIDES, Side
 
 M = BodyMeasures()
 POSTURES: tuple[Posture, Posture] = ("standing", "sitting")
@@ -142,7 +143,7 @@ def test_sitting_lowers_the_shoulders_and_keeps_arms_and_trunk() -> None:
         ({"chest_depth": 0.5}, "person: chest_depth: is 0.5 m, expected at most"),
     ],
 )
-def test_impossible_measures_are_told(change: dict, message: str) -> None:
+def test_impossible_measures_are_told(change: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         BodyMeasures(**change)
 
@@ -151,4 +152,4 @@ def test_unusable_angle_and_posture_are_told() -> None:
     with pytest.raises(UserError, match="arm: abduction: is inf"):
         ArmPose(abduction=float("inf"))
     with pytest.raises(UserError, match="posture: is 'lying', expected one of standing, sitting"):
-        body_capsules(M, "lying")  # type: ignore[arg-type]
+        body_capsules(M, "lying")  # type: ignore[arg-type]  # that is what it is about

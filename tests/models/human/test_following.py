@@ -134,6 +134,6 @@ def test_closed_cycle_costs_the_leader_work(seed: int, back: float | None) -> No
         ({"max_speed": float("inf")}, "max_speed: is inf"),
     ],
 )
-def test_unusable_parameters_are_told(change: dict, message: str) -> None:
+def test_unusable_parameters_are_told(change: dict[str, float], message: str) -> None:
     with pytest.raises(UserError, match=message):
         FollowingParameters(**change)

@@ -1,5 +1,7 @@
 """What a person wants starts and ends at rest, and is as large and fast as it says."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.human.motions import Turn, Wave, Withdraw, minimum_jerk, stance
 
 
-def slope(of, t: float) -> float:
+def slope(of: Callable[[float], float], t: float) -> float:
     return (of(t + 1e-6) - of(t - 1e-6)) / 2e-6
 
 
@@ -58,6 +60,6 @@ def test_withdrawal_is_on_in_its_time() -> None:
         (lambda: Turn(start=-1.0), "start: is -1.0"),
     ],
 )
-def test_unusable_motions_are_told(make, message: str) -> None:
+def test_unusable_motions_are_told(make: Callable[[], object], message: str) -> None:
     with pytest.raises(UserError, match=message):
         make()

@@ -1,6 +1,7 @@
 """An estimate is believed if the person that is described can be so, and only then."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points, shoulder_joint
 from drake_dress.models.sides import SIDES
@@ -109,7 +111,9 @@ def test_swapped_sides_are_refused_and_named(
 )
 @few
 @given(angles, angles, seeds)
-def test_y_up_is_refused_and_named(turn, left: np.ndarray, right: np.ndarray, seed: int) -> None:
+def test_y_up_is_refused_and_named(
+    turn: Callable[[FloatArray], FloatArray], left: np.ndarray, right: np.ndarray, seed: int
+) -> None:
     assert refused(turn(person(left, right) + noise(seed))).startswith("coordinates are y up")
 
 

@@ -19,7 +19,9 @@ SOUND = (Fault.NONE, Fault.NONE)
 STALE = (Fault.NONE, Fault.STALE)
 
 
-def after(state: SupervisionState, faults: tuple[Fault, ...], begin: float, time: float):
+def after(
+    state: SupervisionState, faults: tuple[Fault, ...], begin: float, time: float
+) -> tuple[SupervisionState, float]:
     """Returns the state after a time with the same faults, and when that is."""
     for k in range(1, round(time / PERIOD) + 1):
         state = supervise(state, faults, begin + k * PERIOD, PATIENCE)

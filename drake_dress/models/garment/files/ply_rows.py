@@ -106,12 +106,16 @@ def read_header(header: str, source: str) -> tuple[str, list[Element]]:
             raise _bad(source, number, f"{line.strip()[:60]!r}, expected format, element, property")
     if order is None:
         raise UserError(source, "format", "is missing, expected ascii or binary_…_endian")
+    _check_elements(elements, source)
+    return order, elements
+
+
+def _check_elements(elements: list[Element], source: str) -> None:
     for element in elements:
         if element.count and not element.properties:
             raise UserError(source, f"element {element.name}", "has rows without properties")
         if len(set(element.names)) < len(element.names):
             raise UserError(source, f"element {element.name}", "has two properties of one name")
-    return order, elements
 
 
 def _property(words: list[str], source: str, number: int) -> Property:

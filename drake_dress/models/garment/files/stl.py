@@ -56,53 +56,75 @@ def _binary(data: bytes, source: str) -> RawMesh:
 
 
 def _text(text: str, source: str, most_faces: int) -> RawMesh:
-    numbers = Numbers(source)
-    nodes: list[list[float]] = []
-    node_line: list[int] = []
-    face_line: list[int] = []
-    face_part: list[int] = []
-    names: list[tuple[str, ...]] = []
-    open_solid = False
-    corners = 0  # of the triangle that is open
+    found = _Statements(source, most_faces)
     for line, content in enumerate(lines_of(text), start=1):
         words = content.split()
         keyword = words[0].lower() if words else ""
         if keyword == "vertex":
-            if len(words) != 4:
-                raise UserError(source, f"line {line}", "expected vertex x y z")
-            nodes.append(numbers.read(words[1:], line))
-            node_line.append(line)
-            corners += 1
+            found.add_corner(words, line)
         elif keyword == "endfacet":
-            if corners != 3:
-                raise UserError(
-                    source, f"line {line}", f"a triangle with {corners} corners, expected 3"
-                )
-            face_line.append(line)
-            if len(face_line) > most_faces:
-                raise too_many(source, most_faces)
-            face_part.append(len(names) - 1)
-            corners = 0
+            found.end_triangle(line)
         elif keyword == "solid":
-            if open_solid:
-                raise UserError(source, f"line {line}", "a solid begins before the last has ended")
-            open_solid = True
-            names.append(tuple(filter(None, (" ".join(words[1:]),))))
+            found.begin_solid(words, line)
         elif keyword == "endsolid":
-            open_solid = False
+            found.open_solid = False
         elif keyword not in ("", "facet", "outer", "endloop"):
             raise UserError(source, f"line {line}", f"{keyword[:40]!r} is no statement of STL")
-    if open_solid or corners:
-        raise UserError(source, "", "ends within a solid, expected endsolid (is it cut off?)")
-    if len(nodes) != 3 * len(face_line):
-        raise UserError(source, "", "holds corners outside of triangles, expected an STL file")
-    position = np.array(nodes, dtype=np.float64).reshape(-1, 3)
-    return RawMesh.of(
-        source,
-        position,
-        np.arange(len(position)).reshape(-1, 3),
-        face_part=np.array(face_part, dtype=np.int64),
-        part_names=tuple(names) or ((),),
-        node_line=np.array(node_line, dtype=np.int64),
-        face_line=np.array(face_line, dtype=np.int64),
-    )
+    return found.mesh()
+
+
+class _Statements:
+    """What the statements of a text have told so far."""
+
+    def __init__(self, source: str, most_faces: int) -> None:
+        self.source, self.most_faces = source, most_faces
+        self.numbers = Numbers(source)
+        self.nodes: list[list[float]] = []
+        self.node_line: list[int] = []
+        self.face_line: list[int] = []
+        self.face_part: list[int] = []
+        self.names: list[tuple[str, ...]] = []
+        self.open_solid = False
+        self.corners = 0  # of the triangle that is open
+
+    def add_corner(self, words: list[str], line: int) -> None:
+        if len(words) != 4:
+            raise UserError(self.source, f"line {line}", "expected vertex x y z")
+        self.nodes.append(self.numbers.read(words[1:], line))
+        self.node_line.append(line)
+        self.corners += 1
+
+    def end_triangle(self, line: int) -> None:
+        if self.corners != 3:
+            told = f"a triangle with {self.corners} corners, expected 3"
+            raise UserError(self.source, f"line {line}", told)
+        self.face_line.append(line)
+        if len(self.face_line) > self.most_faces:
+            raise too_many(self.source, self.most_faces)
+        self.face_part.append(len(self.names) - 1)
+        self.corners = 0
+
+    def begin_solid(self, words: list[str], line: int) -> None:
+        if self.open_solid:
+            told = "a solid begins before the last has ended"
+            raise UserError(self.source, f"line {line}", told)
+        self.open_solid = True
+        self.names.append(tuple(filter(None, (" ".join(words[1:]),))))
+
+    def mesh(self) -> RawMesh:
+        """Returns the mesh, at the end of the text."""
+        source = self.source
+        if self.open_solid or self.corners:
+            raise UserError(source, "", "ends within a solid, expected endsolid (is it cut off?)")
+        if len(self.nodes) != 3 * len(self.face_line):
+            raise UserError(source, "", "holds corners outside of triangles, expected an STL file")
+        position = np.array(self.nodes, dtype=np.float64).reshape(-1, 3)
+        return RawMesh.of(
+            source,
+            position,
+            np.arange(len(position)).reshape(-1, 3),
+            face_part=np.array(self.face_part, dtype=np.int64),
+            part_names=tuple(self.names) or ((),),
+            node_line=np.array(self.node_line, dtype=np.int64),
+            face_line=np.array(self.face_line, dtype=np.int64),
+        )

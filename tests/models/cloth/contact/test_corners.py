@@ -58,7 +58,8 @@ def test_the_way_out_of_a_hollow_is_the_shortest(angle: float, y: float, z: floa
 @given(st.integers(0, 10_000))
 def test_the_nearest_other_body_is_the_second_of_all(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    bodies = Obstacles.resting(*rng.normal(size=(2, 4, 3)), rng.uniform(0.01, 0.5, 4))
+    a, b = rng.normal(size=(2, 4, 3))
+    bodies = Obstacles.resting(a, b, rng.uniform(0.01, 0.5, 4))
     plane = HalfSpaces.resting(rng.normal(size=3), rng.standard_normal(3))
     bodies = replace(bodies, half_spaces=plane)
     x = rng.normal(size=(20, 3))

@@ -11,7 +11,7 @@ from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 
 @given(st.integers(0, 10_000), st.floats(0.0, 0.5))
 @settings(max_examples=60)
-def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
+def test_what_is_out_of_reach_is_as_far_as_asked(seed: int, distance: float) -> None:
     rng = np.random.default_rng(seed)
     x = rng.uniform(-0.3, 0.3, (20, 3)) + rng.uniform(-1.5, 1.5, 3)
     ends = rng.uniform(-0.5, 0.5, (2, 3, 3))
@@ -27,7 +27,7 @@ def test_what_is_out_of_reach_is_as_far_as_asked(seed, distance):
 
 
 @given(st.integers(0, 10_000), st.integers(1, 9))
-def test_nearest_capsule_is_the_nearest_of_all(seed, count):
+def test_nearest_capsule_is_the_nearest_of_all(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(2, count, 3))
     b[::3] = a[::3]

@@ -1,6 +1,7 @@
 """What every inner iteration has to hold: its limit, its contact, its derivatives."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth
 from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.inner.one_step import OneStep
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import sheet_elements
 
@@ -40,7 +42,9 @@ def draped(h: float) -> tuple[Elements, FloatArray, FloatArray, FloatArray]:
     return e, x, v + 0.02 * rng.normal(size=v.shape), h * motion
 
 
-def make(e: Elements, h: float, name: str, iterations: int, m: Material = MATERIAL):  # type: ignore[no-untyped-def]
+def make(
+    e: Elements, h: float, name: str, iterations: int, m: Material = MATERIAL
+) -> ExplicitBiasCloth:
     return ExplicitBiasCloth(e, m, h, HELD, tolerance=1e-12, iterations=iterations, inner=name)
 
 
@@ -119,7 +123,7 @@ def test_derivatives_match_finite_differences(name: str, iterations: int, h: flo
     cloth = make(e, h, name, iterations)
     tape = cloth.step(x, v, motion, limb(), types)[3]
     g = cloth.vector_jacobian_product(tape, weight_x, weight_v, weight_r, by_material=True)
-    at = {"x": x, "v": v, "motion": motion, "m": MATERIAL, "types": types}
+    at: dict[str, Any] = {"x": x, "v": v, "motion": motion, "m": MATERIAL, "types": types}
     for key, point, slope in (("x", x, g.x), ("v", v, g.v), ("motion", motion, g.held_motion)):
         numeric, exact = [], []
         for _ in range(5):
@@ -197,6 +201,7 @@ def test_all_routes_through_contact_lead_to_the_same_step_and_derivative(h: floa
     found = []
     for many, many_slipping in ((10**6, 0), (0, 10**6), (0, 0)):
         cloth = make(e, h, "one_step", 1)
+        assert isinstance(cloth.inner, OneStep)
         cloth.inner.many, cloth.inner.many_slipping = many, many_slipping
         x1, v1, r, tape = cloth.step(x, v, motion, limb())
         assert {SLIP, FREE} <= set(tape.types.mode)

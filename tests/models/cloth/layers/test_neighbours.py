@@ -1,5 +1,7 @@
 """Laws of the search for pairs."""
 
+from collections.abc import Collection
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -129,7 +131,7 @@ def test_what_was_found_before_makes_no_difference(seed: int, size: float, turn:
         x = x + dx
 
 
-def _key(kind: int, nodes: list[int]) -> tuple[frozenset[int], frozenset[int]] | frozenset:
+def _key(kind: int, nodes: list[int]) -> Collection[frozenset[int]]:
     if kind == 0:
         return frozenset(nodes[:1]), frozenset(nodes[1:])
     return frozenset((frozenset(nodes[:2]), frozenset(nodes[2:])))

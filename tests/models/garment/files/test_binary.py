@@ -1,6 +1,7 @@
 """PLY and STL: every way of writing them reads to the same mesh, and damage is told."""
 
 import struct
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.files import RawMesh
 from drake_dress.models.garment.files import ply as ply_file
 from drake_dress.models.garment.files import stl as stl_file
 
@@ -17,21 +19,23 @@ X = JACKET.rest_position.astype(np.float32).astype(np.float64)
 FACES = JACKET.faces
 
 
-def read_ply(data, source, most_faces=10**6):
+def read_ply(data: bytes, source: str, most_faces: int = 10**6) -> RawMesh:
     return ply_file.read_ply(data, source, most_faces)
 
 
-def read_stl(data, source, most_faces=10**6):
+def read_stl(data: bytes, source: str, most_faces: int = 10**6) -> RawMesh:
     return stl_file.read_stl(data, source, most_faces)
 
 
-def refused(reader, data, reason):
+def refused(reader: Callable[[bytes, str], RawMesh], data: bytes, reason: str) -> None:
     with pytest.raises(UserError, match=reason) as caught:
         reader(data, "coat")
     assert "\n" not in str(caught.value)
 
 
-def ply(form, *, quads=False, vertices=None, faces=None):
+def ply(
+    form: str, *, quads: bool = False, vertices: int | None = None, faces: int | None = None
+) -> bytes:
     """A PLY of the jacket; with quads, the first two faces as one with a repeated corner."""
     v, f = (len(X) if vertices is None else vertices), (len(FACES) if faces is None else faces)
     header = (
@@ -54,12 +58,12 @@ def ply(form, *, quads=False, vertices=None, faces=None):
     )
 
 
-def stl(name=b"made by hand"):
+def stl(name: bytes = b"made by hand") -> bytes:
     record = b"".join(struct.pack("<12fH", 0, 0, 1, *X[face].ravel(), 0) for face in FACES.tolist())
     return name.ljust(80, b" ") + struct.pack("<I", len(FACES)) + record
 
 
-def text_stl():
+def text_stl() -> str:
     rows = ["solid jacket"]
     for face in FACES.tolist():
         rows += ["  facet normal 0 0 1", "    outer loop"]
@@ -72,7 +76,7 @@ FORMS = ("ascii", "binary_little_endian", "binary_big_endian")
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_ply_reads_to_the_same_mesh(form):
+def test_every_ply_reads_to_the_same_mesh(form: str) -> None:
     for end in (b"\n", b"\r\n") if form == "ascii" else (b"\n",):
         mesh = read_ply(ply(form).replace(b"\n", end) if form == "ascii" else ply(form), "coat")
         assert np.array_equal(mesh.position, X)
@@ -81,7 +85,7 @@ def test_every_ply_reads_to_the_same_mesh(form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_ply_that_counts_wrong_is_refused(form):
+def test_a_ply_that_counts_wrong_is_refused(form: str) -> None:
     whole = ply(form)
     refused(read_ply, whole[:-200], "element face: the header counts")
     refused(read_ply, whole + b"3 0 1 2\n", "more than its header counts")
@@ -104,12 +108,12 @@ def test_a_ply_that_counts_wrong_is_refused(form):
         text_stl().replace(".", ",").encode("utf-16"),
     ],
 )
-def test_every_stl_reads_to_the_same_triangles(data):
+def test_every_stl_reads_to_the_same_triangles(data: bytes) -> None:
     mesh = read_stl(data, "coat")
     assert np.array_equal(mesh.position[mesh.faces], X[FACES])
 
 
-def test_a_damaged_stl_is_refused():
+def test_a_damaged_stl_is_refused() -> None:
     refused(read_stl, stl()[:-30], "header counts 720 triangles and the file holds 719.4")
     refused(read_stl, stl() + b"\0" * 7, "header counts 720 triangles and the file holds 720.1")
     refused(read_stl, b"solid", "ends within a solid")
@@ -121,7 +125,7 @@ def test_a_damaged_stl_is_refused():
     refused(read_stl, "\n".join(lines[:3] + lines[4:]).encode(), "line 7: a triangle with 2")
 
 
-def test_too_many_triangles_are_refused_before_they_are_read():
+def test_too_many_triangles_are_refused_before_they_are_read() -> None:
     for reader, data in (
         (ply_file.read_ply, ply("ascii")),
         (ply_file.read_ply, ply("binary_little_endian")),
@@ -133,7 +137,7 @@ def test_too_many_triangles_are_refused_before_they_are_read():
 
 @settings(max_examples=60)
 @given(st.data())
-def test_damaged_bytes_are_refused_or_read(data):
+def test_damaged_bytes_are_refused_or_read(data: st.DataObject) -> None:
     reader, whole = data.draw(
         st.sampled_from(
             [(read_ply, ply(form)) for form in FORMS]

@@ -3,14 +3,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.files.polygons import triangulated
 
 
-def areas(x, faces):
+def areas(x: FloatArray, faces: IndexArray) -> FloatArray:
     return np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
 
 
-def star(radii, tilt):
+def star(radii: FloatArray, tilt: float) -> FloatArray:
     """A polygon that is seen whole from the origin, in a tilted plane."""
     angle = np.linspace(0.0, 2 * np.pi, len(radii), endpoint=False)
     flat = np.stack([radii * np.cos(angle), radii * np.sin(angle), 0 * angle], axis=1)
@@ -20,7 +21,7 @@ def star(radii, tilt):
 
 @settings(max_examples=60)
 @given(st.lists(st.floats(0.2, 1.0), min_size=3, max_size=24), st.floats(-1.5, 1.5))
-def test_triangles_cover_a_polygon_once_and_face_its_way(radii, tilt):
+def test_triangles_cover_a_polygon_once_and_face_its_way(radii: list[float], tilt: float) -> None:
     x = star(np.array(radii), tilt)
     n = len(x)
     faces, owner = triangulated(x, [range(n)])
@@ -37,7 +38,7 @@ def test_triangles_cover_a_polygon_once_and_face_its_way(radii, tilt):
         assert np.linalg.norm(parts, axis=1).sum() == pytest.approx(np.linalg.norm(whole))
 
 
-def test_quads_are_cut_inside_and_along_the_shorter_diagonal():
+def test_quads_are_cut_inside_and_along_the_shorter_diagonal() -> None:
     x = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0.5, 0.2, 0], [0, 3, 0]], dtype=float)
     concave, _ = triangulated(x, [[0, 1, 3, 4]])
     assert (areas(x, concave)[:, 2] > 0).all()
@@ -46,7 +47,7 @@ def test_quads_are_cut_inside_and_along_the_shorter_diagonal():
     assert all({1, 3} <= set(face) for face in faces.tolist())
 
 
-def test_mixed_polygons_keep_their_order():
+def test_mixed_polygons_keep_their_order() -> None:
     x = star(np.ones(8), 0.0)
     faces, owner = triangulated(x, [[0, 1, 2], range(8), [0, 2, 4, 6], [5, 6, 7]])
     assert owner.tolist() == [0] + [1] * 6 + [2] * 2 + [3]
