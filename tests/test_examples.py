@@ -11,6 +11,8 @@ FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "load_coat": r"left_cuff: \d+ nodes, girth (29|30) cm\n(.*\n)+hem .*: 0\.\d+ m lower\n$",
+    "read_log": r"s_left +force_left.*\n(.*\n)+largest force on a gripper: [1-9]\.\d N\n$",
 }
 
 
