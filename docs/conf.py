@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,9 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 import generated_pages  # noqa: E402  # it is beside this file
 
 from drake_dress import __version__  # noqa: E402
+from drake_dress.models import arrays  # noqa: E402
+
+ARRAYS = [name for name in vars(arrays) if name.endswith("Array")]
 
 project = "drake_dress"
 author = "The drake_dress authors"
@@ -28,10 +32,11 @@ exclude_patterns: list[str] = []
 html_theme = "furo"
 html_title = f"drake_dress {release}"
 html_static_path = ["_static"]
+html_show_copyright = False
 html_css_files = ["site.css"]
 html_theme_options = {"navigation_with_keys": True}
-# Texts are in UTF-8 with the signs of mathematics; straight quotes stay straight.
-smartquotes = False
+# Dashes alone: straight quotes stay straight.
+smartquotes_action = "D"
 
 myst_enable_extensions = ["colon_fence", "attrs_block"]
 myst_heading_anchors = 4
@@ -41,7 +46,11 @@ default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_class_signature = "mixed"
-autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
+autodoc_default_options = {"members": True}
+autodoc_preserve_defaults = True
+# Names of array types as the code writes them, not what they stand for.
+autodoc_type_aliases = {name: name for name in ARRAYS}
+maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -60,3 +69,21 @@ PUBLIC_MODULES = [
 def setup(app: Any) -> None:
     """Writes the generated pages before Sphinx looks for its sources."""
     app.connect("config-inited", lambda *_: generated_pages.write(PUBLIC_MODULES, DOCS))
+    app.connect("autodoc-process-signature", _plain_aliases)
+    app.connect("autodoc-process-docstring", _literal_blocks, priority=100)  # before napoleon
+
+
+def _plain_aliases(*event: Any) -> tuple[str | None, str | None]:
+    """Returns a signature with the names of type aliases that Sphinx leaves wrapped in unions."""
+    pattern = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+    signature, returned = (text and pattern.sub(r"\1", text) for text in event[-2:])
+    return signature, returned
+
+
+def _literal_blocks(*event: Any) -> None:
+    """Marks indented code and equations of a docstring, so that they are not taken for quotes."""
+    lines: list[str] = event[-1]
+    for i in range(len(lines) - 1, 1, -1):
+        begins = lines[i].startswith("    ") and not lines[i - 1].strip()
+        if begins and lines[i - 2].strip() and not lines[i - 2].startswith(" "):
+            lines[i:i] = ["::", ""]

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,12 +51,6 @@ def write(modules: Sequence[str], folder: Path) -> None:
         _write_if_new(reference / path, text)
 
 
-def remove(folder: Path) -> None:
-    """Removes all generated pages."""
-    (folder / KEYS).unlink(missing_ok=True)
-    shutil.rmtree(folder / REFERENCE, ignore_errors=True)
-
-
 def module_pages(module: Any) -> dict[str, str]:
     """Returns the pages of a module by file: one of its own, and one for each public name."""
     short = module.__name__.rpartition(".")[2]
@@ -81,8 +74,7 @@ def module_pages(module: Any) -> dict[str, str]:
     ]
     pages = {f"{short}.md": "\n".join(index)}
     for name in names:
-        kind = _kind(getattr(module, name))
-        text = _directive(kind, f"{module.__name__}.{name}", {})
+        text = _described(f"{module.__name__}.{name}", getattr(module, name))
         pages[f"{short}/{name}.md"] = f"# {name}\n\n{text}\n"
     return pages
 
@@ -114,10 +106,12 @@ def _reference_index(modules: Sequence[str]) -> str:
     )
 
 
-def _kind(value: Any) -> str:
+def _described(name: str, value: Any) -> str:
     if inspect.isclass(value):
-        return "autoclass"
-    return "autofunction" if callable(value) else "autodata"
+        return _directive("autoclass", name, {})
+    if callable(value):
+        return _directive("autofunction", name, {})
+    return _directive("py:data", name, {}).replace("\n```", f"\n\n   {_constant(value)}\n```")
 
 
 def _directive(kind: str, name: str, options: dict[str, str]) -> str:
@@ -127,8 +121,16 @@ def _directive(kind: str, name: str, options: dict[str, str]) -> str:
 
 def _summary(module: Any, name: str) -> str:
     value = getattr(module, name)
-    documented = inspect.isclass(value) or callable(value)
-    return _first_sentence(inspect.getdoc(value)) if documented else "A constant."
+    if inspect.isclass(value) or callable(value):
+        return _first_sentence(inspect.getdoc(value))
+    return _constant(value)
+
+
+def _constant(value: Any) -> str:
+    """Returns what a constant is: the names in it, or its value."""
+    if isinstance(value, Mapping | tuple | list):
+        return f"A constant with {', '.join(f'`{item}`' for item in value)}."
+    return f"The constant `{value!r}`."
 
 
 def _first_sentence(doc: str | None) -> str:
