@@ -13,12 +13,13 @@ import re
 import types
 import typing
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from drake_dress.diagrams.scenario.mirror import Mirror
 from drake_dress.diagrams.scenario.ranges import CHOICES, plain, range_of
 from drake_dress.diagrams.scenario.schema import Scenario
+from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.sides import SIDES
@@ -76,8 +77,9 @@ class Group:
 
 
 def scenario_groups() -> tuple[Group, ...]:
-    """Returns all groups of a scenario that hold values, in the schema's order."""
-    return tuple(group for group in _groups("", Scenario, Scenario(), "") if group.keys)
+    """Returns all groups that hold values, in the schema's order, and then the effects."""
+    plain_groups = (group for group in _groups("", Scenario, Scenario(), "") if group.keys)
+    return (*plain_groups, *map(_effect_group, EFFECTS.values()))
 
 
 def scenario_keys() -> tuple[Key, ...]:
@@ -110,22 +112,46 @@ def markdown_table() -> str:
 
 
 def _groups(name: str, schema: type, values: Any, note: str) -> Iterator[Group]:
-    """Yields a group and all groups below it."""
+    """Yields a group and all groups below it; effects have no fields of their own in the schema."""
     hints = typing.get_type_hints(schema)
-    texts = _meanings(name, schema)
+    doc = inspect.getdoc(schema.MODEL if issubclass(schema, Mirror) else schema) or ""
+    texts = _entries(doc)
     keys, below = [], []
     for entry in dataclasses.fields(schema):
         hint, optional, many = _unwrapped(hints[entry.name])
         inner = f"{name}.{entry.name}" if name else entry.name
         default = getattr(values, entry.name)
+        if inner == "effects":
+            continue
         if isinstance(hint, type) and dataclasses.is_dataclass(hint):
             below.append((inner, hint, default, optional, many))
         else:
             keys.append(_key(inner, hints[entry.name], default, texts.get(entry.name, "")))
-    yield Group(name, _sentence(_summary(name, schema)), note, tuple(keys))
+    yield Group(name, _sentence(_summary(schema)), note, tuple(keys))
     for inner, hint, default, optional, many in below:
         given = hint() if many or default is None else default
         yield from _groups(inner + "[]" * many, hint, given, _note(default, optional, many))
+
+
+def _effect_group(effect: type[Effect]) -> Group:
+    """Returns the parameters of a physical effect and their standard deviations."""
+    texts = _entries(inspect.getdoc(effect) or "")
+    keys = []
+    for p in effect.parameters():
+        name = f"effects.{effect.NAME}.{p.name}"
+        unit = "" if p.unit == "1" else f", {p.unit}"
+        text = texts.get(p.name, _summary(effect)).replace(f"{unit}.", ".", 1)
+        deviation = (
+            f"standard deviation of `{p.name}` as `drake-dress explain` found it. "
+            "Not used by the simulation."
+        )
+        values = {name: (p.off, text), f"{name}_std": (0.0, deviation)}
+        keys += [
+            replace(_key(key, float, *value), unit=unit.removeprefix(", "))
+            for key, value in values.items()
+        ]
+    note = _note(None, optional=True, many=False)
+    return Group(f"effects.{effect.NAME}", _sentence(_summary(effect)), note, tuple(keys))
 
 
 def _note(default: Any, optional: bool, many: bool) -> str:
@@ -185,28 +211,9 @@ def _allowed(name: str) -> str:
     return "" if bounds is None else f"{bounds[0]:.6g} to {bounds[1]:.6g}"
 
 
-def _summary(name: str, schema: type) -> str:
-    effect = EFFECTS.get(name.removeprefix("effects.")) if name.startswith("effects.") else None
-    doc = inspect.getdoc(schema if effect is None else effect) or ""
+def _summary(described: type) -> str:
+    doc = inspect.getdoc(described) or ""
     return " ".join(doc.split("\n\n")[0].split())
-
-
-def _meanings(name: str, schema: type) -> dict[str, str]:
-    """Returns what a group's docstring says of each of its keys."""
-    if name.startswith("effects."):
-        effect = EFFECTS[name.removeprefix("effects.")]
-        texts = _entries(inspect.getdoc(effect) or "")
-        for p in effect.parameters():
-            text = texts.setdefault(p.name, _summary(name, schema))
-            if p.unit != "1" and _UNIT.search(text) is None:
-                texts[p.name] = f"{text.rstrip('.')}, {p.unit}."
-            texts[f"{p.name}_std"] = (
-                f"standard deviation of `{p.name}` as `drake-dress explain` found it"
-                f"{'' if p.unit == '1' else f', {p.unit}'}. Not used by the simulation."
-            )
-        return texts
-    model = schema.MODEL if issubclass(schema, Mirror) else schema
-    return _entries(inspect.getdoc(model) or "")
 
 
 def _entries(doc: str) -> dict[str, str]:
