@@ -1,9 +1,10 @@
 # make demo: dress the dummy.  make test: all checks.  make setup: install only.
+# make docs: the site, build/docs/index.html.  make docs-links: its links to other sites.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test lint format clean
+.PHONY: setup demo test lint format docs docs-links clean
 
 setup: $(VENV)/.installed
 
@@ -25,6 +26,14 @@ format: $(VENV)/.installed-test
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# Warnings are errors: a link or a reference that leads nowhere fails.
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx -b html -W --keep-going -q -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+
+docs-links: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx -b linkcheck -W --keep-going -q -d build/doctrees docs build/docs-links
+
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
 	    { echo "Python 3.11 is needed; set PYTHON=/path/to/python3.11"; exit 1; }
@@ -42,5 +51,9 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
 	touch $@
 
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	touch $@
+
 clean:
-	rm -rf $(VENV) out build .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) out build docs/reference docs/scenario_keys.md .mypy_cache .ruff_cache .hypothesis

@@ -32,6 +32,7 @@ from drake_dress.diagrams.run import RunOptions, run_scenario
 from drake_dress.diagrams.scenario import Scenario, apply_variation, checked_scenario
 from drake_dress.file_output import RUN_FILES, prove_directory
 from drake_dress.models.control.costs import GarmentCost, PlannedStep, Slope
+from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.own_costs import register_cost, unregister_cost
 from drake_dress.models.human.prediction import (
     ConstantVelocityPredictor,
@@ -49,6 +50,7 @@ __all__ = [
     "ConstantVelocityPredictor",
     "Dressing",
     "GarmentCost",
+    "GlobalPlan",
     "MotionPredictor",
     "OwnParts",
     "PlannedStep",

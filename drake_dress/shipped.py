@@ -28,13 +28,15 @@ def shipped_scenarios() -> dict[str, str]:
 def scenario_file(given: str) -> Path:
     """Returns the file that the user means: a path, or the name of a scenario that ships.
 
-    A file of that name in the working directory goes before a scenario that ships.
+    A file of that name in the working directory goes before a scenario that ships. A directory,
+    such as one that an earlier command wrote with `--out`, does not.
 
     Raises:
         UserError: it is neither.
     """
     path = Path(given)
-    if os.path.exists(path) or path.suffix or path.name != given:
+    here = os.path.exists(path) and not os.path.isdir(path)
+    if here or path.suffix or path.name != given:
         return path
     names = [file.stem for file in _files()]
     if given in names:

@@ -15,9 +15,12 @@ EXPECTED = {
     "explain_own_effect": r"lacks is a chain in the hem \(mass 0\.(09|10)\d* ± .* kg\)\.\n$",
     "explain_recording": r"cameras that are displaced(.*\n)*markers off by 35, now [3-8] mm\n$",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "load_coat": r"left_cuff: \d+ nodes, girth (29|30) cm\n(.*\n)+hem .*: 0\.\d+ m lower\n$",
     "own_controller": r"the left gripper rose by \d\.\d cm\n$",
+    "replay_log": r"1\.0 s in my_replay\.html, \d\.\d MB\n$",
     "solve_own_problem": r"converged: True[^$]*largest force 2\.000 N[^$]*to the wall 0\.200 m",
     "swap_predictor": r"asked [1-9]\d* times in 2\.0 s\n$",
+    "read_log": r"s_left +force_left.*\n(.*\n)+largest force on a gripper: [1-9]\.\d N\n$",
 }
 
 

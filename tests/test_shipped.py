@@ -38,6 +38,14 @@ def test_a_file_goes_before_a_scenario_of_its_name(
     assert load_scenario(scenario_file("lab")).duration == 3.0
 
 
+def test_a_directory_of_its_name_does_not_hide_a_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab").mkdir()
+    assert scenario_file("lab").name == "lab.yaml"
+
+
 @pytest.mark.parametrize("given", ["lab.yaml", "./lab", "some/lab"])
 def test_what_is_written_as_a_path_is_one(
     given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

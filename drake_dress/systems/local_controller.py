@@ -97,12 +97,11 @@ class LocalCompensation(LeafSystem):
         self._record = record
         self._threads = ThreadPoolExecutor(1, "local-controller") if beside else None
         self._solving = self.DeclareAbstractState(Value(_Solving()))
-        idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
         resting = controller.resting(0.0)
         self._memory = self.DeclareAbstractState(Value(_Memory(LocalState(), resting)))
         self._plan = self.DeclareAbstractState(Value(resting))
         self._shown = self.DeclareDiscreteState([np.nan, 0.0])
-        self.DeclareAbstractInputPort("plan", Value(idle))
+        self.DeclareAbstractInputPort("plan", Value(GlobalPlan.resting()))
         count = len(controller.planner.mesh.rest_position)
         self.DeclareVectorInputPort("garment_position", 3 * count)
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (joints_count + 1))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
@@ -32,8 +31,7 @@ class PlanFollower(LeafSystem):
 
     def __init__(self) -> None:
         super().__init__()
-        idle = GlobalPlan(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
-        plan = self.DeclareAbstractInputPort("plan", Value(idle))
+        plan = self.DeclareAbstractInputPort("plan", Value(GlobalPlan.resting()))
         ticket = {self.input_port_ticket(plan.get_index()), self.time_ticket()}
         for i, side in enumerate(SIDES):
             self.DeclareVectorOutputPort(f"{side}_velocity_request", 3, self._calc(i), ticket)
@@ -42,9 +40,7 @@ class PlanFollower(LeafSystem):
     def _calc(self, side: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
             plan: GlobalPlan = self.get_input_port(0).Eval(context)
-            step = int(np.floor((context.get_time() - plan.start + 1e-9) / plan.time_step))
-            running = 0 <= step < len(plan.velocity)
-            output.SetFromVector(plan.velocity[step, side] if running else np.zeros(3))
+            output.SetFromVector(plan.velocity_at(context.get_time())[side])
 
         return calc
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 SAID = re.compile(r"python (-m benchmarks\.[\w.]+\w|benchmarks/\w+\.py)")
 TEXTS = [
     ROOT / "README.md",
-    *ROOT.glob("docs/*.md"),
+    *ROOT.glob("docs/**/*.md"),
     *ROOT.glob("benchmarks/**/*.py"),
 ]
 COMMANDS = sorted({c for text in TEXTS for c in SAID.findall(text.read_text(encoding="utf-8"))})

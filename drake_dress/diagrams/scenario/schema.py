@@ -1,7 +1,10 @@
 """What a scenario's YAML may say: plain dataclasses, which Drake's `yaml_load_typed` fills.
 
-A default that a model has, too, is the model's: groups that are a model's settings mirror them,
-others refer to them. `tests/diagrams/test_defaults.py` holds both against each other.
+Where a model has a setting, too, the default is the model's: groups that are a model's settings
+mirror them, others refer to them. `tests/diagrams/test_defaults.py` checks both against each other.
+
+The docstring of each group says what its keys mean. `key_table.py` makes the table of all keys from
+it. The first sentence of an entry ends with the unit: "greatest speed of a gripper, m/s."
 """
 
 import dataclasses
@@ -40,46 +43,79 @@ _SAFETY = safety.SafetyLimits
 
 @dataclass
 class Coat:
-    """A parametric coat: a preset with single measures replaced, all of them scaled; m."""
+    """A parametric coat: a preset, of which single measures may be replaced.
+
+    Attributes:
+        preset: pattern whose measures are used where none is given.
+        scale: factor on all lengths, given ones included.
+        body_length: from the shoulder tips to the hem, m. The preset's if empty, as all measures
+            below.
+        chest: chest girth, m.
+        shoulder_width: from shoulder tip to shoulder tip, m.
+        sleeve_length: from shoulder tip to cuff, m.
+        armhole_girth: girth of each armhole, m.
+        cuff_girth: girth of each cuff, m.
+        collar_height: height of the collar, m.
+        neck_width: between the inner ends of the shoulder seams, m.
+        shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
+        front_opening: gap between the front edges, which is part of the chest girth, m.
+        grasp: what each gripper holds. `patch` is a patch of 7 cm across, at least four nodes;
+            `seam` is the whole shoulder seam, as on a hanger.
+    """
 
     preset: str = "overcoat"
-    scale: float = 1.0  # on all lengths, given ones too
-    body_length: float | None = None  # shoulder tips to hem
-    chest: float | None = None  # girth
-    shoulder_width: float | None = None  # tip to tip
-    sleeve_length: float | None = None  # shoulder tip to cuff
+    scale: float = 1.0
+    body_length: float | None = None
+    chest: float | None = None
+    shoulder_width: float | None = None
+    sleeve_length: float | None = None
     armhole_girth: float | None = None
     cuff_girth: float | None = None
     collar_height: float | None = None
-    neck_width: float | None = None  # between the inner ends of the shoulder seams
-    shoulder_slope: float | None = None  # height of the seam's inner end above its outer end
-    front_opening: float | None = None  # between the front edges, part of the chest girth
-    # What each gripper holds: a patch of 7 cm across, of four nodes at least, or the whole shoulder
-    # seam, as a hanger does.
+    neck_width: float | None = None
+    shoulder_slope: float | None = None
+    front_opening: float | None = None
     grasp: str = "patch"
 
 
 @dataclass
 class Mesh:
-    """A garment of the user's own, instead of the coat."""
+    """A garment of the user's own, which takes the place of the coat.
 
-    file: str = ""  # OBJ, PLY or STL, relative to the scenario
-    unit: str = MeshOptions.unit  # of its coordinates
-    scale: float = MeshOptions.scale  # on all coordinates, beside the unit
-    # Axis of the file that points up. With z the garment faces +x, with y +z, with x +y; a minus
-    # sign turns it upside down.
+    Attributes:
+        file: OBJ, PLY or STL file, relative to the scenario.
+        unit: unit of the file's coordinates.
+        scale: factor on all coordinates, in addition to the unit.
+        up: axis of the file that points up. With `z` the garment faces +x, with `y` +z, with `x`
+            +y; a minus sign turns it upside down.
+        weld: distance across which edges of seams are sewn, m. With 0 only nodes at the same place
+            are joined.
+        leave_out: names of objects or groups to leave out, or sizes such as `<0.05 m`, below which
+            connected parts are left out.
+        loops: node indices in order around each opening, by the opening's name. Openings that are
+            not given are searched for.
+        grasp: node indices that each gripper holds, by side. By default ten nodes near each
+            shoulder tip.
+    """
+
+    file: str = ""
+    unit: str = MeshOptions.unit
+    scale: float = MeshOptions.scale
     up: str = MeshOptions.up
-    # distance across which edges of seams are sewn, m; 0: equal nodes alone
     weld: float = MeshOptions.weld
-    # Names of objects or groups, or sizes such as "<0.05 m" of parts that are connected.
     leave_out: list[str] = field(default_factory=list)
-    loops: dict[str, list[int]] = field(default_factory=dict)  # nodes in order, by loop name
-    grasp: dict[str, list[int]] = field(default_factory=dict)  # nodes held, by side
+    loops: dict[str, list[int]] = field(default_factory=dict)
+    grasp: dict[str, list[int]] = field(default_factory=dict)
 
 
 @dataclass
 class Garment:
-    """The garment's pattern; plant and controller mesh it each at its own spacing."""
+    """The garment's pattern. Plant and controller each mesh it at their own spacing.
+
+    Attributes:
+        coat: parametric coat.
+        mesh: garment from a file; it takes the place of the coat.
+    """
 
     coat: Coat = field(default_factory=Coat)
     mesh: Mesh | None = None
@@ -87,14 +123,23 @@ class Garment:
 
 @dataclass
 class Material:
-    """A fabric, SI units; see models/cloth/material.py."""
+    """A fabric; see models/cloth/material.py.
 
-    surface_density: float = material.Material.surface_density  # kg/m²
-    stretch_stiffness: float = material.Material.stretch_stiffness  # N/m
-    bending_stiffness: float = material.Material.bending_stiffness  # N·m
-    damping: float = 0.003  # s, of the plant's integrator
+    Attributes:
+        surface_density: mass per rest area, kg/m².
+        stretch_stiffness: tension per unit strain and width, N/m.
+        bending_stiffness: moment per unit curvature and width, N·m.
+        damping: stiffness-proportional damping time of the plant's implicit integrator, s.
+        friction: Coulomb coefficient of cloth on skin.
+        margin: distance kept between a node and the skin, m.
+    """
+
+    surface_density: float = material.Material.surface_density
+    stretch_stiffness: float = material.Material.stretch_stiffness
+    bending_stiffness: float = material.Material.bending_stiffness
+    damping: float = 0.003
     friction: float = material.Material.friction
-    margin: float = material.Material.margin  # m, kept between node and skin
+    margin: float = material.Material.margin
 
 
 @mirror_of(body.BodyMeasures)
@@ -104,17 +149,31 @@ class Measures(Mirror):
 
 @dataclass
 class Arm:
-    """Rest pose of an arm, degrees; all zero hangs straight down."""
+    """Rest pose of an arm. With all angles zero it hangs straight down.
 
-    abduction_deg: float = 13.0  # sideways
-    extension_deg: float = 46.0  # backward
-    rotation_deg: float = 0.0  # about its own axis
-    elbow_deg: float = 10.0  # flexion
+    Attributes:
+        abduction_deg: raised sideways, degrees.
+        extension_deg: drawn backward, degrees.
+        rotation_deg: turned about its own axis, degrees.
+        elbow_deg: elbow flexion, degrees.
+    """
+
+    abduction_deg: float = 13.0
+    extension_deg: float = 46.0
+    rotation_deg: float = 0.0
+    elbow_deg: float = 10.0
 
 
 @dataclass
 class Joints:
-    """How the arms yield: N·m/rad and N·m·s/rad."""
+    """Springs and dampers of the person's arm joints.
+
+    Attributes:
+        shoulder_stiffness: stiffness of each shoulder joint, N·m/rad.
+        shoulder_damping: damping of each shoulder joint, N·m·s/rad.
+        elbow_stiffness: stiffness of the elbow, N·m/rad.
+        elbow_damping: damping of the elbow, N·m·s/rad.
+    """
 
     shoulder_stiffness: float = JointParameters.shoulder_stiffness
     shoulder_damping: float = JointParameters.shoulder_damping
@@ -129,47 +188,82 @@ class Following(Mirror):
 
 @dataclass
 class Reach:
-    """The hand goes into the sleeve, once its armhole is near."""
+    """The hand goes into the sleeve once its armhole is near.
+
+    Attributes:
+        side: hand that reaches.
+        start: earliest time, s.
+        within: distance from hand to armhole at which the reach begins, m.
+        push: how far the hand goes beyond the armhole before it follows the garment, m.
+    """
 
     side: str = "both"
-    start: float = motions.Reach.start  # s, at the earliest
-    within: float = motions.Reach.within  # from hand to armhole, m
-    push: float = motions.Reach.push  # of the hand beyond the armhole; then it follows, m
+    start: float = motions.Reach.start
+    within: float = motions.Reach.within
+    push: float = motions.Reach.push
 
 
 @dataclass
 class Turn:
-    """The body turns about the vertical and stays so."""
+    """The body turns about the vertical axis and stays turned.
 
-    angle_deg: float = 15.0  # leftward
-    start: float = 15.0  # s
-    duration: float = motions.Turn.duration  # s
+    Attributes:
+        angle_deg: angle of the turn, leftward positive, degrees.
+        start: time at which the turn begins, s.
+        duration: duration of the turn, s.
+    """
+
+    angle_deg: float = 15.0
+    start: float = 15.0
+    duration: float = motions.Turn.duration
 
 
 @dataclass
 class Withdraw:
-    """The hand is drawn to the body's side for a while, then goes back."""
+    """The hand is drawn to the side of the body for a while, then goes back.
+
+    Attributes:
+        side: hand that withdraws.
+        start: time at which the hand begins to withdraw, s.
+        duration: time from the start until the hand begins to return, s.
+        distance: horizontal distance that the hand is drawn back, m.
+    """
 
     side: str = "both"
-    start: float = 10.0  # s
-    duration: float = motions.Withdraw.duration  # s
-    distance: float = motions.Withdraw.distance  # m
+    start: float = 10.0
+    duration: float = motions.Withdraw.duration
+    distance: float = motions.Withdraw.distance
 
 
 @dataclass
 class Wave:
-    """The hand goes to and fro sideways."""
+    """The hand moves to and fro sideways.
+
+    Attributes:
+        side: hand that waves.
+        start: time at which the wave begins, s.
+        duration: duration of the wave, s.
+        amplitude: half of the distance to and fro, m.
+        frequency: frequency of the wave, Hz.
+    """
 
     side: str = "both"
-    start: float = 10.0  # s
-    duration: float = motions.Wave.duration  # s
-    amplitude: float = motions.Wave.amplitude  # m
-    frequency: float = motions.Wave.frequency  # Hz
+    start: float = 10.0
+    duration: float = motions.Wave.duration
+    amplitude: float = motions.Wave.amplitude
+    frequency: float = motions.Wave.frequency
 
 
 @dataclass
 class Motion:
-    """One motion of an active person: just one of these."""
+    """One motion of an active person. Exactly one of these is given.
+
+    Attributes:
+        reach: the hand goes into the sleeve.
+        turn: the body turns.
+        withdraw: the hand is drawn back for a while.
+        wave: the hand moves to and fro.
+    """
 
     reach: Reach | None = None
     turn: Turn | None = None
@@ -184,21 +278,38 @@ class Tremor(Mirror):
 
 @dataclass
 class Behaviour:
-    """What the person does of its own; the controller is not told."""
+    """What the person does on their own. The controller is not told.
 
-    # dummy: springs about the rest pose. passive: follows the garment. active: has motions of its
-    # own, and follows between them.
+    Attributes:
+        kind: `dummy` has springs about the rest pose, `passive` follows the garment, `active`
+            performs the listed motions and follows between them.
+        following: how a passive or active person follows.
+        motions: motions of an active person.
+        max_hand_speed: greatest speed of a hand's own motions, m/s.
+        max_joint_speed: greatest joint speed of the person's own motions, rad/s.
+        tremor: tremor of both hands; none if empty.
+    """
+
     kind: str = "dummy"
     following: Following = field(default_factory=Following)
     motions: list[Motion] = field(default_factory=list)
-    max_hand_speed: float = ActiveParameters.max_hand_speed  # of motions of the hand, m/s
-    max_joint_speed: float = ActiveParameters.max_joint_speed  # likewise, rad/s
+    max_hand_speed: float = ActiveParameters.max_hand_speed
+    max_joint_speed: float = ActiveParameters.max_joint_speed
     tremor: Tremor | None = None
 
 
 @dataclass
 class Person:
-    """The person, or a dummy: a person without will."""
+    """The person who is dressed.
+
+    Attributes:
+        posture: standing or sitting.
+        measures: body sizes.
+        left_arm: rest pose of the left arm.
+        right_arm: rest pose of the right arm.
+        joints: springs and dampers of the arm joints.
+        behaviour: what the person does.
+    """
 
     posture: str = "standing"
     measures: Measures = field(default_factory=Measures)
@@ -210,28 +321,38 @@ class Person:
 
 @dataclass
 class Plant:
-    """The simulated truth."""
+    """The simulated garment and person: the truth of a run.
 
-    # fine, standard or quick: gives what is not given of spacing, time_step, body_time_step,
-    # implicitness, buckling_wavelength and tolerance; see fidelity.py
+    Attributes:
+        fidelity: preset for spacing, time_step, body_time_step, implicitness, buckling_wavelength
+            and tolerance where these are not given; see fidelity.py.
+        spacing: edge length of the garment's mesh, m.
+        time_step: time step of the garment, s.
+        body_time_step: time step of robot arms, grippers and the person's joints, s.
+        integrator: `implicit` is linearly implicit; `projective_dynamics` is solved to convergence
+            and takes some thirty times as long.
+        implicitness: blend of the implicit integrator: 1 is implicit Euler, which damps more the
+            longer the step; values near 0.5 are second order and may jitter.
+        buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression
+            that would buckle at shorter wavelengths is relaxed; 0 turns this off.
+        iterations: iteration limit of the implicit integrator's linear solver.
+        tolerance: relative residual at which the linear solver stops.
+        self_collision: whether layers of the garment collide with each other.
+        grasp_stiffness: stiffness of arm and grasp where the person pushes against the held cloth,
+            N/m. The default is the translational stiffness of libfranka's impedance examples.
+        material: fabric of the simulated garment.
+    """
+
     fidelity: str = "standard"
-    spacing: float = _STANDARD["spacing"]  # of the garment's mesh, m
-    time_step: float = _STANDARD["time_step"]  # of the garment, s
-    body_time_step: float = _STANDARD[
-        "body_time_step"
-    ]  # of arms, grippers and the person's joints, s
-    integrator: str = "implicit"  # or projective_dynamics: exact, and some thirty times slower
-    # of the implicit integrator: 1 is implicit Euler, which damps more the longer the step; near
-    # 0.5 it is of second order and may begin to jitter
+    spacing: float = _STANDARD["spacing"]
+    time_step: float = _STANDARD["time_step"]
+    body_time_step: float = _STANDARD["body_time_step"]
+    integrator: str = "implicit"
     implicitness: float = _STANDARD["implicitness"]
-    # of it: shortest wrinkle that the mesh can take, in spacings; what cloth would evade by shorter
-    # ones gives way. 0: never
     buckling_wavelength: float = _STANDARD["buckling_wavelength"]
-    iterations: int = 40  # of the implicit integrator's linear solver, at most
-    tolerance: float = _STANDARD["tolerance"]  # residual by momentum at which it stops
-    self_collision: bool = True  # layers of the garment do not pass through each other
-    # of a gripper's arm and grasp where a person pushes against what it holds, N/m: an arm under
-    # impedance control, by the translational stiffness that libfranka's examples set
+    iterations: int = 40
+    tolerance: float = _STANDARD["tolerance"]
+    self_collision: bool = True
     grasp_stiffness: float = 3000.0
     material: Material = field(default_factory=lambda: Material(stretch_stiffness=1500.0))
 
@@ -258,116 +379,192 @@ class Tasks(Mirror):
 
 @dataclass
 class GlobalMpc:
-    """The global controller."""
+    """The global controller: gradient descent on a plan through the controller's garment.
 
-    period: float = 0.5  # between solves, s
-    # From what is seen to the use of the plan, s, a multiple of time_step; or "measured": the least
-    # such one that 95 % of the solves keep on this machine, of drake-dress bench delay.
+    Attributes:
+        period: time between solves, s.
+        delay: time from the observation to the use of the plan, s. A multiple of `time_step`, or
+            `measured`: the shortest such delay that 95 % of the solves keep on this machine, found
+            by `drake-dress bench delay`.
+        time_step: time step of the prediction, s.
+        horizon: number of prediction steps.
+        max_iterations: gradient steps per solve, at most.
+        budget: iterations of linear solves that one solve may spend, of 0.1 to 0.2 ms each. The
+            best plan so far is used when they are spent. Unlimited if empty. On hardware a solve
+            has `delay_share` of its delay instead.
+        delay_share: share of the delay that a solve may take on hardware.
+        inner_iterations: iterations of the garment's linear solve per prediction step; 1 is the
+            paper's scheme.
+        max_speed: greatest planned speed of a gripper, m/s.
+        weights: weights of the stage costs.
+        progress_step: advance of the dressing coordinate s that is asked for in each prediction
+            step (k in the paper).
+        approach_distance: upper bound of l_h, the distance before the hand at which a sleeve is
+            prepared, m.
+        waiting_progress: lowest s at which a sleeve waits for the other one.
+        force_limit: old name of `safety.force_limit`, N. Deprecated.
+    """
+
+    period: float = 0.5
     delay: float = round(_POLICY.committed_steps * _POLICY.time_step, 9)
-    time_step: float = _POLICY.time_step  # of the prediction, s
-    horizon: int = _POLICY.horizon  # steps
-    max_iterations: int = _POLICY.max_iterations  # gradient steps per solve
-    # Of a solve, in iterations of linear solves, of 0.1 to 0.2 ms; what is best when it is spent is
-    # used. Any number if empty. On hardware a solve has a share of its delay instead.
+    time_step: float = _POLICY.time_step
+    horizon: int = _POLICY.horizon
+    max_iterations: int = _POLICY.max_iterations
     budget: int | None = _POLICY.budget.iterations
-    delay_share: float = 0.9  # of the delay, that a solve may take on hardware
-    # of the garment's linear solve; 1 is the paper's scheme
+    delay_share: float = 0.9
     inner_iterations: int = _POLICY.inner_iterations
-    max_speed: float = _POLICY.max_speed  # of a gripper, m/s
+    max_speed: float = _POLICY.max_speed
     weights: Weights = field(default_factory=Weights)
-    progress_step: float = round(
-        _POLICY.tasks.progress_rate * _POLICY.time_step, 9
-    )  # advance of s asked for per step (k)
-    approach_distance: float = _POLICY.tasks.approach_distance  # cap of l_h, m
-    waiting_progress: float = _POLICY.tasks.stages.waiting_progress  # least s of a waiting sleeve
-    force_limit: float | None = None  # deprecated, N: is safety.force_limit now
+    progress_step: float = round(_POLICY.tasks.progress_rate * _POLICY.time_step, 9)
+    approach_distance: float = _POLICY.tasks.approach_distance
+    waiting_progress: float = _POLICY.tasks.stages.waiting_progress
+    force_limit: float | None = None
 
 
 @dataclass
 class Local:
-    """The local controller; see models/control/local_model.py."""
+    """The local controller; see models/control/local_model.py.
 
-    period: float = 0.02  # between solves, s
-    delay: float = 0.002  # from what is seen to the use of the solution, s
-    time_step: float = _LOCAL.time_step  # of the problem, s
-    horizon: int = _LOCAL.horizon  # steps
-    position: float = _LOCAL.position  # weight of sleeves
-    speed: float = _LOCAL.speed  # weight of the grippers' speed, s²/m² of a step
-    max_speed: float = _LOCAL.max_speed  # of a gripper, m/s
-    stretch: float = _LOCAL.stretch  # share of the distances that the garment reaches, that is used
-    beside: float = _LOCAL.beside  # that a dressed sleeve may be beside its target, m
-    beside_speed: float = _LOCAL.beside_speed  # that it may move beside its arm, m/s
-    # at which bounds that are exceeded come back where nothing is planned, m/s
+    Attributes:
+        period: time between solves, s.
+        delay: time from the observation to the use of the solution, s.
+        time_step: time step of the problem, s.
+        horizon: number of steps.
+        position: weight of the sleeves' positions, 1/m².
+        speed: weight of the change of the grippers' speeds, s²/m².
+        max_speed: greatest speed of a gripper, m/s.
+        stretch: usable share of the distances that the garment can span.
+        beside: greatest lateral distance of a dressed sleeve from its arm, m.
+        beside_speed: greatest lateral speed of a dressed sleeve, m/s.
+        return_speed: speed at which violated bounds are restored where nothing is planned, m/s.
+        dragged: distance by which the garment alone may push a hand from where the plan expected
+            it, m. Only what goes beyond is followed.
+        prepare_correction: share of a sleeve's deviation from the plan that is corrected while the
+            sleeve is prepared.
+        dress_correction: the same while the sleeve is drawn up the arm.
+        taut_share: share of the garment's span from one gripper above which a sleeve also follows
+            the other gripper.
+        coupled_share: share of the span between the armholes above which the sleeves are coupled.
+        released_share: share of that span below which the sleeves are decoupled again.
+        feedback: whether the solution's feedback gains correct the command between solves.
+        solver: `constrained_ddp`, or `cone`: Clarabel, which is exact and slower.
+    """
+
+    period: float = 0.02
+    delay: float = 0.002
+    time_step: float = _LOCAL.time_step
+    horizon: int = _LOCAL.horizon
+    position: float = _LOCAL.position
+    speed: float = _LOCAL.speed
+    max_speed: float = _LOCAL.max_speed
+    stretch: float = _LOCAL.stretch
+    beside: float = _LOCAL.beside
+    beside_speed: float = _LOCAL.beside_speed
     return_speed: float = _LOCAL.return_speed
-    dragged: float = _LOCAL.dragged  # how far a hand is taken to be pushed by the garment, m
-    # share of what a sleeve is off from where the plan foresaw it, that is made up for:
-    prepare_correction: float = _LOCAL.prepare_correction  # while it is prepared
-    dress_correction: float = _LOCAL.dress_correction  # while it is drawn on
-    # shares of what the garment reaches from a gripper and between the armholes: from which on a
-    # sleeve follows the other gripper, too; beyond which sleeves are coupled; below which no more
+    dragged: float = _LOCAL.dragged
+    prepare_correction: float = _LOCAL.prepare_correction
+    dress_correction: float = _LOCAL.dress_correction
     taut_share: float = _LOCAL.taut_share
     coupled_share: float = _LOCAL.coupled_share
     released_share: float = _LOCAL.released_share
-    feedback: bool = True  # corrects between solves by the solution's gains
-    solver: str = "constrained_ddp"  # or cone: Clarabel, exact and slower
+    feedback: bool = True
+    solver: str = "constrained_ddp"
 
 
 @dataclass
 class Controller:
-    """What the controllers believe and how they act."""
+    """What the controllers assume and how they act.
 
-    spacing: float = 0.05  # of the believed garment's mesh, m
+    Attributes:
+        spacing: edge length of the controller's garment mesh, m.
+        material: fabric that the controller assumes.
+        method: `global` uses the global plan alone, `local` the local controller alone, `full`
+            both.
+        global_mpc: the global controller.
+        tasks: targets of the sleeves.
+        stages: thresholds between the stages.
+        local: the local controller.
+        predictor: how the person's arms are predicted to move.
+        costs: registered costs of the plan by name, each with its fields.
+        command_rate: rate of the grippers' commands, Hz.
+    """
+
+    spacing: float = 0.05
     material: Material = field(default_factory=Material)
-    method: str = "global"  # global plan alone, local compensation alone, or full: both
+    method: str = "global"
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
     tasks: Tasks = field(default_factory=Tasks)
     stages: Stages = field(default_factory=Stages)
     local: Local = field(default_factory=Local)
-    # how the arms are believed to move on: still, or constant_velocity
     predictor: str = "still"
-    # costs of a user's own by name, each with its fields; see models/control/own_costs.py
     costs: ValuesByName = field(default_factory=dict)
-    command_rate: float = 100.0  # Hz
+    command_rate: float = 100.0
 
 
 @dataclass
 class Workspace:
-    """A box in the world frame that the grippers' commands stay in; m."""
+    """A box in the world frame that the grippers' commands stay in.
 
-    low: list[float] = field(default_factory=list)  # x, y, z
+    Attributes:
+        low: lower corner x, y, z, m.
+        high: upper corner x, y, z, m.
+    """
+
+    low: list[float] = field(default_factory=list)
     high: list[float] = field(default_factory=list)
 
 
 @dataclass
 class Safety:
-    """Limits that no controller's request gets past; see models/control/safety.py."""
+    """Limits that the safety governor enforces; see models/control/safety.py.
 
-    max_speed: float = _SAFETY.max_speed  # of a gripper's command, m/s
-    max_acceleration: float = _SAFETY.max_acceleration  # the same, m/s²
-    # where the other limits need it; never exceeded, m/s²
+    Attributes:
+        max_speed: greatest speed of a gripper's command, m/s.
+        max_acceleration: greatest ordinary acceleration of a command, m/s².
+        max_braking: greatest acceleration where other limits need it; never exceeded, m/s².
+        force_limit: force above which a gripper does not pull and gives way, N.
+        soft_force_limit: force above which pulling fades, N. Half of `force_limit` if empty.
+        force_filter_time: time constant of the force's low-pass filter, s.
+        yield_rate: speed of giving way per newton beyond the limit, m/s/N.
+        yield_speed: greatest speed of giving way, m/s.
+        relax_speed: speed of giving way while stopped, m/s.
+        stop_time: time beyond the force limit after which both grippers stop, s.
+        max_lead: greatest distance of a command ahead of its gripper, m.
+        stale_time: age above which a request is ignored, s.
+        person_distance: smallest distance of a gripper from the person's skin, m.
+        held_distance: smallest distance of the held cloth from the skin, m. A fold fits in between.
+        least_distance: smallest distance between the grippers, m.
+        largest_distance: greatest distance between the grippers, m. Unlimited if empty.
+        workspace: box that commands stay in; unlimited if empty.
+    """
+
+    max_speed: float = _SAFETY.max_speed
+    max_acceleration: float = _SAFETY.max_acceleration
     max_braking: float = _SAFETY.max_braking
-    # no pulling from here on, N; beyond it grippers give way
     force_limit: float = _SAFETY.hard_force
-    soft_force_limit: float | None = None  # pulling fades from here on, N; half of it if empty
-    force_filter_time: float = _SAFETY.filter_time  # of the force's low-pass, s
-    yield_rate: float = _SAFETY.yield_rate  # speed of giving way per force beyond the limit, m/s/N
-    yield_speed: float = _SAFETY.yield_speed  # of giving way, at most, m/s
-    relax_speed: float = _SAFETY.relax_speed  # of giving way while stopped, m/s
-    # beyond the force limit, after which both grippers stop, s
+    soft_force_limit: float | None = None
+    force_filter_time: float = _SAFETY.filter_time
+    yield_rate: float = _SAFETY.yield_rate
+    yield_speed: float = _SAFETY.yield_speed
+    relax_speed: float = _SAFETY.relax_speed
     stop_time: float = _SAFETY.stop_time
-    max_lead: float = _SAFETY.max_lead  # of a command before its gripper, m
-    stale_time: float = _SAFETY.stale_time  # age at which a request is not obeyed any more, s
-    person_distance: float = _SAFETY.person_distance  # of a gripper to the person's skin, m
-    # likewise of the cloth that it holds, m: a fold fits between
+    max_lead: float = _SAFETY.max_lead
+    stale_time: float = _SAFETY.stale_time
+    person_distance: float = _SAFETY.person_distance
     held_distance: float = _SAFETY.held_distance
-    least_distance: float = _SAFETY.least_distance  # between the grippers, m
-    largest_distance: float | None = None  # between the grippers, m; any if empty
-    workspace: Workspace | None = None  # everywhere if empty
+    least_distance: float = _SAFETY.least_distance
+    largest_distance: float | None = None
+    workspace: Workspace | None = None
 
 
 @dataclass
 class Gripper:
-    """Limits of a floating gripper: m/s, m/s²."""
+    """Limits of a floating gripper.
+
+    Attributes:
+        max_speed: greatest speed, m/s.
+        max_acceleration: greatest acceleration, m/s².
+    """
 
     max_speed: float = 0.25
     max_acceleration: float = 2.0
@@ -375,7 +572,13 @@ class Gripper:
 
 @dataclass
 class Start:
-    """Where the coat hangs at first, from the shoulders' middle, m."""
+    """Where the coat hangs at the start, relative to the midpoint of the shoulders.
+
+    Attributes:
+        distance_behind: distance behind the person, m.
+        height_offset: height above the shoulders, m.
+        lateral_offset: offset to the person's left, m.
+    """
 
     distance_behind: float = 0.75
     height_offset: float = 0.0
@@ -384,100 +587,158 @@ class Start:
 
 @dataclass
 class Arms:
-    """What carries the grippers: nothing (they float), or two Panda arms behind the person."""
+    """What carries the grippers.
 
-    model: str = "floating"  # or panda
-    distance_behind: float = 0.7  # of the arms' bases behind the person, m
-    spread: float = 1.1  # between them, m
-    height_offset: float = -0.25  # of both, over the person's shoulders, m
-    tilt_deg: float = 35.0  # of the hands, which point forward and this much down
-    rate: float = 200.0  # of the joints' commands, Hz
-    mode: str = "position_velocity"  # what is commanded: or position, or velocity alone
+    Attributes:
+        model: `floating` grippers, or two `panda` arms behind the person.
+        distance_behind: distance of the arms' bases behind the person, m.
+        spread: distance between the two bases, m.
+        height_offset: height of both bases above the person's shoulders, m.
+        tilt_deg: downward tilt of the hands, which point forward, degrees.
+        rate: rate of the joint commands, Hz.
+        mode: what a joint command contains: position and velocity, or one of them.
+    """
+
+    model: str = "floating"
+    distance_behind: float = 0.7
+    spread: float = 1.1
+    height_offset: float = -0.25
+    tilt_deg: float = 35.0
+    rate: float = 200.0
+    mode: str = "position_velocity"
 
 
 @dataclass
 class Beliefs:
-    """What messages of hardware may say to be believed; arms hold at what goes beyond it."""
+    """Plausibility bounds on hardware messages. The arms hold where a message exceeds one.
 
-    # Of an arm's status:
-    joint_leap: float = JointBounds.leap  # of a joint between messages beyond its speed limit, rad
-    # of a joint's torque limit that may push it from outside
+    Attributes:
+        joint_leap: joint motion between two arm messages beyond what the speed limit allows, rad.
+        torque_share: external torque on a joint, as a multiple of its torque limit.
+        point_error: error of a reported point of the person, m. Body trackers reach 1 to 3 cm.
+        limb_share: relative difference between real limbs and the scenario's measures.
+        shoulder_distance: distance of the midpoint between the shoulders from where the scenario
+            has it, m.
+        turn_deg: turn of the shoulders about the vertical axis, degrees.
+        joint_room_deg: angle by which a supple person's joints may exceed the limits, degrees.
+        person_speed: speed of a point of the person, m/s. Covers a hand that is pulled back in
+            alarm.
+        frozen_time: time for which a noisy point may stay exactly the same, s. Real trackers have
+            noise; 0 turns the check off.
+        node_noise: standard deviation of a garment node on each axis, m. Depth cameras have 0.5 to
+            1 cm.
+        strain: strain of an edge of the garment. Coats stretch by 10 % in use, 20 % at most.
+        least_edge: smallest root-mean-square edge length relative to rest; folds shorten edges.
+        grasp_distance: distance of the held nodes' centre from their gripper, m.
+        garment_speed: speed of a node between messages, m/s. A swinging hem reaches 1.7 m/s.
+        garment_velocity: reported velocity of a node, including its noise, m/s.
+        velocity_error: difference between reported velocities and the motion, m/s.
+        frozen_travel: travel of a gripper while the garment stays exactly the same, m. 0 turns the
+            check off.
+    """
+
+    joint_leap: float = JointBounds.leap
     torque_share: float = JointBounds.torque_share
-    # Of the person, against the scenario's measures and joints:
-    # of a point, m; trackers of bodies are good to 1 to 3 cm
     point_error: float = PoseBounds.point_error
-    limb_share: float = PoseBounds.length_share  # by which a real limb may differ from the measures
-    # of the shoulders' middle from where it is described, m
+    limb_share: float = PoseBounds.length_share
     shoulder_distance: float = PoseBounds.shoulder_distance
-    turn_deg: float = math.degrees(PoseBounds.turn)  # of the shoulders about the vertical
-    # that a supple person's joints may go beyond the limits
+    turn_deg: float = math.degrees(PoseBounds.turn)
     joint_room_deg: float = math.degrees(PoseBounds.joint_room)
-    person_speed: float = PersonBounds.speed  # of a point, m/s; a hand that is drawn back in alarm
-    # for which a point that changed with each message may stay the same to the last bit, s; a real
-    # tracker has noise; 0 does not judge it
+    person_speed: float = PersonBounds.speed
     frozen_time: float = PersonBounds.frozen_time
-    # Of the garment, against the controller's mesh and the grippers:
-    # standard deviation on each axis, m; depth cameras have 0.5 to 1 cm
     node_noise: float = ShapeBounds.node_noise
-    # of an edge; coats stretch by 10 % in the hand, 20 % at most
     strain: float = ShapeBounds.strain
-    # share of their length at rest, root mean square; folds shorten edges
     least_edge: float = ShapeBounds.least_edge
-    # of the held nodes' middle from their gripper, m
     grasp_distance: float = ShapeBounds.grasp_distance
-    # of a node between messages, m/s; a hem that swings does 1.7
     garment_speed: float = GarmentBounds.speed
-    # of a node as it is reported, m/s: speed and its noise
     garment_velocity: float = GarmentBounds.velocity
-    # of reported velocities against motion, m/s
     velocity_error: float = GarmentBounds.velocity_error
-    # of a gripper while the garment stays the same, m; 0: not judged
     frozen_travel: float = GarmentBounds.frozen_travel
 
 
 @dataclass
 class Hardware:
-    """Of a station of kind hardware, and of the lab that `drake-dress sim-station` plays."""
+    """The message bus of a hardware station, and of the lab that `drake-dress sim-station` plays.
 
-    # ttl 0 keeps messages on this machine
+    Attributes:
+        lcm_url: address of the LCM bus. `ttl=0` keeps messages on this machine.
+        status_channel: channel of the arms' status; `_LEFT` and `_RIGHT` are appended.
+        command_channel: channel of the arms' commands; `_LEFT` and `_RIGHT` are appended.
+        garment_channel: channel of the garment estimates.
+        person_channel: channel of the person estimates.
+        camera_channel: channel of the camera images; `_NAME` is appended.
+        status_rate: rate of the lab's arm status, Hz.
+        estimate_rate: rate of the lab's estimates, Hz.
+        stale_status: age of an arm's status at which the arms hold, s. A late message that is older
+            than the newest by no more than this is dropped.
+        stale_estimate: age of an estimate at which the arms hold, s. Late messages are treated as
+            for `stale_status`.
+        stale_camera: age of an image at which the arms hold, s. Late messages are treated as for
+            `stale_status`.
+        settle_time: time for which every source must be sound before the arms move on, s.
+        patience: time that a fault may last before the run ends, s.
+        wait: time to wait for the first messages, s.
+        start_distance: greatest distance of a gripper from its start, m.
+        start_angle: greatest deviation of a joint from its start, rad.
+        beliefs: plausibility bounds on messages.
+    """
+
     lcm_url: str = "udpm://239.255.76.67:7667?ttl=0"
-    status_channel: str = "PANDA_STATUS"  # of the arms; _LEFT and _RIGHT are appended
-    command_channel: str = "PANDA_COMMAND"  # the same
+    status_channel: str = "PANDA_STATUS"
+    command_channel: str = "PANDA_COMMAND"
     garment_channel: str = "GARMENT_ESTIMATE"
     person_channel: str = "PERSON_ESTIMATE"
-    camera_channel: str = "CAMERA"  # _NAME is appended
-    status_rate: float = 200.0  # of the lab, Hz
-    estimate_rate: float = 50.0  # of the lab, Hz
-    # Age at which arms hold, s. What is older than the newest message by no more is dropped.
+    camera_channel: str = "CAMERA"
+    status_rate: float = 200.0
+    estimate_rate: float = 50.0
     stale_status: float = 0.05
-    stale_estimate: float = 0.2  # the same
-    stale_camera: float = 0.5  # the same
-    settle_time: float = Patience.settle_time  # for which all must be well before arms go on, s
-    patience: float = Patience.fault  # with what is wrong, before the run ends, s
-    wait: float = 10.0  # for the first messages, s
-    start_distance: float = 0.02  # of a gripper from where the run begins, at most, m
-    start_angle: float = 0.1  # of a joint, rad
+    stale_estimate: float = 0.2
+    stale_camera: float = 0.5
+    settle_time: float = Patience.settle_time
+    patience: float = Patience.fault
+    wait: float = 10.0
+    start_distance: float = 0.02
+    start_angle: float = 0.1
     beliefs: Beliefs = field(default_factory=Beliefs)
 
 
 @dataclass
 class Camera:
-    """A camera for colour and depth that looks at the person; world frame, m."""
+    """A colour and depth camera; world frame.
+
+    Attributes:
+        name: name of the camera, in lower case.
+        position: position x, y, z, m.
+        target: point in the centre of the image x, y, z, m.
+        width: width of the image, pixels.
+        height: height of the image, pixels.
+        fov_deg: vertical field of view, degrees.
+        rate: image rate, Hz.
+    """
 
     name: str = ""
-    position: list[float] = field(default_factory=list)  # x, y, z
-    target: list[float] = field(default_factory=list)  # what is in the middle of its image
-    width: int = 320  # pixels
+    position: list[float] = field(default_factory=list)
+    target: list[float] = field(default_factory=list)
+    width: int = 320
     height: int = 240
-    fov_deg: float = 60.0  # vertical
-    rate: float = 5.0  # of images, Hz
+    fov_deg: float = 60.0
+    rate: float = 5.0
 
 
 @dataclass
 class Station:
-    """Robots, or what stands in for them."""
+    """Robots, or their simulation.
 
-    kind: str = "simulated"  # or hardware: the same behind LCM messages
+    Attributes:
+        kind: `simulated`, or `hardware`: the same ports behind LCM messages.
+        arms: what carries the grippers.
+        hardware: message bus.
+        gripper: limits of floating grippers.
+        start: where the coat hangs at the start.
+        cameras: cameras of the station.
+    """
+
+    kind: str = "simulated"
     arms: Arms = field(default_factory=Arms)
     hardware: Hardware = field(default_factory=Hardware)
     gripper: Gripper = field(default_factory=Gripper)
@@ -487,40 +748,67 @@ class Station:
 
 @dataclass
 class LabFault:
-    """Something that goes wrong in the lab that `drake-dress sim-station` plays."""
+    """A fault in the lab that `drake-dress sim-station` plays.
 
-    kind: str = "stale"  # see models/supervision/injection.py
-    source: str = "left_arm"  # or right_arm, garment, person, camera_<name>; a lost bus is of all
-    start: float = 5.0  # s after the first command
-    duration: float = 1.0  # s
+    Attributes:
+        kind: kind of the fault; see models/supervision/injection.py.
+        source: source that is faulty: `left_arm`, `right_arm`, `garment`, `person` or
+            `camera_NAME`. A lost bus affects all.
+        start: time after the first command, s.
+        duration: duration of the fault, s.
+    """
+
+    kind: str = "stale"
+    source: str = "left_arm"
+    start: float = 5.0
+    duration: float = 1.0
 
 
 @dataclass
 class Lab:
-    """The lab that `drake-dress sim-station` plays; a run does not know of it."""
+    """The lab that `drake-dress sim-station` plays. A run does not know of it.
+
+    Attributes:
+        faults: faults to inject.
+        stale_command: age of commands at which the arms stop by themselves, s.
+        wait: time to wait for the first command, s.
+        rest: time after the last command until the lab closes, s.
+        push: force of a fault of kind `push`, N.
+        person_noise: standard deviation of the person's reported points on each axis, m. No real
+            tracker repeats itself exactly.
+    """
 
     faults: list[LabFault] = field(default_factory=list)
-    stale_command: float = 0.1  # age of commands at which arms stop by themselves, s
-    wait: float = 300.0  # for the first command, s
-    rest: float = 3.0  # after the last command, before the lab closes, s
-    push: float = 60.0  # of a fault of kind push, N
-    # standard deviation of the person's reported points on each axis, m: no tracker repeats itself
-    # to the last bit, as a dummy that stands still would
+    stale_command: float = 0.1
+    wait: float = 300.0
+    rest: float = 3.0
+    push: float = 60.0
     person_noise: float = 1e-4
 
 
 @dataclass
 class Variation:
-    """What the seed draws, uniformly within ± these."""
+    """What the seed draws, uniformly within plus or minus these widths.
 
-    arm_angle_deg: float = 0.0  # on each arm's abduction, extension and elbow
-    coat_scale: float = 0.0  # relative, on all lengths of the garment at once
-    coat_measures: float = 0.0  # relative, on each measure of the coat by itself
-    person_scale: float = 0.0  # relative, on all lengths of the body at once; masses as the cube
-    person_measures: float = 0.0  # relative, on each measure of the body by itself
-    plant_stiffness: float = 0.0  # relative, on stretch and bending
-    plant_friction: float = 0.0  # relative
-    start_offset: float = 0.0  # m, on each of the three
+    Attributes:
+        arm_angle_deg: width on abduction, extension and elbow of each arm, degrees.
+        coat_scale: relative width on all lengths of the garment at once.
+        coat_measures: relative width on each measure of the coat by itself.
+        person_scale: relative width on all body lengths at once; masses scale with the cube.
+        person_measures: relative width on each body measure by itself.
+        plant_stiffness: relative width on stretch and bending stiffness.
+        plant_friction: relative width on friction.
+        start_offset: width on each of the three start offsets, m.
+    """
+
+    arm_angle_deg: float = 0.0
+    coat_scale: float = 0.0
+    coat_measures: float = 0.0
+    person_scale: float = 0.0
+    person_measures: float = 0.0
+    plant_stiffness: float = 0.0
+    plant_friction: float = 0.0
+    start_offset: float = 0.0
 
 
 def _effect_schema(effect: type[Effect]) -> type:
@@ -557,17 +845,37 @@ SCHEMAS: dict[str, Callable[[], type]] = {
 
 @dataclass
 class Log:
-    """What is written while the run goes on."""
+    """What is logged during a run.
 
-    rate: float = 30.0  # Hz
+    Attributes:
+        rate: samples per second of simulated time, Hz.
+    """
+
+    rate: float = 30.0
 
 
 @dataclass
 class Scenario:
-    """One run."""
+    """One run.
+
+    Attributes:
+        seed: seed of everything that is drawn.
+        duration: longest simulated time, s.
+        garment: pattern of the garment.
+        person: the person who is dressed.
+        plant: simulated garment and person.
+        controller: controllers.
+        safety: limits of the safety governor.
+        station: robots.
+        lab: lab that `drake-dress sim-station` plays.
+        variation: what the seed varies.
+        log: what is logged.
+        effects: physical effects beyond the plain simulation, each with its parameters. An effect
+            that is not given is off.
+    """
 
     seed: int = 0
-    duration: float = 90.0  # at most, s
+    duration: float = 90.0
     garment: Garment = field(default_factory=Garment)
     person: Person = field(default_factory=Person)
     plant: Plant = field(default_factory=Plant)
@@ -577,5 +885,4 @@ class Scenario:
     lab: Lab = field(default_factory=Lab)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)
-    # physical effects by name, each with its parameters in SI units; see models/effects/
     effects: ValuesByName = field(default_factory=dict)

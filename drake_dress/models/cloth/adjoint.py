@@ -40,14 +40,17 @@ _STEP = 1e-8
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative of a scalar with respect to the inputs of a step.
+    """Derivative of a scalar by the inputs of a step.
 
     Attributes:
-        x, v: (n,3). held_motion: (k,3).
+        x: (n,3) by the positions.
+        v: (n,3) by the velocities.
+        held_motion: (k,3) by the displacements of the held nodes.
         origin: (m,3) by the position of each obstacle, per m.
         rotation: (m,3) by its rotation about its origin, per rad, world axes.
-        velocity, angular_velocity: (m,3) by its velocities.
-        material: by the fields of `Material` of the same names, where asked for.
+        velocity: (m,3) by its velocity.
+        angular_velocity: (m,3) by its angular velocity.
+        material: by the fields of `Material` of the same names, if requested.
     """
 
     x: FloatArray

@@ -65,15 +65,15 @@ class Elements:
 
 
 def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> Elements:
-    """Returns the elements of a mesh whose rest shape is `rest_position` (n,3), m.
+    """Returns the elements of a triangle mesh.
 
     Args:
         rest_position: (n,3) rest shape, m.
         faces: (F,3) node indices, consistently oriented, manifold.
 
     Raises:
-        ValueError: a triangle has no area, a node of one is not there or not finite, a triangle is
-            inverted, or an edge has more than two.
+        ValueError: a triangle has no area, a node of it does not exist or is not finite, a triangle
+            is inverted, or an edge has more than two triangles.
     """
     x = np.ascontiguousarray(rest_position, dtype=np.float64)
     triangle = np.ascontiguousarray(faces, dtype=np.int32)

@@ -170,27 +170,27 @@ _NOTHING_BOUND = _Bound(_NO_VECTORS, _NO_VECTORS, NO_CONTACT, _NO_VECTORS, _NO_V
 
 
 class ExplicitBiasCloth:
-    """Steps a garment as the paper does, with derivatives.
+    """Steps a garment with the paper's scheme, which has exact derivatives.
 
     Args:
-        elements: the rest shape.
-        material: SI values; `damping` is not used, the scheme damps by itself.
-        time_step: h, s; large steps stay bounded.
+        elements: rest shape, from `make_elements`.
+        material: fabric. `damping` is not used; the scheme has damping of its own.
+        time_step: h, s. The motion stays bounded at large steps.
         held: (k,) nodes that move with the grippers.
         gravity: (3,) m/s².
-        tolerance: of solves by conjugate gradients, relative.
-        iterations: of the inner iteration: 1 for the paper's one-step scheme.
-        self_collision: thickness, m, that layers of the garment keep; 0 lets them pass. Layers are
-            kept apart after the step (layers/), by the pairs, weights and directions that the
-            adjoint holds.
-        attachment_stiffness: of a spring from each held node to its gripper, N/m, as the paper has
-            it; None, the default, for nodes that move with the gripper. Springs yield by their
+        tolerance: relative tolerance of solves by conjugate gradients.
+        iterations: inner iterations; 1 is the paper's one-step scheme.
+        self_collision: distance that layers of the garment keep, m; 0 lets them pass through each
+            other. Layers are separated after the step (layers/). The adjoint keeps their pairs,
+            weights and directions fixed.
+        attachment_stiffness: stiffness of a spring from each held node to its gripper, N/m, as in
+            the paper. By default (None) held nodes move with the gripper. Springs yield by their
             force, and by v h more in motion.
-        inner: which inner iteration (`INNER`); by default `one_step` for 1 iteration and
+        inner: inner iteration, one of `INNER`. By default `one_step` for 1 iteration and
             `conjugate_gradients` for more.
 
     Raises:
-        ValueError: `inner` is not one of `INNER`, or one step is asked to iterate.
+        ValueError: `inner` is not one of `INNER`, or `one_step` is given more than one iteration.
     """
 
     def __init__(
@@ -237,7 +237,7 @@ class ExplicitBiasCloth:
         )
 
     def with_material(self, material: Material) -> ExplicitBiasCloth:
-        """Returns the same garment of another fabric."""
+        """Returns the same garment with another fabric."""
         options: dict[str, Any] = self._options
         return ExplicitBiasCloth(
             self.elements, material, self.time_step, self.held, self.gravity, **options

@@ -70,18 +70,20 @@ _TOLERATED_CHANGES = 0.02
 
 @dataclass(frozen=True)
 class ClothState:
-    """State of a garment.
+    """State of a garment between two steps.
 
     Attributes:
-        x, v: (n,3) m, m/s.
-        mode: (n,) 0 free, 1 stick, 2 slip, 3 held.
-        reaction: (n,3) force of person or gripper on the node in the last step, N.
-        owner: (n,) obstacle that the node touches, -1 without.
-        solver: (2,n+1) what the linear solvers of the next step start from, so that a step depends
-            on its arguments alone. Row 0 is of the linearly implicit scheme, row 1 of Projective
-            Dynamics: how worn the factor is, -1 without one, then 1 for each node it leaves out.
-        tangled: (n,) 1 for nodes of edges and triangles that pierce each other, where layers that
-            are kept apart have crossed even so; 0 for the others.
+        x: (n,3) positions of the nodes, m.
+        v: (n,3) velocities, m/s.
+        mode: (n,) contact of each node: 0 free, 1 stick, 2 slip, 3 held.
+        reaction: (n,3) force of person or gripper on each node in the last step, N.
+        owner: (n,) obstacle that each node touches, -1 for none.
+        solver: (2,n+1) starting point of the linear solvers in the next step, so that a step
+            depends on its arguments alone. Row 0 belongs to the linearly implicit scheme, row 1 to
+            Projective Dynamics: how outdated the factor is (-1 without one), then 1 for each node
+            that it leaves out.
+        tangled: (n,) 1 for nodes of edges and triangles that pierce each other although layers are
+            kept apart; 0 for the others.
     """
 
     x: FloatArray
@@ -101,7 +103,11 @@ class ClothState:
 
     @staticmethod
     def at_rest(x: FloatArray) -> ClothState:
-        """Returns a garment that rests at `x` (n,3), m, free of contact."""
+        """Returns a garment at rest and free of contact.
+
+        Args:
+            x: (n,3) positions, m.
+        """
         n = len(x)
         return ClothState(
             np.array(x, dtype=np.float64),
@@ -162,25 +168,27 @@ class _Problem:
 
 
 class ImplicitCloth:
-    """Steps a garment with the linearly implicit scheme.
+    """Steps a garment with the linearly implicit scheme: accurate, without derivatives.
 
     Args:
-        elements: the rest shape.
-        material: SI values.
+        elements: rest shape, from `make_elements`.
+        material: fabric.
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        tolerance: residual at which conjugate gradients stop, relative to the momentum with what
+        tolerance: residual at which conjugate gradients stop, relative to the momentum plus what
             gravity adds to it in a step.
-        max_iterations: of conjugate gradients, per pass.
-        max_passes: of the active-set iteration, per step; what is left over is mended in the next.
-        sample_elements: contact at edge midpoints and face centroids too.
-        most_cone_passes: solves added, at most, while nodes stick beyond what friction can hold.
-        fibres: further stiffness of the triangles along a direction of theirs.
-        added_mass: (n,) further mass of the nodes, kg.
-        implicitness: θ, above 0.5 to 1.
-        buckling_wavelength: shortest wrinkle that the mesh can take, in its spacings; compression
-            that cloth would evade by shorter ones gives way (`Buckling`). 0: it never does.
+        max_iterations: iterations of conjugate gradients per pass, at most.
+        max_passes: passes of the active-set iteration per step, at most. The next step corrects
+            what is left.
+        sample_elements: whether edge midpoints and face centroids have contact, in addition to
+            nodes.
+        most_cone_passes: additional solves, at most, while nodes stick beyond the friction cone.
+        fibres: additional stiffness of the triangles along given directions.
+        added_mass: (n,) additional mass of the nodes, kg.
+        implicitness: θ, above 0.5 up to 1. 1 is implicit Euler; smaller values damp less.
+        buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression
+            that would buckle at shorter wavelengths is relaxed (`Buckling`). 0 turns this off.
     """
 
     def __init__(
@@ -246,17 +254,17 @@ class ImplicitCloth:
         influences: Influences = NO_INFLUENCES,
         guess: FloatArray | None = None,
     ) -> tuple[ClothState, StepInfo]:
-        """Returns the state one time step later.
+        """Returns the state one time step later, and information on the solve.
 
         Args:
-            state: now.
-            obstacles: the person now, with velocities.
-            held_velocity: (k,3) of the held nodes over this step, m/s.
-            influences: what else acts on the garment.
-            guess: (n,3) what the mean velocity over the step may be, m/s; free fall by default.
+            state: present state.
+            obstacles: the person at the start of the step, with velocities.
+            held_velocity: (k,3) velocity of the held nodes over this step, m/s.
+            influences: other effects on the garment.
+            guess: (n,3) estimate of the mean velocity over the step, m/s; free fall by default.
 
         Raises:
-            ValueError: something is not finite; the message names it.
+            ValueError: an input is not finite; the message names it.
         """
         p = self._problem(state, obstacles, held_velocity, influences)
         mode = p.contact.mode

@@ -16,14 +16,15 @@ from drake_dress.models.cloth.layers.bonds import Bonds
 
 @dataclass(frozen=True)
 class Influences:
-    """All that is None leaves the step as it is.
+    """Other effects on the garment during a step. None has no effect.
 
     Attributes:
-        force: (n,3) on the nodes, N.
-        friction: (n,) Coulomb coefficient in place of the material's.
-        adhesion: (n,) pull that a contact bears before it lets go, N; presses as well.
-        stretch_factor: (F,) on the stretch stiffness of each triangle.
-        bonds: pairs of layers that resist approach; only the linearly implicit scheme heeds them.
+        force: (n,3) forces on the nodes, N.
+        friction: (n,) coefficients of friction that replace the material's.
+        adhesion: (n,) pull that a contact can bear before it is released, N. It adds to the normal
+            force in friction.
+        stretch_factor: (F,) factors on the stretch stiffness of each triangle.
+        bonds: pairs of layers that resist approach. Only the linearly implicit scheme uses them.
     """
 
     force: FloatArray | None = None

@@ -62,12 +62,12 @@ class Integrator(Protocol):
 
 
 class LayeredCloth:
-    """An integrator with self-collision.
+    """Adds self-collision to an integrator.
 
-    Nodes that are held or stick to the person are not moved by other layers, those that lie on the
-    person only along its surface. Where layers would cross for that, as in an armpit, friction and
-    skin yield: by up to 1.5 mm in the folds looked at. What layers do to nodes in the grippers is
-    not part of the grippers' force.
+    Other layers do not move nodes that are held or that stick to the person. They move nodes that
+    lie on the person only along its surface. Where layers would cross because of that, as in an
+    armpit, friction and skin yield, by up to 1.5 mm in the folds that were examined. The force of
+    layers on nodes in the grippers is not part of the grippers' force.
 
     Args:
         integrator: steps the garment.

@@ -83,27 +83,27 @@ class ProjectiveInfo:
 
 
 class ProjectiveDynamicsCloth:
-    """Steps a garment by Projective Dynamics.
+    """Steps a garment by Projective Dynamics, to convergence.
 
-    By default contact is at nodes only, unlike `ImplicitCloth`'s: thin things slip between them.
-    With friction a step of 0.1 s that lands has more than one fixed point; which is found depends
-    on the way.
+    By default only nodes have contact, unlike in `ImplicitCloth`, so thin objects can slip between
+    them. With friction, a step of 0.1 s in which cloth lands has more than one fixed point; which
+    one is found depends on the path of the iteration.
 
     Args:
-        elements: the rest shape.
-        material: SI values.
+        elements: rest shape, from `make_elements`.
+        material: fabric.
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        tolerance: estimated distance to the fixed point at which a step is done, m.
-        max_iterations: global steps at most; the info says if they did not suffice.
+        tolerance: estimated distance to the fixed point at which a step is finished, m.
+        max_iterations: global steps, at most. The info says if they were not enough.
         quasi_newton: L-BFGS instead of the plain iteration.
-        fibres: further stiffness of the triangles along a direction of theirs.
-        added_mass: (n,) further mass of the nodes, kg.
-        predicted: start each step from the linearly implicit one; where that is near, few
+        fibres: additional stiffness of the triangles along given directions.
+        added_mass: (n,) additional mass of the nodes, kg.
+        predicted: whether each step starts from the linearly implicit one. If that is close, few
             iterations are left.
-        sample_elements: contact at edge midpoints and face centroids too, by where they are at the
-            start of a step.
+        sample_elements: whether edge midpoints and face centroids have contact, too, from their
+            places at the start of a step.
     """
 
     def __init__(
@@ -164,17 +164,17 @@ class ProjectiveDynamicsCloth:
         influences: Influences = NO_INFLUENCES,
         guess: FloatArray | None = None,
     ) -> tuple[ClothState, ProjectiveInfo]:
-        """Returns the state one time step later.
+        """Returns the state one time step later, and information on the solve.
 
         Args:
-            state: now.
-            obstacles: the person now, with velocities.
-            held_velocity: (k,3) of the held nodes over this step, m/s.
-            influences: what else acts on the garment.
-            guess: (n,3) what the velocity after the step may be, m/s; for the predictor.
+            state: present state.
+            obstacles: the person at the start of the step, with velocities.
+            held_velocity: (k,3) velocity of the held nodes over this step, m/s.
+            influences: other effects on the garment.
+            guess: (n,3) estimate of the velocity after the step, m/s; for the predictor.
 
         Raises:
-            ValueError: something in the input is not finite.
+            ValueError: an input is not finite.
         """
         h = self.time_step
         if not all(np.isfinite(a).all() for a in (state.x, state.v, held_velocity)):

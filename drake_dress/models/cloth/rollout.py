@@ -24,14 +24,15 @@ Seeds = tuple[FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Rollout:
-    """What is kept of a run of N steps.
+    """The stored part of a simulation of N steps, from which `roll_back` repeats the rest.
 
     Attributes:
-        held_motion: (N,k,3) of each step, m.
-        obstacles: of each step.
-        starts: numbers of the steps whose states are kept, ascending from 0.
+        held_motion: (N,k,3) displacement of the held nodes in each step, m.
+        obstacles: obstacles of each step.
+        starts: indices of the steps whose states are stored, ascending from 0.
         states: positions and velocities (n,3) before these steps.
-        x, v: (n,3) at the end.
+        x: (n,3) positions at the end, m.
+        v: (n,3) velocities at the end, m/s.
     """
 
     cloth: ExplicitBiasCloth
@@ -48,11 +49,12 @@ class RolloutGradient:
     """Derivative of a scalar by the inputs of a rollout of N steps.
 
     Attributes:
-        x, v: (n,3) by the state at the start.
-        held_motion: (N,k,3).
+        x: (n,3) by the positions at the start.
+        v: (n,3) by the velocities at the start.
+        held_motion: (N,k,3) by the displacements of the held nodes.
         bodies: (N,m,4,3) by position, rotation, velocity and angular velocity of each obstacle at
             each step; see `Gradient`.
-        material: by the fields of `Material`, where asked for.
+        material: by the fields of `Material`, if requested.
     """
 
     x: FloatArray
@@ -71,20 +73,20 @@ def roll_out(
     observe: Observer | None = None,
     segment: int | None = None,
 ) -> Rollout:
-    """Runs N steps.
+    """Simulates N steps and stores what `roll_back` needs.
 
     Args:
-        cloth: the garment.
+        cloth: garment.
         x: (n,3) positions at the start, m.
-        v: (n,3) velocities, m/s.
+        v: (n,3) velocities at the start, m/s.
         held_motion: (N,k,3) displacement of the held nodes in each step, m.
-        obstacles: at the start of each of the N steps.
-        observe: called after each step with its number, positions, velocities and reactions of the
+        obstacles: obstacles at the start of each of the N steps.
+        observe: called after each step with its index, positions, velocities and reactions of the
             held nodes (k,3), N.
-        segment: steps whose tapes the adjoint may hold at once; by default √N.
+        segment: number of steps whose tapes the adjoint may hold at once; √N by default.
 
     Raises:
-        ValueError: numbers of steps differ, or a step fails: the message names it.
+        ValueError: the numbers of steps differ, or a step fails; the message names it.
     """
     count = len(held_motion)
     if len(obstacles) != count:
@@ -116,11 +118,11 @@ def roll_back(
     """Returns the derivative of a loss by the inputs of a rollout.
 
     Args:
-        rollout: of `roll_out`.
-        seeds: gives, for the number of a step and its results (positions, velocities, reactions of
-            the held nodes), the derivative of the loss by them; None where it does not depend on
-            them. Called once a step, last step first.
-        by_material: also by the material's values.
+        rollout: result of `roll_out`.
+        seeds: function that takes the index of a step and its results (positions, velocities,
+            reactions of the held nodes) and returns the derivatives of the loss by them, None for
+            those on which it does not depend. It is called once a step, last step first.
+        by_material: whether to differentiate by the material's values, too.
     """
     cloth, motion, obstacles = rollout.cloth, rollout.held_motion, rollout.obstacles
     count = len(motion)

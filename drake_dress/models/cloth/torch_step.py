@@ -78,18 +78,18 @@ def cloth_step(
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Returns positions (n,3), velocities (n,3) and reactions of the held nodes (k,3) after a step.
 
-    All tensors are float64 on the CPU. Differentiable once: a second derivative raises
-    RuntimeError, and so does a backward pass after an input was written to in place.
+    All tensors are float64 on the CPU. The step is differentiable once: a second derivative raises
+    RuntimeError, and so does a backward pass after an input was modified in place.
 
     Args:
-        cloth: the garment.
+        cloth: garment.
         x: (n,3) positions, m.
         v: (n,3) velocities, m/s.
         held_motion: (k,3) displacement of the held nodes over the step, m.
-        obstacles: at the start of the step.
-        bodies: (m,4,3) how they are displaced, turned and sped up; see `Obstacles.moved`.
-        material: (5,) the values of `MATERIAL`; the cloth's own by default. The garment of the
-            values last used is kept: a rollout of one fabric makes it once.
+        obstacles: obstacles at the start of the step.
+        bodies: (m,4,3) changes of their poses and velocities; see `Obstacles.moved`.
+        material: (5,) the values of `MATERIAL`; by default those of `cloth`. The garment with the
+            last values is kept, so a rollout of one fabric makes it once.
 
     Raises:
         ValueError: a tensor is not float64, or a value of `material` is outside its range.
@@ -106,7 +106,7 @@ def cloth_step(
 
 
 def material_tensor(material: Material) -> torch.Tensor:
-    """Returns (5,) the values of `MATERIAL`, float64."""
+    """Returns (5,) the values of `MATERIAL` of a fabric, float64."""
     return torch.tensor([getattr(material, n) for n in MATERIAL], dtype=torch.float64)
 
 

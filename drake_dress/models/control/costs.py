@@ -33,26 +33,34 @@ class Weights:
     """Diagonal weights of the stage costs.
 
     Attributes:
-        position: W, 1/m².
-        direction: Q, dimensionless.
-        speed: R on the gripper displacement of a step, 1/m².
-        safety: w_s on the gripper force beyond `free_force`, 1/N².
+        position: W, weight of a sleeve's distance from its target, 1/m².
+        direction: Q, weight of a sleeve's deviation from its direction.
+        speed: R, weight of the gripper displacement in a step, 1/m².
+        safety: w_s, weight of the gripper force beyond `free_force`, 1/N².
         free_force: gripper force that costs nothing, N.
-        separation: on the distance of the grippers beyond what the garment between them spans at
-            rest, 1/m²; it is what the force would say too late for a descent to hear. Also on
-            what it is short of `least_spread` of that, where the garment collapses.
-        entering_spread: takes the place of `least_spread` while a sleeve is entered: an armhole is
-            held open and turned toward the hand by the garment between the grippers, if it is
-            stretched out; a slack one hangs, and is pushed away by the hand.
-        level: on what the left gripper is short of being `least_level` of the grippers' distance at
-            rest further left than the right one, as the person sees it, 1/m². A garment on edge
-            has its openings turned away from both hands, and no way back on its own.
-        clearance: on how much closer than `free_clearance` a gripper comes to the person, 1/m².
-        free_clearance: distance of a gripper to the person's skin that costs nothing, m.
-        corridor: on what hangs ahead of a hand that is to go in, 1/m²; see corridor.py.
-        corridor_radius, corridor_length: of the cylinder ahead of it, m.
-        passage: on what would cross the forearm if the hand were in the armhole now, 1/m².
-        passage_radius, passage_length: of the cylinder that stands for the forearm, m.
+        separation: weight of the grippers' distance beyond the rest span of the garment between
+            them, 1/m². It acts before the garment is taut, when the force does not say anything
+            yet. It also weighs what the distance falls short of `least_spread` of that span, where
+            the garment collapses.
+        least_spread: smallest distance of the grippers that costs nothing, as a share of the rest
+            span.
+        entering_spread: replaces `least_spread` while a hand enters a sleeve. A stretched garment
+            holds the armhole open and turns it to the hand; a slack one hangs, and the hand pushes
+            it away.
+        level: weight of what the left gripper falls short of being `least_level` of the rest span
+            further left than the right one, as the person sees it, 1/m². A garment on edge turns
+            its openings away from both hands and does not come back by itself.
+        least_level: lateral lead of the left gripper that costs nothing, as a share of the rest
+            span.
+        clearance: weight of how much closer than `free_clearance` a gripper is to the person, 1/m².
+        free_clearance: distance of a gripper from the person's skin that costs nothing, m.
+        corridor: weight of cloth that hangs ahead of a hand about to enter, 1/m²; see corridor.py.
+        corridor_radius: radius of the cylinder ahead of that hand, m.
+        corridor_length: length of the cylinder ahead of that hand, m.
+        passage: weight of cloth that would cross the forearm if the hand were in the armhole now,
+            1/m².
+        passage_radius: radius of the cylinder that stands for the forearm, m.
+        passage_length: length of the cylinder that stands for the forearm, m.
     """
 
     position: float = 1.0

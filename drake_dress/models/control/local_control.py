@@ -53,6 +53,19 @@ class GlobalPlan(Immutable):
     assignment: Assignment | None = None
     joints: FloatArray | None = None
 
+    @classmethod
+    def resting(cls) -> GlobalPlan:
+        """Returns the plan before anything is planned: to rest."""
+        return cls(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
+
+    def velocity_at(self, time: float) -> FloatArray:
+        """Returns the gripper velocities (2,3) at a time, s; zero before the plan and after it."""
+        step = int(np.floor((time - self.start + 1e-9) / self.time_step))
+        if not 0 <= step < len(self.velocity):
+            return np.zeros((2, 3))
+        velocity: FloatArray = self.velocity[step]
+        return velocity
+
 
 @dataclass(frozen=True)
 class LocalPlan(Immutable):

@@ -19,11 +19,13 @@ class Approach:
     """A way to go about a hand; shares are between inward across the body (0) and forearm (1).
 
     Attributes:
-        share: of the direction in which an armhole is drawn over the hand.
-        orientation: of the direction from the armhole to the garment's entry.
-        emphasis: factor on Q.
-        tilt: how much of the forearm's slope the latter direction has. The garment turns about the
-            vertical as far as it is asked to; turned up toward a steep forearm it hangs on edge.
+        share: direction in which the armhole is drawn over the hand: 0 is inward across the body, 1
+            is along the forearm.
+        orientation: direction from the armhole to the garment's entry, on the same scale.
+        emphasis: factor on the weight Q of the direction.
+        tilt: share of the forearm's slope that the direction to the entry has. The garment turns
+            about the vertical axis as far as it is asked to; tilted up toward a steep forearm it
+            hangs on edge.
     """
 
     share: float = 0.25
@@ -58,66 +60,77 @@ class TaskParameters:
     """Where sleeves are asked to go.
 
     Attributes:
-        progress_rate: advance of s asked for, 1/s (k in a step of the prediction).
-        approach_distance: cap of l_h, m.
-        tethered_approach_distance: the same with the other sleeve on, m.
-        approach_slope: l_h per distance beside the line of approach; 1 as printed.
-        approaches: how a hand is gone about; after each attempt that missed it the next, in turn.
-            The first is tried first, but the second for a flat forearm, the third for a steep one.
-        tethered_approaches: the same with the other sleeve on, begun with the first.
-        flat, steep: level part of a forearm's direction from which on it is flat; up to which it
-            is steep.
-        led_inward: inward part of a forearm's direction, hand to elbow, below which the hand has
-            been led inward. led_approach: to such an arm, if it is the first one, from `led_after`
-            misses on.
-        behind_distance: cap of how far behind the hand a sleeve that is not in line yet waits, m.
-        retreat_distance: how much further back a sleeve goes that missed the hand, m.
-        passing_back: the same of a tethered one, m: as far back as the panel before it needs to
-            pass behind the hand. Drawn further back, it pulls the first sleeve off its arm.
-        withdrawal_distance: behind the shoulders, to where both sleeves are taken back, m.
-        swing_reach: how far from the first armhole the second one is swung back, as a share of the
-            distance between both at rest.
-        swing_outward: outward part of the way there, for each part backward.
-        widening: growth of the cap of l_h with each attempt that missed the hand.
-        passing_outward, passing_behind: how far outward of a hand that does not see it, and behind
-            it, a tethered armhole is asked to be in the end, m: the panel before it is as wide.
-        passing_from, passing_beside: so far outward of the hand it begins to come forward, and is
-            asked to be that far forward, m; from less the panel would come before the hand.
-        outlook_distance: from the hand, within which a sleeve that missed it goes where it is seen,
-            m.
-        longest_reach: share of the distance between both armholes at rest to which the garment is
-            taken to be drawn out.
-        clear_sight: share from which on a tethered sleeve is drawn straight at the hand, wherever
-            the hand is before the opening.
-        funnel_wide: hand this far beside the normal of an opening that it sees clearly: the opening
-            is brought in line first, `funnel_distance` before the hand, m.
-        funnel_narrow: this far beside it is drawn on, m.
-        funnel_distance: m.
-        aside_free: distance beside that does not count, m.
-        overshoot: how far past the hand an armhole in line is asked to go, m.
-        inside_radius: a hand beyond an armhole's plane and this close to its centre is in it, m.
-        touch_distance: a hand this close to the surface that spans an armhole is about to go in:
-            the armhole is drawn along the forearm, whatever bars the hand's sight of it, m.
-        near_distance: from the hand, from which on an armhole's place counts more than its
-            direction, m.
-        near_position, near_direction: factors on W and Q then.
+        progress_rate: rate of the dressing coordinate s that is asked for, 1/s (k per step of the
+            prediction).
+        approach_distance: upper bound of l_h, m.
+        tethered_approach_distance: the same while the other sleeve is on, m.
+        approach_slope: l_h per lateral distance from the line of approach; 1 in the paper.
+        approaches: ways to approach a hand. After each attempt that missed the hand the next one is
+            used, in turn. The first attempt uses the first, but the second for a flat forearm and
+            the third for a steep one.
+        tethered_approaches: the same while the other sleeve is on, starting with the first.
+        led_inward: inward component of the forearm's direction, from hand to elbow, below which the
+            hand counts as pulled inward.
+        led_after: number of misses after which the first sleeve uses `led_approach` for such a
+            hand.
+        led_approach: way to approach a hand that was pulled inward.
+        flat: horizontal part of the forearm's direction above which the forearm is flat.
+        steep: horizontal part of the forearm's direction below which the forearm is steep.
+        behind_distance: greatest distance behind the hand at which a sleeve waits until it is in
+            line, m.
+        retreat_distance: how much further back a sleeve goes after it missed the hand, m.
+        passing_back: the same of a tethered sleeve, m. The front panel needs this distance to pass
+            behind the hand; further back, the sleeve pulls the first one off its arm.
+        withdrawal_distance: distance behind the shoulders to which both sleeves withdraw, m.
+        swing_reach: distance from the first armhole to which the second one swings back, as a share
+            of their distance at rest.
+        swing_outward: outward part of that motion per backward part.
+        widening: growth of the bound of l_h with each attempt that missed the hand.
+        passing_outward: lateral distance outward of an unseen hand at which a tethered armhole
+            ends, m. The panel in front of it is as wide.
+        passing_behind: distance behind an unseen hand at which a tethered armhole ends, m.
+        passing_from: distance outward of the hand at which a tethered armhole begins to come
+            forward, m. Any closer and the panel would get in front of the hand.
+        passing_beside: how far forward that armhole then goes, m.
+        outlook_distance: distance from the hand within which a sleeve that missed it moves to where
+            the hand sees the opening, m.
+        longest_reach: greatest distance of the armholes that is assumed, as a share of their
+            distance at rest.
+        clear_sight: share of the opening that the hand must see for a tethered sleeve to be drawn
+            straight at the hand.
+        funnel_wide: lateral distance of the hand from the normal of a clearly seen opening above
+            which the opening is aligned first, m.
+        funnel_narrow: lateral distance below which the aligned opening is drawn on, m.
+        funnel_distance: distance before the hand at which the opening is aligned, m.
+        aside_free: lateral distance that is ignored, m.
+        overshoot: how far past the hand an aligned armhole is asked to go, m.
+        inside_radius: distance from the armhole's centre within which a hand beyond the armhole's
+            plane counts as inside, m.
+        touch_distance: distance of a hand from the surface that spans the armhole below which the
+            hand is about to enter, m. The armhole is then drawn along the forearm, even if cloth
+            hides it from the hand.
+        near_distance: distance from the hand below which the armhole's position counts more than
+            its direction, m.
+        near_position: factor on W below `near_distance`.
+        near_direction: factor on Q below `near_distance`.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
-        dressing_position: factor on W once both are: the last centimetres cost less than what the
-            armhole lies askew on the shoulder. Also of a waiting sleeve that may slip off.
-        waiting_reach: share of the distance between both armholes at rest that a waiting sleeve
-            lets the other one use.
-        largest_aside: how far a waiting sleeve is drawn aside at most, m: hands that hang 0.58 m
-            apart come 0.15 m nearer at forces of 12 N.
-        final_progress: s that is asked for in the end; at 2 the armhole would be drawn into the
-            armpit, and both sleeves would pull against each other. A sleeve whose other one is not
-            there yet stays where it just counts as done, and leaves the garment to it.
-        held_progress: s up to which a sleeve that has slipped is drawn again while both are held:
-            what is asked for is reached but for 0.03, and forces follow where it is.
-        settling_speed: of grippers once both sleeves are at the shoulders, m/s. A plan answers what
-            was seen up to 0.9 s before: with all the speed there is, grippers went up and down by
-            4 cm once a second.
-        largest_lead: advance of s that one of two sleeves on their arms may have on the other.
-        stages: thresholds of the switching.
+        dressing_position: factor on W once both sleeves are drawn up. Without it the last
+            centimetres cost less than the tilt of the armhole on the shoulder. Also used for a
+            waiting sleeve that may slip off.
+        waiting_reach: share of the armholes' rest distance that a waiting sleeve leaves to the
+            other one.
+        largest_aside: greatest lateral motion of a waiting sleeve, m. Hands that hang 0.58 m apart
+            come 0.15 m nearer at forces of 12 N.
+        final_progress: progress s that is asked for at the end. At 2 the armhole would be drawn
+            into the armpit, and both sleeves would pull against each other. A sleeve that waits for
+            the other one there stays where it just counts as done.
+        held_progress: progress s up to which a slipped sleeve is drawn again while both are held.
+            What is asked for is reached to within 0.03, and forces follow from where the sleeve is.
+        settling_speed: greatest speed of the grippers once both sleeves are at the shoulders, m/s.
+            A plan is based on observations up to 0.9 s old; at full speed the grippers oscillated
+            by 4 cm once a second.
+        largest_lead: greatest lead in s of one sleeve over the other when both are on their arms.
+        stages: thresholds between the stages.
 
     Raises:
         ValueError: there are fewer ways to go about a hand than `LEAST_APPROACHES`.

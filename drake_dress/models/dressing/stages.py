@@ -77,42 +77,46 @@ class StageParameters:
     """Thresholds of the switching.
 
     Attributes:
-        prepared_distance: a sleeve this close to its prepared position may be dressed, m (φ_p).
-        least_sight: share of the opening that a hand has to see for it to be drawn over it.
-        lost_sight: share below which the garment bars the hand: sight goes to and fro while cloth
-            moves, and an armhole that turned back each time would never get there.
-        sight_time: for which a hand that its armhole is about to meet counts as seeing it after it
-            did, s: at 10 cm the rim and the panel beside it bar most of what was seen from 15 cm,
-            and an armhole that turned back then never got there.
-        missed_distance: an armhole that has gone this far past the hand without the arm in it
-            is taken back, m.
-        waiting_progress: least s at which a sleeve waits for the other (bound of ŝ_f).
-        done_progress: s from which a sleeve is done.
-        kept_progress: s down to which it stays done, and from which one that does not come any
-            further is done.
-        reach: distance two armholes can be apart, m (φ_c).
-        meeting_distance: an armhole this close to a hand meets it, m.
-        pushed_distance: a hand that has gone this far before an armhole that meets it is pushed by
-            the garment, not entered: the armhole is taken back before the arm, which follows, is
-            where no hand can go in, m.
-        lingering_distance, lingering_timeout: an armhole that has been this close to a hand for so
-            long is taken back, m and s: of 22 hands that went in, 19 did within 2.6 s.
-        insertion_timeout: time after which a dressing without insertion is taken back, s.
-        barred_distance: an armhole this close to a hand that it is barred from is taken back, m.
-        barred_timeout: not before a sleeve was prepared for this long, s.
-        stall_timeout: time without progress after which a sleeve gives way, s; twice as long for
-            each time before that it has stalled there: what does not come free creeps on.
+        prepared_distance: distance from its prepared position below which a sleeve may be dressed,
+            m (φ_p).
+        least_sight: share of the opening that the hand must see before the sleeve is drawn over it.
+        lost_sight: share below which the garment blocks the hand. It is lower than `least_sight`,
+            since the visible share fluctuates while cloth moves, and an armhole that turned back
+            each time would never arrive.
+        sight_time: time for which a hand still counts as seeing an armhole that it is about to
+            meet, s. At 10 cm the rim and the panel beside it hide most of what was seen from 15 cm.
+        missed_distance: distance past the hand, without the arm inside, at which an armhole
+            withdraws, m.
+        waiting_progress: lowest s at which a sleeve waits for the other one (bound of ŝ_f).
+        done_progress: progress s above which a sleeve is done.
+        kept_progress: progress s above which a sleeve stays done, and above which a sleeve that
+            makes no more progress is done.
+        reach: greatest distance between the armholes, m (φ_c).
+        meeting_distance: distance from the hand below which an armhole meets it, m.
+        pushed_distance: distance that a hand moves ahead of an armhole above which the garment
+            pushes the hand instead of enclosing it, m. The armhole then withdraws before the arm
+            has been pushed to where no hand can enter.
+        lingering_distance: distance from the hand below which `lingering_timeout` counts, m.
+        lingering_timeout: time near the hand after which an armhole withdraws, s. Of 22 hands that
+            entered, 19 did so within 2.6 s.
+        insertion_timeout: time after which a dressing without insertion withdraws, s.
+        barred_distance: distance below which an armhole that is blocked from the hand withdraws, m.
+        barred_timeout: shortest time that a sleeve is prepared before it may withdraw as blocked,
+            s.
+        stall_timeout: time without progress after which a sleeve eases, s. It doubles with each
+            earlier stall at the same place; a sleeve that does not come free creeps on.
         stall_progress: advance of s that counts as progress.
-        easing_time: for which it gives way, s.
-        creeping_progress: s from which on it does not: so near the shoulder all have crept on.
-        retreat_time: for which a sleeve that was taken back keeps away from the hand, s.
-        withdrawal_after: misses of the first hand, each so many of which both sleeves are taken
-            back behind the person: a coat that hangs over an arm misses it again and again.
-        withdrawal_time: for which they are, s.
-        swing_after: misses of the second hand, each so many of which its sleeve is swung back
-            behind the person, the first one staying on its arm.
-        swing_time: for which it is, s.
-        alike: arms whose openings differ by less than this are alike.
+        easing_time: time for which a stalled sleeve eases, s.
+        creeping_progress: progress s above which a sleeve does not ease, since all sleeves crept on
+            so near the shoulder.
+        retreat_time: time for which a withdrawn sleeve stays away from the hand, s.
+        withdrawal_after: both sleeves withdraw behind the person after every so many misses of the
+            first hand. A coat that hangs over an arm misses it again and again.
+        withdrawal_time: duration of that withdrawal, s.
+        swing_after: the second sleeve swings back behind the person after every so many misses of
+            its hand, while the first one stays on its arm.
+        swing_time: duration of that swing, s.
+        alike: difference in opening below which two arms are treated as equal.
     """
 
     prepared_distance: float = 0.03

@@ -25,7 +25,7 @@ class AirDrag(ForceEffect):
     """Still air resists: f = −½ ρ C A ‖v·n‖ (v·n) n on each triangle; see the module.
 
     Args:
-        coefficient: C, dimensionless.
+        coefficient: C, drag coefficient of the cloth.
     """
 
     NAME = "air_drag"
@@ -47,9 +47,9 @@ class Wind(ForceEffect):
     f(v − w) − f(v) with f of the module, so that no wind is no change.
 
     Args:
-        x: of the wind's velocity, world, m/s.
-        y: m/s.
-        z: m/s.
+        x: forward component of the wind's velocity in the world frame, m/s.
+        y: leftward component, m/s.
+        z: upward component, m/s.
     """
 
     NAME = "wind"

@@ -27,7 +27,7 @@ class Friction(MaterialEffect):
     """Another Coulomb coefficient: μ' = μ + added.
 
     Args:
-        added: dimensionless.
+        added: change of the coefficient of friction.
     """
 
     NAME = "friction"
@@ -51,7 +51,7 @@ class VelocityDependentFriction(FrictionEffect):
     compensation", 1998).
 
     Args:
-        rate: c, s/m.
+        rate: c, increase of the coefficient of friction with sliding speed, s/m.
     """
 
     NAME = "velocity_dependent_friction"
@@ -102,7 +102,7 @@ class Adhesion(AdhesionEffect):
     (Derjaguin's law, "Molekulartheorie der äußeren Reibung", 1934.)
 
     Args:
-        strength: σ, Pa.
+        strength: σ, tensile strength of the contact, Pa.
     """
 
     NAME = "adhesion"

@@ -23,7 +23,7 @@ class StretchStiffness(MaterialEffect):
     """The cloth is stiffer against stretch: k' = k + added.
 
     Args:
-        added: N/m.
+        added: change of the stretch stiffness, N/m.
     """
 
     NAME = "stretch_stiffness"
@@ -45,7 +45,7 @@ class BendingStiffness(MaterialEffect):
     """The cloth is stiffer against bending: B' = B + added.
 
     Args:
-        added: N·m.
+        added: change of the bending stiffness, N·m.
     """
 
     NAME = "bending_stiffness"
@@ -67,7 +67,7 @@ class InternalDamping(MaterialEffect):
     """Deformation costs energy: β' = β + added, damping forces β K₊ v (Rayleigh).
 
     Args:
-        added: s.
+        added: change of the damping time, s.
     """
 
     NAME = "internal_damping"
@@ -87,7 +87,7 @@ class RestSize(ShapeEffect):
     """The garment has shrunk or grown at the same mass: rest lengths (1 + strain) L.
 
     Args:
-        strain: dimensionless, negative for shrinkage.
+        strain: relative change of all rest lengths; negative for shrinkage.
     """
 
     NAME = "rest_size"
@@ -109,7 +109,7 @@ class AnisotropicStiffness(FibreEffect):
     Fabrics are orthotropic (Kawabata, "The standardization and analysis of hand evaluation", 1980).
 
     Args:
-        warp: k_a, N/m.
+        warp: k_a, additional stiffness along the warp, N/m.
     """
 
     NAME = "anisotropic_stiffness"
@@ -131,7 +131,7 @@ class StrainStiffening(StretchEffect):
     In compression (ε ≤ 0) k stays. (The tensile curve of Kawabata 1980 to first order.)
 
     Args:
-        rate: c, per unit of strain.
+        rate: c, relative increase of stiffness per unit strain.
     """
 
     NAME = "strain_stiffening"

@@ -15,7 +15,7 @@ class GripperLatency(ClockEffect):
     """Grippers are later than they report: at time t they are where they say to be at t − delay.
 
     Args:
-        delay: s.
+        delay: delay of the grippers behind their report, s.
     """
 
     NAME = "gripper_latency"
@@ -35,7 +35,7 @@ class GripperCompliance(MountEffect):
     """A gripper gives way by c times the force on it, on a critically damped mount; see `mounts`.
 
     Args:
-        compliance: c, m/N.
+        compliance: c, displacement of a gripper per force, m/N.
     """
 
     NAME = "gripper_compliance"
@@ -55,8 +55,8 @@ class GripperSlip(MountEffect):
     """Cloth creeps out of a gripper: it slides along the pull at speed c (‖f‖ − f₀), if positive.
 
     Args:
-        rate: c, m/(N·s).
-        threshold: f₀, N.
+        rate: c, sliding speed per force beyond the threshold, m/(N·s).
+        threshold: f₀, force below which the cloth does not slide, N.
     """
 
     NAME = "gripper_slip"

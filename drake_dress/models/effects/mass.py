@@ -29,7 +29,7 @@ class SurfaceDensity(MaterialEffect):
     """The cloth is heavier: ρ' = ρ + added.
 
     Args:
-        added: kg/m².
+        added: change of the surface density, kg/m².
     """
 
     NAME = "surface_density"
@@ -52,10 +52,10 @@ class LocalMass(MassEffect):
     rest shape from the given point, σ = 5 cm; the sum is the mass, the centre of it near the point.
 
     Args:
-        mass: kg.
-        x: of the point in the garment's frame, m.
-        y: m.
-        z: m.
+        mass: additional mass, kg.
+        x: x of its place in the garment's frame, m.
+        y: y of its place, m.
+        z: z of its place, m.
     """
 
     NAME = "local_mass"
@@ -103,8 +103,8 @@ class GravityTilt(GravityEffect):
     """The world frame is not level: gravity g R_y(about_y) R_x(about_x) (0, 0, −1).
 
     Args:
-        about_x: rad.
-        about_y: rad.
+        about_x: rotation of gravity about x, rad.
+        about_y: rotation of gravity about y, rad.
     """
 
     NAME = "gravity_tilt"

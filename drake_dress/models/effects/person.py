@@ -16,7 +16,7 @@ class LimbRadius(BodyEffect):
     """Arms and hands are thicker: R' = R + added.
 
     Args:
-        added: m.
+        added: change of the radius of arms and hands, m.
     """
 
     NAME = "limb_radius"
@@ -37,7 +37,7 @@ class LimbCompliance(MountEffect):
     """A limb gives way by c times the force on it, on a critically damped mount; see `mounts`.
 
     Args:
-        compliance: c, m/N, of each upper arm and each forearm.
+        compliance: c, displacement of each upper arm and forearm per force, m/N.
     """
 
     NAME = "limb_compliance"

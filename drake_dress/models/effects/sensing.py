@@ -16,7 +16,7 @@ class TimeOffset(ClockEffect):
     """The cameras' clock is ahead of the robot's: what they stamp t was seen at t − offset.
 
     Args:
-        offset: s.
+        offset: lead of the cameras' clock, s.
     """
 
     NAME = "time_offset"
@@ -36,9 +36,9 @@ class CameraTranslation(CameraEffect):
     """The cameras' world is displaced: p_measured = p + t.
 
     Args:
-        x: of t, m.
-        y: m.
-        z: m.
+        x: x of the displacement t, m.
+        y: y of t, m.
+        z: z of t, m.
     """
 
     NAME = "camera_translation"
@@ -64,9 +64,9 @@ class CameraRotation(CameraEffect):
     """The cameras' world is turned about its origin: p_measured = R p, R of a rotation vector.
 
     Args:
-        x: of the rotation vector, rad.
-        y: rad.
-        z: rad.
+        x: x of the rotation vector, rad.
+        y: y of the rotation vector, rad.
+        z: z of the rotation vector, rad.
     """
 
     NAME = "camera_rotation"

@@ -32,20 +32,35 @@ SPACING_RANGE = (0.01, 0.06)  # m
 
 @dataclass(frozen=True)
 class CoatParameters:
-    """Measures of a coat, all m where nothing else is said."""
+    """Measures of a coat.
 
-    body_length: float = 0.72  # height of the shoulder tips above the hem
-    chest: float = 1.16  # girth at the underarm, closed over the open front
-    shoulder_width: float = 0.46  # from shoulder tip to shoulder tip
-    sleeve_length: float = 0.56  # from the shoulder tip to the cuff, along the top
+    Attributes:
+        body_length: height of the shoulder tips above the hem, m.
+        chest: girth at the underarm, closed over the open front, m.
+        shoulder_width: from shoulder tip to shoulder tip, m.
+        sleeve_length: from the shoulder tip to the cuff, along the top, m.
+        armhole_girth: girth of an armhole, m.
+        cuff_girth: girth of a cuff, m.
+        collar_height: height of the collar, m.
+        neck_width: distance between the inner ends of the shoulder seams, m.
+        front_opening: gap between the front edges at the underarm, part of the chest girth, m.
+        shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
+        grasp_fraction: where a gripper holds the shoulder seam, from neck (0) to shoulder tip (1).
+        grasp_radius: radius within which a gripper holds the cloth, m. With 0 it holds the whole
+            seam.
+    """
+
+    body_length: float = 0.72
+    chest: float = 1.16
+    shoulder_width: float = 0.46
+    sleeve_length: float = 0.56
     armhole_girth: float = 0.54
     cuff_girth: float = 0.32
     collar_height: float = 0.05
-    neck_width: float = 0.17  # between the inner ends of the shoulder seams
-    front_opening: float = 0.22  # between the front edges at the underarm, part of the chest girth
-    shoulder_slope: float = 0.04  # height of the seam's inner end above its outer end
-    grasp_fraction: float = 0.75  # where a gripper holds, from neck (0) to shoulder tip (1)
-    # within which a gripper holds the cloth; 0: its whole shoulder seam
+    neck_width: float = 0.17
+    front_opening: float = 0.22
+    shoulder_slope: float = 0.04
+    grasp_fraction: float = 0.75
     grasp_radius: float = 0.035
 
 
@@ -75,14 +90,14 @@ COATS = {
 def make_coat(parameters: CoatParameters, spacing: float, source: str = "coat") -> GarmentMesh:
     """Returns an open-front coat in the canonical rest pose of `GarmentMesh`.
 
-    The mesh is manifold, symmetric about y = 0 (bar the order of nodes), and oriented outward. Its
-    boundaries are the two cuffs and the rim: hem, front edges and collar. Armhole and cuff loops
-    begin at the shoulder tip's column and walk by the front; column k of both is the same.
+    The mesh is manifold, symmetric about y = 0 (except for the order of nodes), and oriented
+    outward. Its boundaries are the two cuffs and the rim: hem, front edges and collar. Armhole and
+    cuff loops begin at the shoulder tip and go round by the front; column k of both is the same.
 
     Args:
-        parameters: the measures.
-        spacing: wanted mean edge length, m; met to 25 %.
-        source: file or name put in front of error messages.
+        parameters: measures of the coat.
+        spacing: desired mean edge length, m; met to 25 %.
+        source: file or name at the beginning of error messages.
 
     Raises:
         UserError: a measure or the spacing is out of range, or measures contradict each other.

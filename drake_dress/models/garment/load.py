@@ -157,19 +157,20 @@ def load_garment(
     """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
 
     Args:
-        path: of the file.
-        unit: see `MeshOptions`, as for `up` and what follows it.
-        spacing: wanted mean edge length, m; None keeps the mesh as it is.
-        up: axis of the file.
+        path: file.
+        unit: unit of its coordinates, `m`, `cm` or `mm`.
+        spacing: desired mean edge length, m. None keeps the mesh as it is.
+        up: axis of the file that points up: `z`, `y` or `x`, with a minus sign for upside down.
         weld: distance across which seams are sewn, m.
-        leave_out: names, or sizes such as `<0.05 m`.
-        loops: nodes around openings.
-        grasp: nodes held.
-        scale: of all coordinates, beside the unit.
-        progress: is told what is being done, and which share of it is.
+        leave_out: names of objects or groups to leave out, or sizes such as `<0.05 m`.
+        loops: nodes in order around each opening, by its name; those not given are searched for.
+        grasp: nodes that the `left` and the `right` gripper hold.
+        scale: factor on all coordinates, in addition to the unit.
+        progress: function that is called with the present task and the share of it that is done.
 
     Raises:
-        UserError: see `read_garment` and `WholeGarment.at_spacing`.
+        UserError: the file, an option or the mesh is unusable; see `read_garment` and
+            `WholeGarment.at_spacing`.
     """
     options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale)
     whole = read_garment(path, options, progress)

@@ -19,16 +19,17 @@ LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
 
 @dataclass(frozen=True)
 class GarmentMesh:
-    """A garment at rest, with the openings and patches that dressing speaks of.
+    """A garment at rest, with its openings and the nodes that grippers hold.
 
-    Canonical rest pose of a coat: it faces +x, +y is its wearer's left, z is up, the hem is lowest,
-    the sleeves point sideways and down; the origin is the midpoint between the shoulder tips.
+    In the canonical rest pose a coat faces +x, +y is its wearer's left, and z is up. The hem is
+    lowest, the sleeves point sideways and down, and the origin is the midpoint between the shoulder
+    tips.
 
     Attributes:
         rest_position: (n,3) float64, m.
         faces: (F,3) int32, counter-clockwise seen from outside.
-        loops: node indices in order around each opening of `LOOP_NAMES`, the first not repeated.
-        grasp: nodes held by each gripper, keys `left` and `right`.
+        loops: node indices in order around each opening of `LOOP_NAMES`; the first is not repeated.
+        grasp: nodes held by each gripper, with keys `left` and `right`.
         region: (n,) int8, index into `REGION_NAMES`.
     """
 
@@ -54,10 +55,10 @@ class GarmentMesh:
         return replace(self, rest_position=self.rest_position * factor)
 
     def validate(self, source: str = "garment") -> None:
-        """Checks all that the rest of the package relies on.
+        """Checks everything that the rest of the package relies on.
 
         Args:
-            source: file or name put in front of the message.
+            source: file or name at the beginning of the message.
 
         Raises:
             UserError: the mesh is empty, holds NaN or infinity, a face has no area, it is not a

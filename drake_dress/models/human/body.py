@@ -33,10 +33,23 @@ class BodyMeasures:
     """Sizes of a person, m, and masses, kg.
 
     Attributes:
-        shoulder_height: of the shoulder joints above the floor, standing.
-        shoulder_width: from joint to joint.
-        forearm_length: from the elbow to the middle of the hand.
-        forearm_mass: hand included.
+        shoulder_height: height of the shoulder joints above the floor, standing, m.
+        shoulder_width: distance between the shoulder joints, m.
+        upper_arm_length: from shoulder to elbow, m.
+        forearm_length: from the elbow to the middle of the hand, m.
+        upper_arm_radius: radius of the upper arm, m.
+        forearm_radius: radius of the forearm, m.
+        hand_radius: radius of the hand, m.
+        chest_width: width of the chest, m.
+        chest_depth: depth of the chest, m.
+        torso_length: length of the trunk below the shoulders, m.
+        hip_width: width of the hips, m.
+        neck_radius: radius of the neck, m.
+        head_radius: radius of the head, m.
+        leg_length: length of a leg, m.
+        thigh_radius: radius of a thigh, m.
+        upper_arm_mass: mass of an upper arm, kg.
+        forearm_mass: mass of a forearm with its hand, kg.
 
     Raises:
         UserError: a value is not a positive finite number, or the trunk does not fit: it reaches

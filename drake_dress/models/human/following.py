@@ -40,10 +40,11 @@ class FollowingParameters:
     """How a person follows.
 
     Attributes:
-        time_constant: T, in which a joint held away from its set-point is followed, s.
+        time_constant: T, with which the set-point follows a displaced joint, s.
         threshold: θ, the torque up to which a joint keeps its set-point, N·m.
-        return_time_constant: T_c toward the comfortable pose, s; None: where led, there it stays.
-        max_speed: of a set-point, rad/s.
+        return_time_constant: T_c of the return to the comfortable pose, s. None: the arm stays
+            where it was led.
+        max_speed: greatest speed of a set-point, rad/s.
 
     Raises:
         UserError: a value is not as said here.

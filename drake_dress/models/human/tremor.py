@@ -30,8 +30,8 @@ class TremorParameters:
     """How the hands tremble.
 
     Attributes:
-        amplitude: of the hand, half of the way to and fro, m, in the rest pose.
-        frequency: Hz.
+        amplitude: half of the hand's motion to and fro in the rest pose, m.
+        frequency: frequency of the tremor, Hz.
 
     Raises:
         UserError: a value is not a finite number, the amplitude negative or the frequency not

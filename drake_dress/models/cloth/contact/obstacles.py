@@ -20,13 +20,13 @@ from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
 
 @dataclass(frozen=True)
 class HalfSpaces:
-    """Half-spaces in the world frame; the garment stays where the normals point.
+    """Half-spaces in the world frame. The garment stays on the side of the normals.
 
     Attributes:
-        point: (k,3) on the surface, m.
-        normal: (k,3) unit, outward.
-        velocity: (k,3) of the point, m/s.
-        angular_velocity: (k,3), rad/s.
+        point: (k,3) points on the surfaces, m.
+        normal: (k,3) unit normals, outward.
+        velocity: (k,3) velocities of the points, m/s.
+        angular_velocity: (k,3) angular velocities, rad/s.
     """
 
     point: FloatArray
@@ -41,7 +41,7 @@ class HalfSpaces:
 
     @staticmethod
     def resting(point: FloatArray, normal: FloatArray) -> HalfSpaces:
-        """Returns half-spaces that do not move; normals of any length."""
+        """Returns half-spaces that do not move. Normals may have any length."""
         p = np.atleast_2d(np.asarray(point, dtype=np.float64))
         n = np.atleast_2d(np.asarray(normal, dtype=np.float64))
         return HalfSpaces(
@@ -70,14 +70,15 @@ class Solid:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """All that the garment touches at one instant; a sphere is a capsule with a == b.
+    """Everything that the garment can touch, at one instant. A sphere is a capsule with a == b.
 
     Attributes:
-        a, b: (m,3) ends of the capsules' axes, world, m.
-        radius: (m,), m.
-        velocity: (m,3) of point a, m/s.
-        angular_velocity: (m,3), rad/s.
-        half_spaces: k of them.
+        a: (m,3) first ends of the capsules' axes, world frame, m.
+        b: (m,3) second ends, m.
+        radius: (m,) radii, m.
+        velocity: (m,3) velocities of the points a, m/s.
+        angular_velocity: (m,3) angular velocities, rad/s.
+        half_spaces: half-spaces.
         solids: closed meshes.
     """
 
@@ -96,7 +97,7 @@ class Obstacles:
 
     @staticmethod
     def none() -> Obstacles:
-        """Returns no obstacle at all."""
+        """Returns no obstacles."""
         empty = np.zeros((0, 3))
         return Obstacles(empty, empty, np.zeros(0), empty, empty)
 
@@ -119,7 +120,7 @@ class Obstacles:
         return replace(Obstacles.none(), half_spaces=plane)
 
     def copy(self) -> Obstacles:
-        """Returns the same with arrays of its own; the large signed distances are shared."""
+        """Returns a copy with its own arrays; the large signed distances are shared."""
         p = self.half_spaces
         planes = (p.point, p.normal, p.velocity, p.angular_velocity)
         solids = (
@@ -143,11 +144,12 @@ class Obstacles:
         )
 
     def moved(self, offset: FloatArray) -> Obstacles:
-        """Returns the bodies displaced, turned and sped up by `offset` (count,4,3).
+        """Returns the bodies with other poses and velocities.
 
-        Rows are a displacement of the origin, m, a rotation vector about it, rad, and additions to
-        velocity, m/s, and angular velocity, rad/s, all in world axes, bodies in order of owners:
-        what `Gradient` differentiates by.
+        Args:
+            offset: (count,4,3) for each body in the order of owners: displacement of the origin, m,
+                rotation vector about it, rad, change of velocity, m/s, and change of angular
+                velocity, rad/s, all in world axes. `Gradient` has the derivatives by these.
         """
         m, k = len(self.radius), len(self.half_spaces.point)
         turn = Rotation.from_rotvec(offset[:, 1])
