@@ -11,6 +11,7 @@ FOLDER = Path(__file__).parents[1] / "examples"
 # By file, what its output has to match.
 EXPECTED = {
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "gym_episode": r"armhole \d+ cm from the hand, reward \+0\.[1-9]\d+\n$",
 }
 
 
