@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +11,7 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.build import local_setup
 from drake_dress.diagrams.controller_diagram import make_controller_diagram
+from drake_dress.diagrams.release import release
 from drake_dress.gym.environment import DressingEnv
 from drake_dress.gym.observations import Observation
 from drake_dress.models.sides import SIDES
@@ -42,11 +45,13 @@ class ControllerPolicy:
         if "garment_position" not in inner.observation_space.spaces:  # type: ignore[attr-defined]
             raise ValueError("env does not observe the group state, which the controllers see")
         self._env = inner
+        self._diagram: Any = None
         self.reset()
 
     def reset(self) -> None:
         """Begins anew, with the person and garment of the environment's episode."""
         parts = self._env.parts
+        self.close()
         local = local_setup(parts.scenario, parts.policy)
         self._has_local = local is not None
         # what the controllers request is used from their delay on
@@ -56,12 +61,24 @@ class ControllerPolicy:
         self._root = self._simulator.get_mutable_context()
         self._begun = False
 
+    def close(self) -> None:
+        """Frees the memory of the controllers, and ends their thread."""
+        if self._diagram is not None:
+            del self._simulator, self._root
+            release(self._diagram)
+            self._diagram = None
+
     def act(self, observation: Observation) -> npt.NDArray[np.float32]:
         """Returns the action (2,3), m/s, that follows from an observation.
 
         Args:
             observation: of the episode, each once and in their order.
+
+        Raises:
+            ValueError: the policy is closed.
         """
+        if self._diagram is None:
+            raise ValueError("the policy is closed, expected reset() first")
         self._fix("joint_position", observation["joint_position"])
         for name in ("garment_position", "garment_velocity"):
             self._fix(name, observation[name])

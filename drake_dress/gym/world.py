@@ -13,6 +13,7 @@ from drake_dress.diagrams.agent_diagram import make_agent_diagram
 from drake_dress.diagrams.arms import ArmReachError
 from drake_dress.diagrams.assemble import Garments, Parts, garments, parts
 from drake_dress.diagrams.garment import build_garment_like
+from drake_dress.diagrams.release import release
 from drake_dress.diagrams.scenario import Scenario, apply_variation
 from drake_dress.errors import UserError
 from drake_dress.gym.reward import Loads
@@ -73,6 +74,13 @@ class World:
         self._command.FixValue(self._root, np.zeros(6))
         self._simulator.Initialize()
         self._steps = 0
+
+    def close(self) -> None:
+        """Frees the memory of the diagram; nothing can be asked of this world afterwards."""
+        diagram = self._agent.diagram
+        # simulator and contexts first: they use the diagram
+        self.__dict__.clear()
+        release(diagram)
 
     def is_of(self, drawn: Scenario) -> bool:
         """Returns whether this is the world of a drawn scenario, so that it can be restarted.
