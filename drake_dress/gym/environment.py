@@ -27,7 +27,7 @@ from drake_dress.shipped import scenario_file
 
 Action = npt.NDArray[np.float32]
 
-# Seeds of episodes that are reset without one: none of those that results are reported of.
+# Range of the seeds of episodes that are reset without one; results are reported on smaller ones.
 _DRAWN_SEEDS = (2**32, 2**62)
 # Names of the cameras that an environment adds: for observations, and for `render`.
 _VIEW, _RENDER_VIEW = "view", "render_view"
@@ -56,9 +56,9 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
 
     `reset(seed=n)` draws what `drake-dress run --seed n` draws. The same seed and actions give the
     same observations bit for bit. Without a seed one is drawn, 2³² or more, from the environment's
-    generator; so no episode of a training is one that results are reported of. A reset that draws
-    what the last one drew keeps the diagram; any other builds a new one, which takes a second or
-    two and leaves 1 MB behind that Drake does not free.
+    generator, so that training never uses a seed on which results are reported. A reset that draws
+    what the last one drew keeps the diagram. Any other builds a new one, which takes a second or
+    two and leaves about 1 MB behind that Drake does not free.
 
     Args:
         scenario: name of a scenario that ships, or a YAML file.
@@ -296,7 +296,7 @@ def _plant_steps(scenario: Scenario, control_rate: float | None) -> int:
     """Returns for how many of the plant's steps an action is held."""
     step = scenario.plant.time_step
     if control_rate is None:
-        # of all scenarios that ship the plant's step divides the local controller's
+        # in all scenarios that ship, the local controller's period is a multiple of the step
         return max(1, round(scenario.controller.local.period / step))
     steps = 1.0 / (control_rate * step) if control_rate > 0.0 else 0.0
     if not (steps < np.inf and round(steps) >= 1 and abs(steps - round(steps)) < 1e-6):
