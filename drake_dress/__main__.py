@@ -42,6 +42,7 @@ BENCHMARKS = {
     "arms": "every scenario with floating grippers and with two arms; what the arms do",
     "dressing": "persons and coats under many seeds, by each method of control",
     "explain": "hidden effects that are named right",
+    "gym": "speed of the Gymnasium environment, and dressings through its actions",
     "hardware": "rates, latency, faults and memory of a run and a lab in two processes",
     "inputs": "what becomes of drawn bad scenarios, garment files, measured logs and messages",
     "killed": "what runs leave that are killed, terminated or out of disk",

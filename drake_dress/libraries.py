@@ -19,7 +19,14 @@ SYSTEM_LIBRARIES = {
 # Modules that every command needs.
 _NEEDED = ("numpy", "scipy", "yaml", "rich", "h5py", "trimesh", "rtree", "pydrake.common")
 # Modules that come with an extra.
-EXTRAS = {"torch": "torch", "cv2": "vision", "ray": "ray", "pyarrow": "ray"}
+EXTRAS = {
+    "torch": "torch",
+    "cv2": "vision",
+    "gymnasium": "gym",
+    "moviepy": "gym",
+    "ray": "ray",
+    "pyarrow": "ray",
+}
 _SHARED_OBJECT = re.compile(r"(lib[\w.+-]+\.so[\d.]*)")
 _INSTALL = "expected all packages of drake_dress: pip install them again"
 

@@ -15,6 +15,7 @@ EXPECTED = {
     "explain_own_effect": r"lacks is a chain in the hem \(mass 0\.(09|10)\d* ± .* kg\)\.\n$",
     "explain_recording": r"cameras that are displaced(.*\n)*markers off by 35, now [3-8] mm\n$",
     "fit_fabric": r"stretch stiffness 60\.000 N/m\n$",
+    "gym_episode": r"armhole \d+ cm from the hand, reward \+0\.[1-9]\d+\n$",
     "load_coat": r"left_cuff: \d+ nodes, girth (29|30) cm\n(.*\n)+hem .*: 0\.\d+ m lower\n$",
     "own_controller": r"the left gripper rose by \d\.\d cm\n$",
     "replay_log": r"1\.0 s in my_replay\.html, \d\.\d MB\n$",

@@ -202,16 +202,7 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
         ),
     )
     asking = w.add(*_plan_to_request(control))
-    governor = w.add(
-        "safety_governor",
-        SafetyGovernor(
-            w.of.start_grippers,
-            rates.command_period,
-            control.limits,
-            policy.person,
-            policy.held_offsets,
-        ),
-    )
+    governor = add_governor(w, control)
     w.connect(w.station, "estimate.joint_position", predicted, "joint_position")
     for quantity in MOTION:
         w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
@@ -222,11 +213,26 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
         w.connect(mpc, "plan", asking, "plan")
     if control.local is not None:
         _add_local_inputs(w, control.local, control.predictor, asking)
-    _wire_governor(w, asking, governor)
-    return _Controllers(mpc, asking, governor, _command_grippers(w, control, governor))
+    wire_governor(w, asking, governor)
+    return _Controllers(mpc, asking, governor, command_grippers(w, control, governor))
 
 
-def _command_grippers(
+def add_governor(w: Wiring, control: ControlSetup) -> SafetyGovernor:
+    """Adds the safety governor of a setup, not yet wired."""
+    governor: SafetyGovernor = w.add(
+        "safety_governor",
+        SafetyGovernor(
+            w.of.start_grippers,
+            control.rates.command_period,
+            control.limits,
+            control.policy.person,
+            control.policy.held_offsets,
+        ),
+    )
+    return governor
+
+
+def command_grippers(
     w: Wiring, control: ControlSetup, governor: SafetyGovernor
 ) -> ArmController | None:
     """Has grippers go where the governor commands.
@@ -280,7 +286,14 @@ def _add_local_inputs(
     _show_grippers(w, controller, "position")
 
 
-def _wire_governor(w: Wiring, asking: Any, governor: SafetyGovernor) -> None:
+def wire_governor(w: Wiring, asking: Any, governor: SafetyGovernor) -> None:
+    """Gives the governor what the station measures, and the requests of a system.
+
+    Args:
+        w: the diagram in the making.
+        asking: with outputs `{left,right}_velocity_request` and `request_time`.
+        governor: of safety.
+    """
     w.connect(asking, "request_time", governor, "request_time")
     w.connect(w.station, "permission", governor, "permission")
     w.connect(w.station, "estimate.joint_position", governor, "joint_position")

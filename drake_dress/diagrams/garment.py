@@ -37,6 +37,31 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
 
 
+def build_garment_like(
+    garment: schema.Garment, nominal: schema.Garment, spacing: float, base: Path
+) -> GarmentMesh:
+    """Returns a garment on the nodes that the nominal garment has at `spacing`, m.
+
+    A variation draws garments of different sizes, whose meshes differ in their numbers of nodes.
+    Meshes of this function all have those of the nominal garment, each at the same place of the
+    pattern.
+
+    Args:
+        garment: pattern or mesh file, drawn from `nominal` by a variation.
+        nominal: the same pattern or file before the draw.
+        spacing: wanted edge length of the nominal garment, m.
+        base: directory that a mesh file's name is relative to.
+
+    Raises:
+        UserError: measures contradict each other, or the file cannot be used.
+    """
+    if garment.mesh is not None and nominal.mesh is not None:
+        mesh = build_garment(nominal, spacing, base)
+        return mesh.scaled(garment.mesh.scale / nominal.mesh.scale)
+    like = coat_parameters(nominal.coat)
+    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
+
+
 def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarment:
     key = _identity(path, mesh)
     if key is not None and key in _kept:

@@ -1,3 +1,4 @@
+import copy
 import os
 from pathlib import Path
 from typing import Any
@@ -96,3 +97,19 @@ def test_a_scenario_with_all_keys_loads() -> None:
     mesh = present(scenario.garment.mesh)
     assert mesh.up == "-y"
     assert mesh.leave_out == ["Button", "<0.05 m"]
+
+
+@pytest.mark.parametrize("scale", [0.93, 1.08])
+def test_a_garment_like_the_nominal_one_has_its_nodes(scale: float, tmp_path: Path) -> None:
+    write(tmp_path / "jacket.obj")
+    for nominal in (Garment(), Garment(mesh=Mesh(file="jacket.obj"))):
+        drawn = copy.deepcopy(nominal)
+        drawn.coat.scale *= scale
+        if drawn.mesh is not None:
+            drawn.mesh.scale *= scale
+        first = garment.build_garment(nominal, 0.06, tmp_path)
+        like = garment.build_garment_like(drawn, nominal, 0.06, tmp_path)
+        np.testing.assert_allclose(
+            like.rest_position, scale * first.rest_position, atol=0.02 * abs(scale - 1.0) + 1e-12
+        )
+        np.testing.assert_array_equal(like.loops["left_cuff"], first.loops["left_cuff"])

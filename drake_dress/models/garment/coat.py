@@ -87,7 +87,12 @@ COATS = {
 }
 
 
-def make_coat(parameters: CoatParameters, spacing: float, source: str = "coat") -> GarmentMesh:
+def make_coat(
+    parameters: CoatParameters,
+    spacing: float,
+    source: str = "coat",
+    like: CoatParameters | None = None,
+) -> GarmentMesh:
     """Returns an open-front coat in the canonical rest pose of `GarmentMesh`.
 
     The mesh is manifold, symmetric about y = 0 (except for the order of nodes), and oriented
@@ -98,18 +103,31 @@ def make_coat(parameters: CoatParameters, spacing: float, source: str = "coat") 
         parameters: measures of the coat.
         spacing: desired mean edge length, m; met to 25 %.
         source: file or name at the beginning of error messages.
+        like: measures of another coat. The mesh then has the nodes and loops that the other coat's
+            mesh has at this spacing, each at the same place of the pattern, so that arrays of
+            nodes of both can be compared. The spacing is met for the other coat only. Which nodes
+            a gripper holds, and the diagonals of the grids, follow the coat's own measures.
 
     Raises:
         UserError: a measure or the spacing is out of range, or measures contradict each other.
     """
     _check(parameters, spacing, source)
-    draft = _shape(parameters, None, source)
+    if like is None:
+        return _at_spacing(parameters, spacing, source)[1]
+    _check(like, spacing, source)
+    counts, _ = _at_spacing(like, spacing, source)
+    return _build(parameters, _shape(parameters, counts, source), counts, source)
+
+
+def _at_spacing(p: CoatParameters, spacing: float, source: str) -> tuple[_Counts, GarmentMesh]:
+    """Returns a coat's mesh, and the numbers of columns and rows that it was built with."""
+    draft = _shape(p, None, source)
     for fill in _FILLS:
-        counts = _count(parameters, draft, fill * spacing)
-        mesh = _build(parameters, _shape(parameters, counts, source), counts, source)
+        counts = _count(p, draft, fill * spacing)
+        mesh = _build(p, _shape(p, counts, source), counts, source)
         if edge_lengths(mesh.rest_position, mesh.faces).max() <= _LONGEST * spacing:
             break
-    return mesh
+    return counts, mesh
 
 
 _RANGES = {

@@ -184,3 +184,33 @@ def test_bad_measure_is_named(change: dict[str, Any], key: str) -> None:
 def test_bad_spacing_is_named(spacing: float) -> None:
     with pytest.raises(UserError, match="spacing"):
         make_coat(CoatParameters(), spacing)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.12])
+def test_a_coat_like_another_has_its_nodes_and_its_own_measures(factor: float) -> None:
+    nominal = COATS["jacket"]
+    own = replace(
+        nominal,
+        chest=factor * nominal.chest,
+        sleeve_length=factor * nominal.sleeve_length,
+        cuff_girth=factor * nominal.cuff_girth,
+    )
+    first, second = make_coat(nominal, 0.05), make_coat(own, 0.05, like=nominal)
+    assert len(make_coat(own, 0.05).rest_position) != len(first.rest_position)
+    second.validate()
+    check_measures(second, own)
+    np.testing.assert_array_equal(second.region, first.region)
+    for name, loop in first.loops.items():
+        np.testing.assert_array_equal(second.loops[name], loop)
+    # each node at the same place of the pattern: moved by no more than the sizes differ
+    moved = np.linalg.norm(second.rest_position - first.rest_position, axis=1)
+    assert moved.max() < 1.2 * abs(factor - 1.0) * nominal.chest
+
+
+def test_a_coat_like_itself_is_itself() -> None:
+    first, second = (
+        make_coat(COATS["jacket"], 0.03),
+        make_coat(COATS["jacket"], 0.03, like=COATS["jacket"]),
+    )
+    np.testing.assert_array_equal(first.rest_position, second.rest_position)
+    np.testing.assert_array_equal(first.faces, second.faces)
