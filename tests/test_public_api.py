@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-MODULES = ("cloth", "control", "dressing")
+MODULES = ("cloth", "control", "dressing", "explain", "gym")
 # Those that need neither Drake nor torch.
 PLAIN = ("cloth", "control")
 
