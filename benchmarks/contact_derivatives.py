@@ -23,7 +23,7 @@ from drake_dress.file_output import output_file, write_text
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
 
 STEPS = (0.001, 0.005, 0.01, 0.05, 0.1)
@@ -120,7 +120,9 @@ def _random_state(
     v = np.zeros_like(x)
     for _ in range(int(rng.integers(10, 40))):
         x, v, _, _ = settle.step(x, v, np.tile(0.01 * velocity, (len(held), 1)), limbs)
-    cloth = ExplicitBiasCloth(elements, material, time_step, held, tolerance=1e-11)
+    cloth = ExplicitBiasCloth(
+        elements, material, time_step, held, settings=ExplicitSettings(tolerance=1e-11)
+    )
     return cloth, x, v, np.tile(time_step * velocity, (len(held), 1)), limbs
 
 

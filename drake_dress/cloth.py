@@ -19,13 +19,14 @@ from typing import TYPE_CHECKING, Any
 from drake_dress.models.cloth.adjoint import Gradient
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import Influences
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
 from drake_dress.models.cloth.rollout import Rollout, RolloutGradient, roll_back, roll_out
+from drake_dress.models.cloth.state import Additions, ClothState
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
 from drake_dress.models.garment.load import load_garment
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -36,19 +37,23 @@ if TYPE_CHECKING:
 __all__ = [
     "COATS",
     "MATERIAL",
+    "Additions",
     "ClothState",
     "CoatParameters",
     "Elements",
     "ExplicitBiasCloth",
+    "ExplicitSettings",
     "GarmentMesh",
     "Gradient",
     "HalfSpaces",
     "ImplicitCloth",
+    "ImplicitSettings",
     "Influences",
     "LayeredCloth",
     "Material",
     "Obstacles",
     "ProjectiveDynamicsCloth",
+    "ProjectiveSettings",
     "Rollout",
     "RolloutGradient",
     "cloth_step",

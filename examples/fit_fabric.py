@@ -15,7 +15,13 @@ def make_strip() -> tuple[cloth.ExplicitBiasCloth, torch.Tensor]:
     rest = np.stack([u.ravel(), np.zeros(u.size), z.ravel()], axis=1)
     corner = np.arange(u.size).reshape(u.shape)[:-1, :-1].reshape(-1, 1)
     elements = cloth.make_elements(rest, np.concatenate([corner + [0, 5, 1], corner + [1, 5, 6]]))
-    strip = cloth.ExplicitBiasCloth(elements, cloth.Material(), 0.05, np.arange(5), iterations=5)
+    strip = cloth.ExplicitBiasCloth(
+        elements,
+        cloth.Material(),
+        0.05,
+        np.arange(5),
+        settings=cloth.ExplicitSettings(iterations=5),
+    )
     return strip, torch.from_numpy(rest)
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from benchmarks.cloth.scene import Scene
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.state import ClothState
 
 
 class Engine(Protocol):
@@ -61,8 +62,7 @@ class ExplicitBiasEngine:
             scene.material,
             time_step,
             scene.held,
-            iterations=iterations,
-            self_collision=thickness,
+            settings=ExplicitSettings(iterations=iterations, self_collision=thickness),
         )
         self._obstacles = scene.obstacles
         self.x = scene.first_position().copy()
@@ -130,7 +130,13 @@ def explicit_bias(iterations: int = 1, thickness: float = 0.0) -> Recipe:
 
 def _make_implicit(scene: Scene, h: float) -> Engine:
     # Peers and the other schemes have contact at nodes only.
-    cloth = ImplicitCloth(scene.elements(), scene.material, h, scene.held, sample_elements=False)
+    cloth = ImplicitCloth(
+        scene.elements(),
+        scene.material,
+        h,
+        scene.held,
+        settings=ImplicitSettings(sample_elements=False),
+    )
     return StateEngine(cloth, scene, h)
 
 
@@ -144,7 +150,11 @@ def projective_dynamics(quasi_newton: bool = False) -> Recipe:
 
     def make(scene: Scene, h: float) -> Engine:
         cloth = ProjectiveDynamicsCloth(
-            scene.elements(), scene.material, h, scene.held, quasi_newton=quasi_newton
+            scene.elements(),
+            scene.material,
+            h,
+            scene.held,
+            settings=ProjectiveSettings(quasi_newton=quasi_newton),
         )
         return StateEngine(cloth, scene, h)
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.plant.motion import DressingMotion
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK
-from drake_dress.models.cloth.implicit import ClothState
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 

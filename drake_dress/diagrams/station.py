@@ -63,10 +63,10 @@ from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.control.person_model import PersonModel, person_capsules
 from drake_dress.models.effects.composition import (
     GarmentWithEffects,

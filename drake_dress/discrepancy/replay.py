@@ -25,10 +25,10 @@ from drake_dress.discrepancy.lab import Lab
 from drake_dress.discrepancy.recording import Recording, smoothed
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import Influences
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import stretch_matrix
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.composition import (
     GarmentWithEffects,
     seen_points,

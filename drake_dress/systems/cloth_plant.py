@@ -18,8 +18,8 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.grasp import Pressing, press
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.contact.wrenches import body_wrenches
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.garment_steps import Steps, StepsBeside, StepsHere, Surroundings

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.systems.shared_memory import SharedMemory
 from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 

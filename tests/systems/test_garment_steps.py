@@ -14,8 +14,9 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.systems.garment_steps import StepsBeside, StepsHere, Surroundings
 from tests.models.cloth.sheets import sheet_elements
 from tests.systems.draped import H, draped_station

@@ -22,7 +22,7 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.distance import normal_derivative
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.forces import (
     force_and_product,
     stiffness_product,

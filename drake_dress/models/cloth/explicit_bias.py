@@ -30,7 +30,6 @@ the step with contact types held: friction follows the sticking force, normals f
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -55,12 +54,11 @@ from drake_dress.models.cloth.contact.friction import (
     most_revisions,
     revise_modes,
 )
+from drake_dress.models.cloth.contact.modes import FREE, HELD, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, STICK
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import force_and_product
-from drake_dress.models.cloth.implicit import GRAVITY
 from drake_dress.models.cloth.inner.conjugate_gradients import ConjugateGradients
 from drake_dress.models.cloth.inner.direct import Direct
 from drake_dress.models.cloth.inner.filtered import Filtered
@@ -73,9 +71,9 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     bending_bound,
     bending_matrix,
-    lumped_mass,
     stretch_matrix,
 )
+from drake_dress.models.cloth.state import GRAVITY, SteppedCloth
 
 INNER = ("one_step", "stationary", "conjugate_gradients", "direct")
 
@@ -169,7 +167,31 @@ _NO_VECTORS = np.zeros((0, 3))
 _NOTHING_BOUND = _Bound(_NO_VECTORS, _NO_VECTORS, NO_CONTACT, _NO_VECTORS, _NO_VECTORS)
 
 
-class ExplicitBiasCloth:
+@dataclass(frozen=True)
+class ExplicitSettings:
+    """How the scheme with bias solves, and what it takes part in.
+
+    Attributes:
+        tolerance: relative tolerance of solves by conjugate gradients.
+        iterations: inner iterations; 1 is the paper's one-step scheme.
+        inner: inner iteration, one of `INNER`. By default `one_step` for 1 iteration and
+            `conjugate_gradients` for more.
+        self_collision: distance that layers of the garment keep, m; 0 lets them pass through each
+            other. Layers are separated after the step (layers/). The adjoint keeps their pairs,
+            weights and directions fixed.
+        attachment_stiffness: stiffness of a spring from each held node to its gripper, N/m, as in
+            the paper. By default (None) held nodes move with the gripper. Springs yield by their
+            force, and by v h more in motion.
+    """
+
+    tolerance: float = 1e-4
+    iterations: int = 1
+    inner: str | None = None
+    self_collision: float = 0.0
+    attachment_stiffness: float | None = None
+
+
+class ExplicitBiasCloth(SteppedCloth):
     """Steps a garment with the paper's scheme, which has exact derivatives.
 
     Args:
@@ -178,16 +200,7 @@ class ExplicitBiasCloth:
         time_step: h, s. The motion stays bounded at large steps.
         held: (k,) nodes that move with the grippers.
         gravity: (3,) m/s².
-        tolerance: relative tolerance of solves by conjugate gradients.
-        iterations: inner iterations; 1 is the paper's one-step scheme.
-        self_collision: distance that layers of the garment keep, m; 0 lets them pass through each
-            other. Layers are separated after the step (layers/). The adjoint keeps their pairs,
-            weights and directions fixed.
-        attachment_stiffness: stiffness of a spring from each held node to its gripper, N/m, as in
-            the paper. By default (None) held nodes move with the gripper. Springs yield by their
-            force, and by v h more in motion.
-        inner: inner iteration, one of `INNER`. By default `one_step` for 1 iteration and
-            `conjugate_gradients` for more.
+        settings: how it solves.
 
     Raises:
         ValueError: `inner` is not one of `INNER`, or `one_step` is given more than one iteration.
@@ -200,47 +213,32 @@ class ExplicitBiasCloth:
         time_step: float,
         held: npt.NDArray[np.integer],
         gravity: FloatArray = GRAVITY,
-        tolerance: float = 1e-4,
-        iterations: int = 1,
-        inner: str | None = None,
-        self_collision: float = 0.0,
-        attachment_stiffness: float | None = None,
+        settings: ExplicitSettings = ExplicitSettings(),
     ) -> None:
-        self.elements = elements
-        self.material = material
-        self.time_step = time_step
-        self.held = np.asarray(held, dtype=np.int32)
-        self.gravity = np.asarray(gravity, dtype=np.float64)
-        self.mass = lumped_mass(elements, material)
-        self._most_revisions = most_revisions(tolerance)
-        self.layers = LayerSeparation(elements, self_collision) if self_collision else None
+        super().__init__(elements, material, time_step, held, gravity)
+        s = settings
+        self.settings = s
+        self._most_revisions = most_revisions(s.tolerance)
+        self.layers = LayerSeparation(elements, s.self_collision) if s.self_collision else None
         self.held_mask = np.zeros(elements.node_count, dtype=np.bool_)
         self.held_mask[self.held] = True
-        if attachment_stiffness is not None and not 0.0 < attachment_stiffness < np.inf:
+        self.spring = s.attachment_stiffness
+        if self.spring is not None and not 0.0 < self.spring < np.inf:
             raise ValueError(
-                f"attachment_stiffness is {attachment_stiffness} N/m, expected a number above 0"
+                f"attachment_stiffness is {self.spring} N/m, expected a number above 0"
             )
-        self.spring = attachment_stiffness
-        self._options = {
-            "tolerance": tolerance,
-            "iterations": iterations,
-            "inner": inner,
-            "self_collision": self_collision,
-            "attachment_stiffness": attachment_stiffness,
-        }
         # Springs leave all nodes free.
         self._fixed = self.held if self.spring is None else self.held[:0]
         self.inner = self._make_inner(
-            inner or ("one_step" if iterations == 1 else "conjugate_gradients"),
-            iterations,
-            tolerance,
+            s.inner or ("one_step" if s.iterations == 1 else "conjugate_gradients"),
+            s.iterations,
+            s.tolerance,
         )
 
     def with_material(self, material: Material) -> ExplicitBiasCloth:
         """Returns the same garment with another fabric."""
-        options: dict[str, Any] = self._options
         return ExplicitBiasCloth(
-            self.elements, material, self.time_step, self.held, self.gravity, **options
+            self.elements, material, self.time_step, self.held, self.gravity, self.settings
         )
 
     def step(

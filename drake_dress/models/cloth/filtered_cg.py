@@ -10,6 +10,8 @@ symmetric positive definite between the projections, so it need not be renewed a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numba as nb
 import numpy as np
 
@@ -25,7 +27,6 @@ from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
-FREE, STICK, SLIP, HELD, RAIL = 0, 1, 2, 3, 4
 # Weight of motion across the cloth beside P⁻¹ in the preconditioner: smooth motion is in both.
 _ACROSS = 0.3
 # Of the residual at the start, what rounding leaves over. Where all but nothing drives the free
@@ -34,6 +35,51 @@ _ROUNDING = 1e-12
 # Nor is more asked for than this share of the tolerance leaves of that residual: where nothing
 # moves and nothing weighs, what is left over has nothing else to be held against.
 _OF_THE_START = 1e-2
+
+
+@dataclass(frozen=True)
+class Preconditioner:
+    """What approximates the inverse of A.
+
+    Attributes:
+        factor: of P without some nodes. Those that it leaves out and that are free are
+            preconditioned by the diagonal.
+        across: of `normal_response`, added to the preconditioner but not to the norm. A coat on an
+            arm took 16.5 iterations without it, and 12.5 with it.
+    """
+
+    factor: Factor
+    across: tuple[FloatArray, FloatArray] | None = None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What of the nodes' motion is prescribed.
+
+    Attributes:
+        mode: (n,) FREE, STICK, SLIP, HELD or RAIL.
+        normal: (n,3) of the surface where a node slips, or direction of its rail.
+        resistance: (n,) added to the diagonal of A where nodes are free, kg.
+    """
+
+    mode: IntArray
+    normal: FloatArray
+    resistance: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When conjugate gradients end.
+
+    Attributes:
+        tolerance: relative to ‖Π against‖.
+        max_iterations: at most.
+        against: (n,3) what the residual is held against; the right-hand side by default.
+    """
+
+    tolerance: float
+    max_iterations: int
+    against: FloatArray | None = None
 
 
 class SystemMatrix:
@@ -104,59 +150,44 @@ class SystemMatrix:
 
     def solve(
         self,
-        factor: Factor,
+        preconditioner: Preconditioner,
         block: FloatArray,
-        mode: IntArray,
-        normal: FloatArray,
+        bound: Bound,
         rhs: FloatArray,
         z: FloatArray,
-        tolerance: float,
-        max_iterations: int,
-        resistance: FloatArray | None = None,
-        across: tuple[FloatArray, FloatArray] | None = None,
+        stop: Stop,
         applied: FloatArray | None = None,
-        against: FloatArray | None = None,
     ) -> tuple[int, float]:
         """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π against‖ in the factor's norm.
 
         Or until ‖r‖ is what rounding leaves of it, or a hundredth of the tolerance of where it
-        started; the tolerance counts as met then, too. `against` (n,3) is `rhs` by default.
+        started; the tolerance counts as met then, too.
 
         `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
-        stick, normal of those that slip) is kept, and enters the right-hand side through A. Nodes
-        that `factor` leaves out and that are free here are preconditioned by the diagonal.
-        `resistance` (n,), kg, is added to the diagonal of A where nodes are free. `across` of
-        `normal_response` is added to the preconditioner, but not to the norm: a coat
-        on an arm took 16.5 iterations without, and 12.5 with it. A z (n,3) is written into
-        `applied`, if given: it is a by-product.
+        stick, normal of those that slip) is kept, and enters the right-hand side through A. A z
+        (n,3) is written into `applied`, if given: it is a by-product.
 
         Returns:
             Iterations done, and the last relative residual.
         """
-        f = factor
-        if resistance is None:
-            resistance = np.zeros(0)
+        factor, across = preconditioner.factor, preconditioner.across
         if across is None:
             across = np.zeros((0, 3)), np.zeros(0)
-        if applied is None:
-            applied = np.empty((0, 3))
-        if against is None:
-            against = rhs
         return _filtered_cg(
             self._operator(block),
-            (f.blocks, f.pattern.permutation),
-            f.masked,
+            (factor.blocks, factor.pattern.permutation),
+            factor.masked,
             self._inverse_diagonal,
-            mode,
-            normal,
+            bound.mode,
+            bound.normal,
             rhs,
-            against,
+            rhs if stop.against is None else stop.against,
             z,
-            tolerance,
-            max_iterations,
-            resistance,
+            stop.tolerance,
+            stop.max_iterations,
+            np.zeros(0) if bound.resistance is None else bound.resistance,
             across,
-            applied,
+            np.empty((0, 3)) if applied is None else applied,
         )
 
     def solve_pair(

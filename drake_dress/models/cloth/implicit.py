@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import FloatArray, IntArray
@@ -29,11 +30,11 @@ from drake_dress.models.cloth.contact.detection import (
     find_proximity,
     nothing_near,
 )
+from drake_dress.models.cloth.contact.modes import FREE, HELD, RAIL, SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
-from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK, SystemMatrix
+from drake_dress.models.cloth.filtered_cg import Preconditioner, Stop, SystemMatrix
 from drake_dress.models.cloth.filtered_stiffness import (
     normal_response,
     prepare_filtered,
@@ -48,11 +49,16 @@ from drake_dress.models.cloth.matrices import (
     Csr,
     bending_bound,
     bending_matrix,
-    lumped_mass,
     stretch_matrix,
 )
+from drake_dress.models.cloth.state import (
+    GRAVITY,
+    NO_ADDITIONS,
+    Additions,
+    ClothState,
+    SteppedCloth,
+)
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
 _REFACTOR_AFTER = 40
 # A slipping node whose friction resists by more than this share of P's diagonal is left out of the
 # factor: with it, P⁻¹ is far too soft around it. Two sleeves on arms: 46 iterations a step before,
@@ -66,56 +72,6 @@ _LANDING_PASSES = 3
 _PARTING_PASSES = 3
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
-
-
-@dataclass(frozen=True)
-class ClothState:
-    """State of a garment between two steps.
-
-    Attributes:
-        x: (n,3) positions of the nodes, m.
-        v: (n,3) velocities, m/s.
-        mode: (n,) contact of each node: 0 free, 1 stick, 2 slip, 3 held.
-        reaction: (n,3) force of person or gripper on each node in the last step, N.
-        owner: (n,) obstacle that each node touches, -1 for none.
-        solver: (2,n+1) starting point of the linear solvers in the next step, so that a step
-            depends on its arguments alone. Row 0 belongs to the linearly implicit scheme, row 1 to
-            Projective Dynamics: how outdated the factor is (-1 without one), then 1 for each node
-            that it leaves out.
-        tangled: (n,) 1 for nodes of edges and triangles that pierce each other although layers are
-            kept apart; 0 for the others.
-    """
-
-    x: FloatArray
-    v: FloatArray
-    mode: IntArray
-    reaction: FloatArray
-    owner: IntArray
-    solver: IntArray = field(default_factory=lambda: np.empty((2, 0), dtype=np.int32))
-    tangled: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-
-    def __post_init__(self) -> None:
-        if len(self.tangled) == 0:
-            object.__setattr__(self, "tangled", np.zeros(len(self.x), dtype=np.int32))
-        if self.solver.shape[1] == 0:
-            no_factor = np.full((2, len(self.x) + 1), -1, dtype=np.int32)
-            object.__setattr__(self, "solver", no_factor)
-
-    @staticmethod
-    def at_rest(x: FloatArray) -> ClothState:
-        """Returns a garment at rest and free of contact.
-
-        Args:
-            x: (n,3) positions, m.
-        """
-        n = len(x)
-        return ClothState(
-            np.array(x, dtype=np.float64),
-            np.zeros((n, 3)),
-            np.zeros(n, dtype=np.int32),
-            np.zeros((n, 3)),
-            np.full(n, -1, dtype=np.int32),
-        )
 
 
 @dataclass(frozen=True)
@@ -167,15 +123,11 @@ class _Problem:
         self.impulse = np.empty_like(self.state.v)
 
 
-class ImplicitCloth:
-    """Steps a garment with the linearly implicit scheme: accurate, without derivatives.
+@dataclass(frozen=True)
+class ImplicitSettings:
+    """How exactly the linearly implicit scheme solves, and what it looks at.
 
-    Args:
-        elements: rest shape, from `make_elements`.
-        material: fabric.
-        time_step: h, s.
-        held: (k,) nodes whose motion is prescribed.
-        gravity: (3,) m/s².
+    Attributes:
         tolerance: residual at which conjugate gradients stop, relative to the momentum plus what
             gravity adds to it in a step.
         max_iterations: iterations of conjugate gradients per pass, at most.
@@ -184,11 +136,31 @@ class ImplicitCloth:
         sample_elements: whether edge midpoints and face centroids have contact, in addition to
             nodes.
         most_cone_passes: additional solves, at most, while nodes stick beyond the friction cone.
-        fibres: additional stiffness of the triangles along given directions.
-        added_mass: (n,) additional mass of the nodes, kg.
         implicitness: θ, above 0.5 up to 1. 1 is implicit Euler; smaller values damp less.
         buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression
             that would buckle at shorter wavelengths is relaxed (`Buckling`). 0 turns this off.
+    """
+
+    tolerance: float = 5e-3
+    max_iterations: int = 40
+    max_passes: int = 2
+    sample_elements: bool = True
+    most_cone_passes: int = 3
+    implicitness: float = 1.0
+    buckling_wavelength: float = 0.0
+
+
+class ImplicitCloth(SteppedCloth):
+    """Steps a garment with the linearly implicit scheme: accurate, without derivatives.
+
+    Args:
+        elements: rest shape, from `make_elements`.
+        material: fabric.
+        time_step: h, s.
+        held: (k,) nodes whose motion is prescribed.
+        gravity: (3,) m/s².
+        additions: what effects add to the garment.
+        settings: how exactly it solves.
     """
 
     def __init__(
@@ -196,39 +168,21 @@ class ImplicitCloth:
         elements: Elements,
         material: Material,
         time_step: float,
-        held: IntArray,
+        held: npt.NDArray[np.integer],
         gravity: FloatArray = GRAVITY,
-        tolerance: float = 5e-3,
-        max_iterations: int = 40,
-        max_passes: int = 2,
-        sample_elements: bool = True,
-        most_cone_passes: int = 3,
-        fibres: Fibres | None = None,
-        added_mass: FloatArray | None = None,
-        implicitness: float = 1.0,
-        buckling_wavelength: float = 0.0,
+        additions: Additions = NO_ADDITIONS,
+        settings: ImplicitSettings = ImplicitSettings(),
     ) -> None:
-        self.elements = elements
-        self.material = material
-        self.time_step = time_step
-        self.held = np.asarray(held, dtype=np.int32)
-        self.gravity = np.asarray(gravity, dtype=np.float64)
-        self.mass = lumped_mass(elements, material)
-        if added_mass is not None:
-            self.mass = self.mass + added_mass
-        self._fibres = fibres
-        self._tolerance = tolerance
-        self._max_iterations = max_iterations
-        self._max_passes = max_passes
-        self._most_cone_passes = most_cone_passes
-        self._edge = elements.edge if sample_elements else None
-        self._triangle = elements.triangle if sample_elements else None
+        super().__init__(elements, material, time_step, held, gravity, additions)
+        self._settings = settings
+        self._edge = elements.edge if settings.sample_elements else None
+        self._triangle = elements.triangle if settings.sample_elements else None
 
         self._buckling = None
-        if buckling_wavelength > 0.0:
-            self._buckling = Buckling(elements, material, buckling_wavelength)
+        if settings.buckling_wavelength > 0.0:
+            self._buckling = Buckling(elements, material, settings.buckling_wavelength)
 
-        self._implicitness = implicitness
+        implicitness, fibres = settings.implicitness, additions.fibres
         self._inertia = self.mass / implicitness
         scale = time_step * (implicitness * time_step + material.damping)
         bending = bending_matrix(elements, material)
@@ -278,7 +232,7 @@ class ImplicitCloth:
         end = state.x + h * p.velocity
         if not np.isfinite(end).all():
             explain_not_finite(state.x, v, held_velocity, self.held)
-        if p.residual > max(0.1, self._tolerance):
+        if p.residual > max(0.1, self._settings.tolerance):
             memory[0] = -1
         reaction = p.contact.impulse(p.velocity, p.impulse) / h
         # for this step only
@@ -288,7 +242,7 @@ class ImplicitCloth:
         share = (self.mass / p.inertia)[:, None]
         after = ClothState(
             end,
-            p.velocity if self._implicitness == 1.0 else v + (p.velocity - v) / share,
+            p.velocity if self._settings.implicitness == 1.0 else v + (p.velocity - v) / share,
             mode,
             reaction,
             np.where(touching, p.near.owner, -1).astype(np.int32),
@@ -306,11 +260,11 @@ class ImplicitCloth:
         """Returns what a step has to solve, made ready for its first pass."""
         m, h, x, v = self.material, self.time_step, state.x, state.v
         e = influences.stiffened(self.elements)
-        mu, adhesion = influences.contact_law(m.friction, len(x))
         force, block = self._elastic(e, x)
         force += self.mass[:, None] * self.gravity
-        if self._fibres is not None:
-            self._fibres.add_force(x, force)
+        fibres = self.additions.fibres
+        if fibres is not None:
+            fibres.add_force(x, force)
             self._system.prepare_fibres(x)
         if influences.force is not None:
             force += influences.force
@@ -322,9 +276,8 @@ class ImplicitCloth:
         else:
             near = find_proximity(x, obstacles, m.margin, self._edge, self._triangle)
             near = held_off_corners(near, x, obstacles, m.margin)
-        contact = ImplicitContact(
-            near, v, state.mode, state.reaction, self.held, h, self.gravity, mu, adhesion
-        )
+        law = influences.contact_law(m.friction, len(x))
+        contact = ImplicitContact(near, state, self.held, h, self.gravity, law)
         p = _Problem(state, obstacles, h * force, block, facing, light, near, contact, bonds)
         self._make_ready(p)
         return p
@@ -337,20 +290,26 @@ class ImplicitCloth:
 
     def _solve(self, p: _Problem, factor: Factor) -> None:
         """Finds velocities and impulses, with modes and pairs of layers to which they belong."""
-        cones, landings, partings = self._most_cone_passes, _LANDING_PASSES, _PARTING_PASSES
+        cones, landings, partings = (
+            self._settings.most_cone_passes,
+            _LANDING_PASSES,
+            _PARTING_PASSES,
+        )
         contact = p.contact
         several = contact.is_near or len(p.bonds) > 0
         while True:
             if p.passes > 0:
                 self._make_ready(p)
-            last = p.passes + 1 >= (self._max_passes if several else 1)
-            self._pass(p, factor, self._tolerance if last else _COARSER * self._tolerance)
+            last = p.passes + 1 >= (self._settings.max_passes if several else 1)
+            self._pass(
+                p, factor, self._settings.tolerance if last else _COARSER * self._settings.tolerance
+            )
             # Layers push and do not pull.
             glued = (not last or partings > 0) and p.bonds.update(p.velocity)
             if not last:
                 changed = contact.update(p.velocity, p.impulse)
                 few = changed <= _TOLERATED_CHANGES * np.count_nonzero(contact.mode)
-                if glued or not few or p.residual > self._tolerance:
+                if glued or not few or p.residual > self._settings.tolerance:
                     continue
             elif glued:
                 partings -= 1
@@ -368,20 +327,23 @@ class ImplicitCloth:
         """Solves for modes and pairs of layers as they are now."""
         contact = p.contact
         contact.prescribe(p.velocity)
+        bound = contact.mode.any()
         iterations, p.residual = self._system.solve(
-            factor,
+            # alone, P keeps the momentum of what is free, however soon iterations end
+            Preconditioner(
+                factor,
+                (p.facing, p.bonds.now.stiffened(p.facing, p.light)) if bound else None,
+            ),
             p.block,
-            contact.mode,
-            p.near.normal,
+            contact.bound(),
             p.pushed + contact.drive(),
             p.velocity,
-            tolerance,
-            self._max_iterations,
-            contact.resistance if contact.resistance.any() else None,
-            # alone, P keeps the momentum of what is free, however soon iterations end
-            (p.facing, p.bonds.now.stiffened(p.facing, p.light)) if contact.mode.any() else None,
+            Stop(
+                tolerance,
+                self._settings.max_iterations,
+                p.inertia[:, None] * (p.state.v + self.time_step * self.gravity),
+            ),
             p.impulse,
-            p.inertia[:, None] * (p.state.v + self.time_step * self.gravity),
         )
         p.impulse -= p.pushed
         p.iterations += iterations
@@ -404,7 +366,7 @@ class ImplicitCloth:
 
     def _bound_inertia(self, mode: IntArray) -> FloatArray:
         """Returns (n,), kg, M / θ of the nodes, M of bound ones, and makes it the system's."""
-        if self._implicitness == 1.0:
+        if self._settings.implicitness == 1.0:
             return self.mass
         inertia = np.where(mode == FREE, self._inertia, self.mass)
         self._system.set_diagonal(inertia + self._bending)
@@ -419,7 +381,7 @@ class ImplicitCloth:
         smaller residual. Starting a hanging coat from free fall doubled the iterations.
         """
         v, mode, normal = p.state.v, p.contact.mode, p.near.normal
-        fall = self._implicitness * self.time_step * self.gravity
+        fall = self._settings.implicitness * self.time_step * self.gravity
         other = v + fall if guess is None else guess.copy()
         best, least = v, np.inf
         for start in (v.copy(), other):

@@ -22,8 +22,11 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
 from drake_dress.models.cloth.contact.distance import distance_to, nearest_obstacle
+from drake_dress.models.cloth.contact.modes import FREE, HELD, RAIL, SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, RAIL, SLIP, STICK
+from drake_dress.models.cloth.filtered_cg import Bound
+from drake_dress.models.cloth.influences import ContactLaw
+from drake_dress.models.cloth.state import ClothState
 
 # A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.
 _LARGEST_PUSH = 0.2
@@ -49,13 +52,11 @@ class ImplicitContact:
 
     Args:
         near: what is nearest to the nodes at its start.
-        v: (n,3) then, m/s.
-        mode, reaction: (n,), and (n,3) N, of the step before.
+        state: of the garment at its start.
         held: (k,) nodes whose motion is prescribed; they feel no contact.
         time_step: h, s.
         gravity: (3,) m/s².
-        friction: (n,) Coulomb coefficient.
-        adhesion: (n,) pull that a contact bears, N.
+        law: friction and adhesion.
 
     Attributes:
         mode: (n,) FREE, STICK, SLIP, RAIL or HELD, now. Of a node on a rail, `normal` is the rail's
@@ -66,18 +67,16 @@ class ImplicitContact:
     def __init__(
         self,
         near: Proximity,
-        v: FloatArray,
-        mode: IntArray,
-        reaction: FloatArray,
+        state: ClothState,
         held: IntArray,
         time_step: float,
         gravity: FloatArray,
-        friction: FloatArray,
-        adhesion: FloatArray,
+        law: ContactLaw,
     ) -> None:
-        n, h = len(v), time_step
+        v, h = state.v, time_step
+        n = len(v)
         self._h = h
-        self._near, self._mu, self._adhesion = near, friction, h * adhesion
+        self._near, self._mu, self._adhesion = near, law.friction, h * law.adhesion
         self.mode = np.empty(n, dtype=np.int32)
         _initial_modes(
             near.gap,
@@ -86,7 +85,7 @@ class ImplicitContact:
             v,
             h * gravity,
             h,
-            mode,
+            state.mode,
             near.owner,
             self.mode,
         )
@@ -97,13 +96,13 @@ class ImplicitContact:
         self._friction, self._speed = np.zeros((n, 3)), np.zeros(n)
         self.resistance = np.zeros(n)
         _initial_friction(
-            reaction,
+            state.reaction,
             v,
             near.surface_velocity,
             near.normal,
             h,
-            friction,
-            adhesion,
+            law.friction,
+            law.adhesion,
             self.mode,
             self._friction,
             self.resistance,
@@ -114,6 +113,11 @@ class ImplicitContact:
     def is_near(self) -> bool:
         """Whether any node may land."""
         return bool(np.any(self._near.gap < _NEAR))
+
+    def bound(self) -> Bound:
+        """Returns what of the nodes' motion is bound, for the linear solver."""
+        resistance = self.resistance if self.resistance.any() else None
+        return Bound(self.mode, self._near.normal, resistance)
 
     def prescribe(self, velocity: FloatArray) -> None:
         """Writes what contact prescribes into `velocity` (n,3), m/s."""

@@ -15,6 +15,19 @@ from drake_dress.models.cloth.layers.bonds import Bonds
 
 
 @dataclass(frozen=True)
+class ContactLaw:
+    """Friction and adhesion of the nodes.
+
+    Attributes:
+        friction: (n,) Coulomb coefficient.
+        adhesion: (n,) pull that a contact can bear before it is released, N.
+    """
+
+    friction: FloatArray
+    adhesion: FloatArray
+
+
+@dataclass(frozen=True)
 class Influences:
     """Other effects on the garment during a step. None has no effect.
 
@@ -33,10 +46,10 @@ class Influences:
     stretch_factor: FloatArray | None = None
     bonds: Bonds | None = None
 
-    def contact_law(self, friction: float, count: int) -> tuple[FloatArray, FloatArray]:
-        """Returns Coulomb coefficient and adhesion, N, of `count` nodes, (n,) each."""
+    def contact_law(self, friction: float, count: int) -> ContactLaw:
+        """Returns what contact does with `count` nodes; `friction` is the material's."""
         mu = np.full(count, friction) if self.friction is None else self.friction
-        return mu, np.zeros(count) if self.adhesion is None else self.adhesion
+        return ContactLaw(mu, np.zeros(count) if self.adhesion is None else self.adhesion)
 
     def stiffened(self, elements: Elements) -> Elements:
         """Returns the elements, their areas scaled where stretch has another stiffness."""

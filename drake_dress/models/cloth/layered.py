@@ -15,16 +15,16 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.modes import HELD, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.filtered_cg import HELD, STICK
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.layers.bonds import Bonds
 from drake_dress.models.cloth.layers.neighbours import Passing
 from drake_dress.models.cloth.layers.separation import LayerSeparation
 from drake_dress.models.cloth.layers.tangles import Tangle, Tangles
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 
 # Nodes within this gap of the person are not pushed toward it, m.
 _ON_THE_PERSON = 1e-3

@@ -28,27 +28,35 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import cannot_land, depth_of_elements
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.fibres import Fibres
 from drake_dress.models.cloth.fibres import filtered_product as fibre_product
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product, project
+from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
-from drake_dress.models.cloth.implicit import GRAVITY, ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.matrices import Csr, bending_matrix, lumped_mass, stretch_matrix
+from drake_dress.models.cloth.matrices import Csr, bending_matrix, stretch_matrix
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
 from drake_dress.models.cloth.projective.projected_system import ProjectedSystem
 from drake_dress.models.cloth.projective.quasi_newton import CurvatureHistory
 from drake_dress.models.cloth.projective.stopping_rule import StoppingRule
+from drake_dress.models.cloth.state import (
+    GRAVITY,
+    NO_ADDITIONS,
+    Additions,
+    ClothState,
+    SteppedCloth,
+)
 from drake_dress.models.cloth.vectors import dot, largest_length
 
 _WINDOW = 5
@@ -82,7 +90,28 @@ class ProjectiveInfo:
     changes: int
 
 
-class ProjectiveDynamicsCloth:
+@dataclass(frozen=True)
+class ProjectiveSettings:
+    """How Projective Dynamics iterates, and what has contact.
+
+    Attributes:
+        tolerance: estimated distance to the fixed point at which a step is finished, m.
+        max_iterations: global steps, at most. The info says if they were not enough.
+        quasi_newton: L-BFGS instead of the plain iteration.
+        predicted: whether each step starts from the linearly implicit one. If that is close, few
+            iterations are left.
+        sample_elements: whether edge midpoints and face centroids have contact, too, from their
+            places at the start of a step.
+    """
+
+    tolerance: float = 1e-5
+    max_iterations: int = 5000
+    quasi_newton: bool = False
+    predicted: bool = False
+    sample_elements: bool = False
+
+
+class ProjectiveDynamicsCloth(SteppedCloth):
     """Steps a garment by Projective Dynamics, to convergence.
 
     By default only nodes have contact, unlike in `ImplicitCloth`, so thin objects can slip between
@@ -95,15 +124,8 @@ class ProjectiveDynamicsCloth:
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        tolerance: estimated distance to the fixed point at which a step is finished, m.
-        max_iterations: global steps, at most. The info says if they were not enough.
-        quasi_newton: L-BFGS instead of the plain iteration.
-        fibres: additional stiffness of the triangles along given directions.
-        added_mass: (n,) additional mass of the nodes, kg.
-        predicted: whether each step starts from the linearly implicit one. If that is close, few
-            iterations are left.
-        sample_elements: whether edge midpoints and face centroids have contact, too, from their
-            places at the start of a step.
+        additions: what effects add to the garment.
+        settings: how it iterates.
     """
 
     def __init__(
@@ -111,49 +133,29 @@ class ProjectiveDynamicsCloth:
         elements: Elements,
         material: Material,
         time_step: float,
-        held: IntArray,
+        held: npt.NDArray[np.integer],
         gravity: FloatArray = GRAVITY,
-        tolerance: float = 1e-5,
-        max_iterations: int = 5000,
-        quasi_newton: bool = False,
-        fibres: Fibres | None = None,
-        added_mass: FloatArray | None = None,
-        predicted: bool = False,
-        sample_elements: bool = False,
+        additions: Additions = NO_ADDITIONS,
+        settings: ProjectiveSettings = ProjectiveSettings(),
     ) -> None:
-        self.elements = elements
-        self.material = material
-        self.time_step = time_step
-        self.held = np.asarray(held, dtype=np.int32)
-        self.gravity = np.asarray(gravity, dtype=np.float64)
-        self.mass = lumped_mass(elements, material)
-        if added_mass is not None:
-            self.mass = self.mass + added_mass
-        self._fibres = fibres
-        self._tolerance = tolerance
-        self._sampled = sample_elements
-        self._max_iterations = max_iterations
-        self._history = CurvatureHistory(_WINDOW, elements.node_count) if quasi_newton else None
+        super().__init__(elements, material, time_step, held, gravity, additions)
+        self._settings = settings
+        self._history = None
+        if settings.quasi_newton:
+            self._history = CurvatureHistory(_WINDOW, elements.node_count)
 
         bending = bending_matrix(elements, material)
         stiffness = stretch_matrix(elements, material) + bending
-        if fibres is not None:
-            stiffness = stiffness + fibres.matrix(elements.node_count)
+        if additions.fibres is not None:
+            stiffness = stiffness + additions.fibres.matrix(elements.node_count)
         scale = time_step * (time_step + material.damping)
         self._system = ProjectedSystem(sp.csc_matrix(sp.diags(self.mass) + scale * stiffness))
         self._bending = Csr.of(bending)
         self._predictor = None
-        if predicted:
+        if settings.predicted:
+            sampled = ImplicitSettings(tolerance=1e-3, sample_elements=settings.sample_elements)
             self._predictor = ImplicitCloth(
-                elements,
-                material,
-                time_step,
-                held,
-                gravity,
-                tolerance=1e-3,
-                sample_elements=sample_elements,
-                fibres=fibres,
-                added_mass=added_mass,
+                elements, material, time_step, held, gravity, additions, sampled
             )
 
     def step(
@@ -181,20 +183,15 @@ class ProjectiveDynamicsCloth:
             explain_not_finite(state.x, state.v, held_velocity, self.held)
         if cannot_land(state.x, state.v, held_velocity, obstacles, h):
             obstacles = Obstacles.none()
-        mu, adhesion = influences.contact_law(self.material.friction, len(state.x))
         contact = IteratedContact(
-            state.x,
-            state.mode,
-            state.owner,
-            state.reaction,
+            state,
             self.held,
             obstacles,
             self.mass,
             h,
-            mu,
-            adhesion,
+            influences.contact_law(self.material.friction, len(state.x)),
             self._margins(state.x, obstacles),
-            self._tolerance,
+            self._settings.tolerance,
         )
         self._system.start_counting()
         self._system.go_on(state.solver[1])
@@ -251,7 +248,7 @@ class ProjectiveDynamicsCloth:
         history = self._history
         if history is not None:
             history.clear()
-        stop = StoppingRule(self._tolerance)
+        stop = StoppingRule(self._settings.tolerance)
         before, old_gradient = x.copy(), np.zeros((0, 3))
         iterations = 0
         while True:
@@ -263,7 +260,7 @@ class ProjectiveDynamicsCloth:
                     stop.restart()
                 else:
                     stop.add(largest_length(x - before))
-                if stop.reached() or iterations >= self._max_iterations:
+                if stop.reached() or iterations >= self._settings.max_iterations:
                     break
             if history is not None:
                 if changes:
@@ -292,7 +289,7 @@ class ProjectiveDynamicsCloth:
     def _margins(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
         """Returns (n,) the distance that nodes keep, so that elements between them keep theirs."""
         margin = np.full(len(x), self.material.margin)
-        if self._sampled:
+        if self._settings.sample_elements:
             e = self.elements
             margin += depth_of_elements(x, obstacles, e.edge, e.triangle)
         return margin
@@ -363,7 +360,7 @@ class _Equations:
         self._stiffness = (m.stretch_stiffness, m.bending_stiffness)
         self._mass, self._inertial, self._before = cloth.mass, inertial, x
         self._h2 = cloth.time_step**2
-        self._fibres = cloth._fibres
+        self._fibres = cloth.additions.fibres
         self._damping = cloth.time_step * m.damping
         self._bending = cloth._bending
         # a line search ends where the next iteration starts

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.state import Additions
 
-# Elements, fabric, gravity (3,), fibres and added mass (n,) to what steps the garment.
-MakeIntegrator = Callable[
-    [Elements, Material, FloatArray, Fibres | None, FloatArray | None], Integrator
-]
+# Elements, fabric, gravity (3,) and additions to what steps the garment.
+MakeIntegrator = Callable[[Elements, Material, FloatArray, Additions], Integrator]
 
 
 @dataclass(frozen=True)
@@ -50,40 +48,27 @@ class Scheme:
     buckling_wavelength: float = 0.0
 
     def __call__(
-        self,
-        elements: Elements,
-        material: Material,
-        gravity: FloatArray,
-        fibres: Fibres | None,
-        added_mass: FloatArray | None,
+        self, elements: Elements, material: Material, gravity: FloatArray, additions: Additions
     ) -> Integrator:
         """Returns what steps the garment."""
         if self.damping is not None:
             material = replace(material, damping=self.damping)
         if self.projective:
-            return ProjectiveDynamicsCloth(
-                elements,
-                material,
-                self.time_step,
-                self.held,
-                gravity,
+            iterated = ProjectiveSettings(
                 tolerance=self.accuracy,
                 quasi_newton=True,
-                fibres=fibres,
-                added_mass=added_mass,
                 predicted=self.predicted,
                 sample_elements=self.sampled,
             )
-        return ImplicitCloth(
-            elements,
-            material,
-            self.time_step,
-            self.held,
-            gravity,
+            return ProjectiveDynamicsCloth(
+                elements, material, self.time_step, self.held, gravity, additions, iterated
+            )
+        settings = ImplicitSettings(
             tolerance=self.tolerance,
             max_iterations=self.iterations,
-            fibres=fibres,
-            added_mass=added_mass,
             implicitness=self.implicitness,
             buckling_wavelength=self.buckling_wavelength,
+        )
+        return ImplicitCloth(
+            elements, material, self.time_step, self.held, gravity, additions, settings
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.costs import GarmentCost, Weights
@@ -99,8 +99,7 @@ class DressingPolicy:
             material,
             parameters.time_step,
             mesh.held,
-            tolerance=1e-2,
-            iterations=parameters.inner_iterations,
+            settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
         self.planner = TaskPlanner(mesh, parameters.tasks)
         held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]

@@ -15,10 +15,10 @@ from drake_dress.models.cloth.contact.detection import known_contacts
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.fibres import Fibres
-from drake_dress.models.cloth.implicit import GRAVITY, ClothState
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.scheme import MakeIntegrator
+from drake_dress.models.cloth.state import GRAVITY, Additions, ClothState
 from drake_dress.models.effects.effect import (
     AdhesionEffect,
     BodyEffect,
@@ -95,7 +95,7 @@ class GarmentWithEffects:
             stiffness = sum(fibre.apply(self.sheet) for fibre in along)
             fibres = Fibres.along(elements, rest_position, grain, 1.0)
             fibres = replace(fibres, weight=fibres.weight * stiffness)
-        inner = make(elements, material, gravity, fibres, added)
+        inner = make(elements, material, gravity, Additions(fibres, added))
         self.elements, self.material, self.time_step = elements, material, inner.time_step
         self.held, self.mass, self.gravity = inner.held, inner.mass, inner.gravity
         self._inner = inner

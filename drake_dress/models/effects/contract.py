@@ -25,8 +25,8 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.implicit import GRAVITY
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import GRAVITY
 from drake_dress.models.effects.effect import (
     AdhesionEffect,
     BodyEffect,

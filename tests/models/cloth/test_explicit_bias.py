@@ -5,11 +5,11 @@ import pytest
 import trimesh
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.contact.modes import FREE, SLIP
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
-from drake_dress.models.cloth.filtered_cg import FREE, SLIP
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings, Tape
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 
@@ -36,7 +36,9 @@ def test_gripper_that_moves_steadily_feels_the_weight(h: float, spring: float | 
     x, e = sheet_elements(12, 9, 0.03)
     start = np.column_stack([x[:, 1], np.zeros(len(x)), -x[:, 0]])
     held = np.arange(9, dtype=np.int32)
-    cloth = ExplicitBiasCloth(e, Material(), h, held, attachment_stiffness=spring)
+    cloth = ExplicitBiasCloth(
+        e, Material(), h, held, settings=ExplicitSettings(attachment_stiffness=spring)
+    )
     x, v = start, np.tile([0.15, 0.0, 0.0], (len(x), 1))
     forces = []
     for k in range(max(200, int(3.0 / h))):
@@ -51,7 +53,9 @@ def _in_contact(
 ) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray, Obstacles]:
     x, e = sheet_elements(16, 18, 0.03)
     held = np.array([0, 1, 17, 16], dtype=np.int32)
-    cloth = ExplicitBiasCloth(e, Material(friction=0.3), h, held, tolerance=1e-10)
+    cloth = ExplicitBiasCloth(
+        e, Material(friction=0.3), h, held, settings=ExplicitSettings(tolerance=1e-10)
+    )
     limb = Obstacles(
         np.array([[0.1, 0.2, -0.06], [0.3, 0.1, -0.07]]),
         np.array([[0.4, 0.3, -0.06], [0.3, 0.1, -0.07]]),
@@ -78,8 +82,7 @@ def test_derivative_of_a_contact_step_matches_finite_differences(
             cloth.material,
             h,
             cloth.held,
-            tolerance=1e-10,
-            attachment_stiffness=spring,
+            settings=ExplicitSettings(tolerance=1e-10, attachment_stiffness=spring),
         )
     weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
     weight_r = 1e-3 * rng.normal(size=motion.shape)
@@ -145,7 +148,9 @@ SETTLING = 130
 def _on_all_kinds(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, Obstacles]:
     """A sheet that lies on a floor that rises, a ball given as a mesh that turns, and a capsule."""
     x, e = sheet_elements(16, 18, 0.03)
-    cloth = ExplicitBiasCloth(e, Material(friction=0.3), h, NO_NODES, tolerance=1e-10)
+    cloth = ExplicitBiasCloth(
+        e, Material(friction=0.3), h, NO_NODES, settings=ExplicitSettings(tolerance=1e-10)
+    )
     mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.06)
     field = make_signed_distance_field(mesh.vertices, mesh.faces, 0.025)
     ball = Solid(
@@ -270,11 +275,17 @@ def _two_layers(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray]:
     x = np.concatenate([lower, upper])
     e = make_elements(x, np.concatenate([faces, faces + len(lower)]))
     held = np.flatnonzero((lower[:, 0] < 1e-9) | (lower[:, 0] > 0.329)).astype(np.int32)
-    settle = ExplicitBiasCloth(e, Material(), 0.01, held, self_collision=2e-3)
+    settle = ExplicitBiasCloth(
+        e, Material(), 0.01, held, settings=ExplicitSettings(self_collision=2e-3)
+    )
     v = np.zeros_like(x)
     for _ in range(12):
         x, v, _, _ = settle.step(x, v, np.zeros((len(held), 3)), Obstacles.none())
-    return ExplicitBiasCloth(e, Material(), h, held, self_collision=2e-3), x, v
+    return (
+        ExplicitBiasCloth(e, Material(), h, held, settings=ExplicitSettings(self_collision=2e-3)),
+        x,
+        v,
+    )
 
 
 def test_a_layer_that_falls_onto_another_stays_above_it() -> None:

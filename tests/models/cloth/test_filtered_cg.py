@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from drake_dress.models.cloth.contact.modes import FREE, HELD, SLIP, STICK
 from drake_dress.models.cloth.factor.masked import SymbolicFactor
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK
+from drake_dress.models.cloth.filtered_cg import Bound, Preconditioner, Stop
 from drake_dress.models.cloth.filtered_stiffness import normal_response
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.material import Material
@@ -89,16 +90,12 @@ def test_solution_is_that_of_the_free_motions(helped: bool, resisted: bool) -> N
     stale = np.isin(mode, (HELD, STICK))
     stale[22], stale[50] = False, True
     _, residual = s.system.solve(
-        s.symbolic.factorize(stale),
+        Preconditioner(s.symbolic.factorize(stale), s.across if helped else None),
         s.block,
-        mode,
-        normal,
+        Bound(mode, normal, resistance),
         rhs,
         z,
-        1e-12,
-        500,
-        resistance,
-        s.across if helped else None,
+        Stop(1e-12, 500),
     )
     assert residual < 1e-11
     np.testing.assert_allclose(z.ravel(), expected, atol=1e-8 * np.abs(expected).max())
@@ -120,7 +117,12 @@ def test_what_nothing_but_prescribed_motion_drives_is_solved(drive: float) -> No
     for most in (100, 1000):
         z = start.copy()
         iterations, residual = s.system.solve(
-            factor, s.block, mode, normal, rhs, z, 1e-6, most, None, s.across
+            Preconditioner(factor, s.across),
+            s.block,
+            Bound(mode, normal),
+            rhs,
+            z,
+            Stop(1e-6, most),
         )
         assert iterations < 100
         assert residual <= 1e-6
@@ -138,9 +140,13 @@ def test_motion_across_the_cloth_costs_fewer_iterations() -> None:
     rhs = s.rng.normal(size=(s.n, 1)) * s.across[0]
     count = [
         s.system.solve(
-            factor, s.block, mode, np.zeros((s.n, 3)), rhs, np.zeros((s.n, 3)), 1e-4, 500,
-            across=across,
+            Preconditioner(factor, across),
+            s.block,
+            Bound(mode, np.zeros((s.n, 3))),
+            rhs,
+            np.zeros((s.n, 3)),
+            Stop(1e-4, 500),
         )[0]
         for across in (None, s.across)
-    ]  # fmt: skip
+    ]
     assert count[1] < 0.8 * count[0]

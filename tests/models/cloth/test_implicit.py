@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.contact.modes import STICK
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.filtered_cg import STICK
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 
 H = 0.004
@@ -35,7 +36,9 @@ def test_free_fall_is_exact() -> None:
 def test_momentum_changes_by_gravity_and_contact_alone() -> None:
     x, e = sheet_elements(14, 14, 0.02)
     held = np.array([0, 1], dtype=np.int32)
-    cloth = ImplicitCloth(e, Material(stretch_stiffness=200.0), H, held, tolerance=1e-8)
+    cloth = ImplicitCloth(
+        e, Material(stretch_stiffness=200.0), H, held, settings=ImplicitSettings(tolerance=1e-8)
+    )
     ball = Obstacles.resting(
         np.array([[0.13, 0.05, -0.06]]), np.array([[0.13, 0.2, -0.06]]), np.array([0.05])
     )
@@ -204,9 +207,7 @@ def _vibrated(implicitness: float, time_step: float, duration: float = 0.24) -> 
         time_step,
         held,
         np.zeros(3),
-        tolerance=1e-10,
-        max_iterations=500,
-        implicitness=implicitness,
+        settings=ImplicitSettings(tolerance=1e-10, max_iterations=500, implicitness=implicitness),
     )
     shape = x[:, 1] / x[:, 1].max()
     state = ClothState.at_rest(x + np.outer(0.003 * 0.24 * np.sin(0.5 * np.pi * shape), [0, 1, 0]))
@@ -235,7 +236,9 @@ def test_what_lands_is_at_rest_on_the_floor_and_carries_its_weight(implicitness:
     x, e = sheet_elements(8, 8, 0.02)
     start = x - x.mean(axis=0)
     start[:, 2] = 0.01
-    cloth = ImplicitCloth(e, Material(), 0.008, NO_NODES, implicitness=implicitness)
+    cloth = ImplicitCloth(
+        e, Material(), 0.008, NO_NODES, settings=ImplicitSettings(implicitness=implicitness)
+    )
     state = replace(ClothState.at_rest(start), v=np.tile([0.0, 0.0, -1.0], (64, 1)))
     for _ in range(60):
         state, _ = cloth.step(state, incline(0.0), NOTHING)

@@ -10,9 +10,10 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.implicit import GRAVITY, ClothState, ImplicitCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import GRAVITY, ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet, sheet_elements
 
 NOTHING = np.zeros((0, 3))
@@ -45,16 +46,23 @@ class Run:
                 h,
                 held,
                 gravity,
-                tolerance=1e-6,
-                max_iterations=300,
-                max_passes=6,
-                implicitness=1.0 if scheme == "implicit" else 0.7,
+                settings=ImplicitSettings(
+                    tolerance=1e-6,
+                    max_iterations=300,
+                    max_passes=6,
+                    implicitness=1.0 if scheme == "implicit" else 0.7,
+                ),
             )
             self._state = replace(ClothState.at_rest(x), v=self.v)
         else:
             iterations = 1 if scheme == "one_step" else 30
             self.cloth = ExplicitBiasCloth(
-                elements, material, h, held, gravity, iterations=iterations
+                elements,
+                material,
+                h,
+                held,
+                gravity,
+                settings=ExplicitSettings(iterations=iterations),
             )
 
     def advance(self, held_velocity: FloatArray, obstacles: Obstacles) -> None:
@@ -316,7 +324,7 @@ def test_few_iterations_from_the_motion_do_not_run_away(h: float, stretch: float
     x, e = sheet_elements(14, 14, 0.03)
     held = np.array([0, 13], dtype=np.int32)
     m = Material(surface_density=0.2, stretch_stiffness=stretch, bending_stiffness=1e-4)
-    cloth = ExplicitBiasCloth(e, m, h, held, iterations=5)
+    cloth = ExplicitBiasCloth(e, m, h, held, settings=ExplicitSettings(iterations=5))
     v = np.random.default_rng(0).normal(scale=3.0, size=x.shape)
     v[held] = 0.0
     fastest = np.abs(v).max()

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.layers.scenes import two_sheets
 
 
@@ -21,7 +22,9 @@ def test_a_sheet_that_falls_on_another_lies_on_it(integrator: str) -> None:
     plain = (
         ImplicitCloth(e, material, 0.01, rim)
         if integrator == "implicit"
-        else ProjectiveDynamicsCloth(e, material, 0.01, rim, quasi_newton=True)
+        else ProjectiveDynamicsCloth(
+            e, material, 0.01, rim, settings=ProjectiveSettings(quasi_newton=True)
+        )
     )
     still = np.zeros((len(rim), 3))
     through = []

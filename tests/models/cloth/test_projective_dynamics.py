@@ -15,11 +15,12 @@ from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.forces import internal_force
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import bending_matrix, lumped_mass, stretch_matrix
 from drake_dress.models.cloth.projective.iterated_contact import advanced
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth
+from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet, sheet_elements
 
 NOTHING = np.zeros((0, 3))
@@ -91,7 +92,9 @@ def test_iteration_is_the_local_and_the_global_step() -> None:
     """Projections of all elements, then the constant system, as Bouaziz et al. 2014 have it."""
     x, e = crumpled(6, 0.004)
     m, h = Material(stretch_stiffness=80.0, bending_stiffness=2e-3), 0.02
-    cloth = ProjectiveDynamicsCloth(e, m, h, NO_NODES, gravity=STILL, max_iterations=1)
+    cloth = ProjectiveDynamicsCloth(
+        e, m, h, NO_NODES, gravity=STILL, settings=ProjectiveSettings(max_iterations=1)
+    )
     after, info = cloth.step(ClothState.at_rest(x), Obstacles.none(), NOTHING)
     assert not info.converged
 
@@ -114,7 +117,9 @@ def test_iteration_is_the_local_and_the_global_step() -> None:
 def test_step_ends_where_the_equations_of_implicit_euler_hold(quasi_newton: bool) -> None:
     x, e = crumpled(8, 0.002)
     m, h = Material(), 0.01
-    cloth = ProjectiveDynamicsCloth(e, m, h, NO_NODES, tolerance=1e-9, quasi_newton=quasi_newton)
+    cloth = ProjectiveDynamicsCloth(
+        e, m, h, NO_NODES, settings=ProjectiveSettings(tolerance=1e-9, quasi_newton=quasi_newton)
+    )
     before = moving(x, np.array([0.2, 0.0, 0.1]))
     after, info = cloth.step(before, Obstacles.none(), NOTHING)
     assert info.converged
@@ -128,7 +133,9 @@ def test_step_ends_where_the_equations_of_implicit_euler_hold(quasi_newton: bool
 def test_free_fall_is_implicit_euler(quasi_newton: bool) -> None:
     x, e = sheet_elements(8, 8, 0.02)
     for h in (0.004, 0.1):
-        cloth = ProjectiveDynamicsCloth(e, Material(), h, NO_NODES, quasi_newton=quasi_newton)
+        cloth = ProjectiveDynamicsCloth(
+            e, Material(), h, NO_NODES, settings=ProjectiveSettings(quasi_newton=quasi_newton)
+        )
         state = ClothState.at_rest(x)
         for _ in range(10):
             state, info = cloth.step(state, Obstacles.none(), NOTHING)
@@ -141,7 +148,12 @@ def test_free_fall_is_implicit_euler(quasi_newton: bool) -> None:
 def test_momentum_is_conserved_without_gravity(quasi_newton: bool) -> None:
     x, e = crumpled(8, 0.002)
     cloth = ProjectiveDynamicsCloth(
-        e, Material(), 0.01, NO_NODES, gravity=STILL, tolerance=1e-8, quasi_newton=quasi_newton
+        e,
+        Material(),
+        0.01,
+        NO_NODES,
+        gravity=STILL,
+        settings=ProjectiveSettings(tolerance=1e-8, quasi_newton=quasi_newton),
     )
     state = moving(x, np.array([0.5, -0.2, 0.1]))
     momentum = (cloth.mass[:, None] * state.v).sum(axis=0)
@@ -156,7 +168,9 @@ def test_momentum_changes_by_gravity_grippers_and_contact_alone() -> None:
     x, e = sheet_elements(12, 12, 0.02)
     held = np.array([0, 1], dtype=np.int32)
     h = 0.01
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, held, tolerance=1e-9, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, held, settings=ProjectiveSettings(tolerance=1e-9, quasi_newton=True)
+    )
     state = ClothState.at_rest(x - [0.11, 0.05, -0.06])
     touched = False
     for _ in range(25):
@@ -172,9 +186,15 @@ def test_momentum_changes_by_gravity_grippers_and_contact_alone() -> None:
 def _true_distances(h: float, quasi_newton: bool) -> list[float]:
     x, e = sheet_elements(14, 14, 0.02)
     held = np.array([0, 13], dtype=np.int32)
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, held, quasi_newton=quasi_newton)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, held, settings=ProjectiveSettings(quasi_newton=quasi_newton)
+    )
     fine = ProjectiveDynamicsCloth(
-        e, Material(), h, held, tolerance=1e-10, max_iterations=20000, quasi_newton=True
+        e,
+        Material(),
+        h,
+        held,
+        settings=ProjectiveSettings(tolerance=1e-10, max_iterations=20000, quasi_newton=True),
     )
     state = moving(x, 0.05 * np.random.default_rng(0).normal(size=x.shape))
     pull = np.tile([0.1, 0.0, 0.0], (2, 1))
@@ -201,7 +221,9 @@ def test_what_is_left_when_a_step_stops_is_what_was_estimated(h: float, quasi_ne
 
 def test_a_step_that_is_cut_short_says_so() -> None:
     x, e = crumpled(8, 0.003)
-    cloth = ProjectiveDynamicsCloth(e, Material(), 0.05, NO_NODES, max_iterations=7)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), 0.05, NO_NODES, settings=ProjectiveSettings(max_iterations=7)
+    )
     _, info = cloth.step(ClothState.at_rest(x), Obstacles.none(), NOTHING)
     assert info.iterations == 7
     assert not info.converged
@@ -216,7 +238,11 @@ def test_quasi_newton_reaches_the_same_fixed_point_in_fewer_iterations(h: float)
     steps = []
     for quasi_newton in (False, True):
         cloth = ProjectiveDynamicsCloth(
-            e, Material(), h, held, tolerance=1e-8, quasi_newton=quasi_newton
+            e,
+            Material(),
+            h,
+            held,
+            settings=ProjectiveSettings(tolerance=1e-8, quasi_newton=quasi_newton),
         )
         steps.append(cloth.step(state, Obstacles.none(), np.zeros((2, 3))))
     (plain, slow), (quick, fast) = steps
@@ -232,8 +258,12 @@ def test_hanging_sheet_is_at_the_implicit_schemes_equilibrium() -> None:
     start[held, 2] += 0.1 * start[held, 0]
     material = Material(stretch_stiffness=50.0, bending_stiffness=5e-4)
     steady = np.zeros((10, 3))
-    pd = ProjectiveDynamicsCloth(e, material, 0.05, held, tolerance=1e-6, quasi_newton=True)
-    other = ImplicitCloth(e, replace(material, damping=0.02), 0.01, held, tolerance=1e-4)
+    pd = ProjectiveDynamicsCloth(
+        e, material, 0.05, held, settings=ProjectiveSettings(tolerance=1e-6, quasi_newton=True)
+    )
+    other = ImplicitCloth(
+        e, replace(material, damping=0.02), 0.01, held, settings=ImplicitSettings(tolerance=1e-4)
+    )
     a = b = ClothState.at_rest(start)
     for _ in range(60):
         a, _ = pd.step(a, Obstacles.none(), steady)
@@ -251,7 +281,9 @@ def test_energy_is_not_created_by_swinging_and_landing(quasi_newton: bool) -> No
     x, e = sheet_elements(11, 11, 0.02)
     held = np.array([0, 10], dtype=np.int32)
     h = 0.01
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, held, quasi_newton=quasi_newton)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, held, settings=ProjectiveSettings(quasi_newton=quasi_newton)
+    )
     state = ClothState.at_rest(x - [0.0, 0.1, -0.06])
     last = energy(cloth, state)
     contacts = 0
@@ -269,7 +301,9 @@ def test_tilted_sheet_comes_to_rest_on_the_floor(h: float) -> None:
     x, e = sheet_elements(10, 10, 0.02)
     c, s = np.cos(0.3), np.sin(0.3)
     start = (x - x.mean(axis=0)) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T + [0, 0, 0.08]
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, NO_NODES, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, NO_NODES, settings=ProjectiveSettings(quasi_newton=True)
+    )
     state = ClothState.at_rest(start)
     for _ in range(round(0.8 / h)):
         state, info = cloth.step(state, Obstacles.floor(), NOTHING)
@@ -284,7 +318,9 @@ def test_tilted_sheet_comes_to_rest_on_the_floor(h: float) -> None:
 def test_sheet_comes_to_rest_on_a_capsule(h: float) -> None:
     x, e = sheet_elements(11, 11, 0.02)
     material = Material(friction=0.8)
-    cloth = ProjectiveDynamicsCloth(e, material, h, NO_NODES, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, material, h, NO_NODES, settings=ProjectiveSettings(quasi_newton=True)
+    )
     state = ClothState.at_rest(x - x.mean(axis=0) + [0.0, 0.003, 0.1])
     for _ in range(round(1.5 / h)):
         state, info = cloth.step(state, capsule(0.06), NOTHING)
@@ -301,7 +337,9 @@ def test_sheet_comes_to_rest_on_a_capsule(h: float) -> None:
 def test_nothing_is_leapt_over_in_a_large_step(speed: float) -> None:
     """At 5 m/s and h = 0.1 s a node would pass a capsule of 8 cm six times over."""
     x, e = sheet_elements(13, 13, 0.02)
-    cloth = ProjectiveDynamicsCloth(e, Material(), 0.1, NO_NODES, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), 0.1, NO_NODES, settings=ProjectiveSettings(quasi_newton=True)
+    )
     state = moving(x - x.mean(axis=0) + [0.0, 0.0, 0.3], np.array([0.0, 0.0, -speed]))
     for _ in range(3):
         state, info = cloth.step(state, capsule(0.04), NOTHING)
@@ -318,7 +356,9 @@ def test_a_limb_sweeps_a_hanging_sheet_along(h: float) -> None:
     x, e = sheet_elements(11, 11, 0.02)
     held = np.arange(11, dtype=np.int32)
     start = np.column_stack([x[:, 1] - 0.1, np.zeros(len(x)), -x[:, 0]])
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, held, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, held, settings=ProjectiveSettings(quasi_newton=True)
+    )
     state = ClothState.at_rest(start)
     limb = replace(capsule(0.03), velocity=np.array([[0.0, 1.5, 0.0]]))
     for k in range(round(0.2 / h)):
@@ -342,7 +382,9 @@ def _slide(
     turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     start = (x - x.mean(axis=0)) @ turn.T + 0.003 * turn[:, 2]
     material = Material(friction=friction, stretch_stiffness=300.0)
-    cloth = ProjectiveDynamicsCloth(e, material, h, NO_NODES, quasi_newton=quasi_newton)
+    cloth = ProjectiveDynamicsCloth(
+        e, material, h, NO_NODES, settings=ProjectiveSettings(quasi_newton=quasi_newton)
+    )
     state = ClothState.at_rest(start)
     for _ in range(round(0.4 / h)):
         state, info = cloth.step(state, incline(angle), NOTHING)
@@ -376,7 +418,9 @@ def test_cloth_on_a_steep_incline_slides_with_coulomb_acceleration(
 @BOTH
 def test_friction_stays_in_its_cone_and_nothing_adheres(quasi_newton: bool) -> None:
     x, e = sheet_elements(11, 11, 0.02)
-    cloth = ProjectiveDynamicsCloth(e, Material(), 0.01, NO_NODES, quasi_newton=quasi_newton)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), 0.01, NO_NODES, settings=ProjectiveSettings(quasi_newton=quasi_newton)
+    )
     state = ClothState.at_rest(x - x.mean(axis=0) + [0.0, 0.01, 0.07])
     weight = cloth.mass.sum() * 9.81
     modes = set()
@@ -425,7 +469,9 @@ def test_sheet_on_a_closed_mesh_that_rises_rests_on_its_top(h: float) -> None:
     x, e = sheet_elements(5, 5, 0.02)
     box = trimesh.creation.box((0.2, 0.2, 0.1))
     field = make_signed_distance_field(box.vertices, box.faces, 0.02)
-    cloth = ProjectiveDynamicsCloth(e, Material(), h, NO_NODES, quasi_newton=True)
+    cloth = ProjectiveDynamicsCloth(
+        e, Material(), h, NO_NODES, settings=ProjectiveSettings(quasi_newton=True)
+    )
     tilt = np.array([[0.98, 0.0, 0.2], [0.0, 1.0, 0.0], [-0.2, 0.0, 0.98]])
     state = ClothState.at_rest((x - x.mean(axis=0)) @ tilt.T + [0.01, 0.0, 0.08])
     rise = np.array([0.0, 0.0, 0.1])
@@ -461,7 +507,11 @@ def test_a_thin_rod_does_not_slip_between_nodes_where_elements_are_sampled() -> 
     highest = {}
     for sampled in (False, True):
         cloth = ProjectiveDynamicsCloth(
-            e, material, 0.005, NO_NODES, quasi_newton=True, sample_elements=sampled
+            e,
+            material,
+            0.005,
+            NO_NODES,
+            settings=ProjectiveSettings(quasi_newton=True, sample_elements=sampled),
         )
         # the rod lies between two rows of nodes
         state = ClothState.at_rest(x - x.mean(axis=0) + [0.0, 0.03, 0.03])

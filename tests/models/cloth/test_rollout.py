@@ -5,7 +5,12 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.explicit_bias import (
+    ContactTypes,
+    ExplicitBiasCloth,
+    ExplicitSettings,
+    Tape,
+)
 from drake_dress.models.cloth.rollout import Rollout, Seeds, roll_back, roll_out
 from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb
 
@@ -14,7 +19,7 @@ STEPS = 9
 
 def _scene(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, FloatArray]:
     e, x, v, motion = draped(h)
-    cloth = ExplicitBiasCloth(e, MATERIAL, h, HELD, tolerance=1e-12)
+    cloth = ExplicitBiasCloth(e, MATERIAL, h, HELD, settings=ExplicitSettings(tolerance=1e-12))
     rng = np.random.default_rng(3)
     motions = motion * rng.uniform(0.5, 1.5, size=(STEPS, 1, 1))
     return cloth, x, 0.2 * v, motions

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import INNER, ExplicitBiasCloth
+from drake_dress.models.cloth.explicit_bias import INNER, ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.torch_step import MATERIAL as NAMES
 from drake_dress.models.cloth.torch_step import cloth_step, material_tensor
 from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb, make
@@ -15,7 +15,7 @@ from tests.present import present
 
 def _scene() -> tuple[ExplicitBiasCloth, torch.Tensor, torch.Tensor, torch.Tensor]:
     e, x, v, motion = draped(0.02)
-    cloth = ExplicitBiasCloth(e, MATERIAL, 0.02, HELD, tolerance=1e-12)
+    cloth = ExplicitBiasCloth(e, MATERIAL, 0.02, HELD, settings=ExplicitSettings(tolerance=1e-12))
     return cloth, torch.from_numpy(x), torch.from_numpy(v), torch.from_numpy(motion)
 
 

@@ -9,7 +9,7 @@ import pytest
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.corridor import Corridor
@@ -32,7 +32,11 @@ def setting() -> tuple[GlobalController, FloatArray, tuple[SleeveTarget, SleeveT
     mesh = make_coat(CoatParameters(), 0.05)
     held = np.concatenate([mesh.grasp[s] for s in SIDES])
     cloth = ExplicitBiasCloth(
-        make_elements(mesh.rest_position, mesh.faces), Material(), 0.1, held, tolerance=1e-10
+        make_elements(mesh.rest_position, mesh.faces),
+        Material(),
+        0.1,
+        held,
+        settings=ExplicitSettings(tolerance=1e-10),
     )
     loops = tuple(np.asarray(mesh.loops[f"{s}_armhole"]) for s in SIDES)
     signs = tuple(float(loop_orientation(mesh, s)) for s in SIDES)
@@ -208,8 +212,7 @@ def entering() -> tuple[GlobalController, dict[str, FloatArray], list[SleeveTarg
         Material(),
         0.2,
         np.concatenate([mesh.grasp[s] for s in SIDES]),
-        tolerance=1e-2,
-        iterations=8,
+        settings=ExplicitSettings(tolerance=1e-2, iterations=8),
     )
     controller = GlobalController(
         cloth,

@@ -9,8 +9,8 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState
 from drake_dress.models.cloth.scheme import Scheme
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.air import AirDrag
 from drake_dress.models.effects.composition import GarmentWithEffects
 from drake_dress.models.effects.contact import Adhesion, VelocityDependentFriction

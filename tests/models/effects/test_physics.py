@@ -9,7 +9,8 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.air import AIR_DENSITY, PLATE_DRAG, AirDrag, Wind
 from drake_dress.models.effects.composition import GarmentWithEffects, largest_strain, world_points
 from drake_dress.models.effects.contact import (
@@ -140,7 +141,7 @@ def test_warp_stiffness_adds_along_the_warp_only() -> None:
     assert drop[0] / drop[1] == pytest.approx(2.0, rel=0.05)
     # a sheet of fibres stretched across them feels nothing of them
     assert isinstance(stiff._inner, ImplicitCloth)
-    fibres = present(stiff._inner._fibres)
+    fibres = present(stiff._inner.additions.fibres)
     force = np.zeros_like(x)
     fibres.add_force(x * np.array([1.1, 1.0, 1.0]), force)
     np.testing.assert_allclose(force, 0.0, atol=1e-10)

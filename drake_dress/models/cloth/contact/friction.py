@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.contact.modes import FREE, SLIP, STICK
 
 # A node within this gap lies on the surface, m.
 LYING = 1e-4

@@ -14,8 +14,9 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.arrays import IntArray
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.factor.masked import Factor, restricted_solve, solve_into
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
+from drake_dress.models.cloth.filtered_cg import matrix_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 

@@ -11,8 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.cloth.contact.modes import HELD, SLIP, STICK
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
-from drake_dress.models.cloth.filtered_cg import HELD, SLIP, STICK
+from drake_dress.models.cloth.filtered_cg import Bound, Preconditioner, Stop
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
 
@@ -108,15 +109,13 @@ class ConjugateGradientSystem(FilteredSystem):
         normals[nodes] = normal
         s, product = self._scheme, np.empty_like(z)
         iterations, _ = s.system.solve(
-            self._factor,
+            Preconditioner(self._factor),
             self._block,
-            modes,
-            normals,
+            Bound(modes, normals),
             rhs,
             z,
-            s.tolerance,
-            s.max_iterations,
-            applied=product,
+            Stop(s.tolerance, s.max_iterations),
+            product,
         )
         self.iterations += iterations
         unknown.z = z

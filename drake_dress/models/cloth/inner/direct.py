@@ -7,7 +7,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
 

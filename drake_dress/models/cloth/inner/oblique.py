@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import SLIP
+from drake_dress.models.cloth.contact.modes import SLIP
 
 _MOST_PASSES = 60
 # With solves this coarse one pass with friction is as good as more.

@@ -14,8 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK, matrix_product
+from drake_dress.models.cloth.filtered_cg import matrix_product
 from drake_dress.models.cloth.inner.binding import (
     bind,
     by_all,

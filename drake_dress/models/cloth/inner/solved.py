@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
-from drake_dress.models.cloth.filtered_cg import SLIP, STICK
+from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.inner.interface import directions_of_exact
 from drake_dress.models.cloth.inner.oblique import hold_obliquely

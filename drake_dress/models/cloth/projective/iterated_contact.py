@@ -29,9 +29,11 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.modes import FREE, HELD, SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.filtered_cg import FREE, HELD, SLIP, STICK
+from drake_dress.models.cloth.influences import ContactLaw
 from drake_dress.models.cloth.projective import active_set
+from drake_dress.models.cloth.state import ClothState
 
 # A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.
 _LARGEST_PUSH = 0.2
@@ -49,15 +51,12 @@ class IteratedContact:
     """The contacts of one step.
 
     Args:
-        x: (n,3) where the nodes are, m.
-        mode, owner: (n,) of the step before.
-        reaction: (n,3) of the step before, N.
+        state: of the garment before the step.
         held: (k,) nodes whose motion is prescribed; they feel no contact.
         obstacles: now, with velocities.
         mass: (n,) kg.
         time_step: h, s.
-        friction: (n,) Coulomb coefficient.
-        adhesion: (n,) pull that a contact bears, N.
+        law: friction and adhesion.
         margin: (n,) distance to keep, m.
         tolerance: wanted accuracy of positions, m.
 
@@ -71,28 +70,24 @@ class IteratedContact:
 
     def __init__(
         self,
-        x: FloatArray,
-        mode: IntArray,
-        owner: IntArray,
-        reaction: FloatArray,
+        state: ClothState,
         held: IntArray,
         obstacles: Obstacles,
         mass: FloatArray,
         time_step: float,
-        friction: FloatArray,
-        adhesion: FloatArray,
+        law: ContactLaw,
         margin: FloatArray,
         tolerance: float,
     ) -> None:
-        n = len(x)
+        n = len(state.x)
         self.mode = np.full(n, FREE, dtype=np.int32)
         self.mode[held] = HELD
         self.owner = np.full(n, -1, dtype=np.int32)
         self.normal = np.zeros((n, 3))
         self.resistance = np.zeros(n)
         self.friction = np.zeros((n, 3))
-        self._mu = friction
-        self._adhesion = time_step**2 * adhesion
+        self._mu = law.friction
+        self._adhesion = time_step**2 * law.adhesion
         self._margin = margin
         self._tolerance = tolerance
         self._weight = tolerance * mass
@@ -111,22 +106,28 @@ class IteratedContact:
         self._slid = np.zeros((n, 3))
         self._last_slid = np.zeros(n)
         self._h = time_step
-        self.carried = self._carry(x, obstacles)
+        self.carried = self._carry(state.x, obstacles)
         self.refresh(self.carried)
         self._base = self.carried.copy()
         self._height = np.maximum(self._gap, 0.0)
         self._target = np.minimum(self._gap, 0.0)
         self._target += np.minimum(-0.5 * self._target, _LARGEST_PUSH * time_step)
-        touching = (mode == STICK) | (mode == SLIP)
-        kept = touching & (self._gap < _KEPT_GAP) & (self.mode == FREE) & (owner == self.owner)
-        self.mode[kept] = mode[kept]
+        self._take_up(state, law)
+
+    def _take_up(self, state: ClothState, law: ContactLaw) -> None:
+        """Keeps the contact of the step before where it still is, with its friction."""
+        touching = (state.mode == STICK) | (state.mode == SLIP)
+        same = self.owner == state.owner
+        kept = touching & (self._gap < _KEPT_GAP) & (self.mode == FREE) & same
+        self.mode[kept] = state.mode[kept]
         slip = self.mode == SLIP
         if slip.any():
-            r, normal = reaction[slip], self.normal[slip]
+            r, normal = state.reaction[slip], self.normal[slip]
             pressure = np.einsum("ij,ij->i", r, normal)
             along = r - pressure[:, None] * normal
             size = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
-            bound = time_step**2 * friction[slip] * np.maximum(pressure + adhesion[slip], 0.0)
+            holds = np.maximum(pressure + law.adhesion[slip], 0.0)
+            bound = self._h**2 * law.friction[slip] * holds
             self.friction[slip] = (bound / size)[:, None] * along
 
     def place(self, guess: FloatArray, steady: FloatArray) -> FloatArray:

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 
 H = 0.008
@@ -50,9 +51,7 @@ def test_cloth_pressed_into_the_hollow_of_two_limbs_stays_outside(
         H,
         NO_NODES,
         np.array([0.0, 0.0, -9.81 * pull]),
-        tolerance=2e-2,
-        implicitness=0.7,
-        buckling_wavelength=3.0,
+        settings=ImplicitSettings(tolerance=2e-2, implicitness=0.7, buckling_wavelength=3.0),
     )
     deepest, state = 0.0, ClothState.at_rest(start)
     lift = 0.2 / np.cos(half)
@@ -71,7 +70,13 @@ def test_a_sheet_thrown_at_a_limb_does_not_enter(speed: float) -> None:
     start[:, 2] = 0.09
     rng = np.random.default_rng(0)
     bodies = capsules((np.array([-0.3, 0, 0]), np.array([0.3, 0, 0])), radius=0.06)
-    cloth = ImplicitCloth(e, Material(stretch_stiffness=1500.0), H, NO_NODES, implicitness=0.7)
+    cloth = ImplicitCloth(
+        e,
+        Material(stretch_stiffness=1500.0),
+        H,
+        NO_NODES,
+        settings=ImplicitSettings(implicitness=0.7),
+    )
     v = np.tile([0.0, 0.0, -speed], (len(x), 1)) + 0.2 * speed * rng.normal(size=x.shape)
     state = replace(ClothState.at_rest(start), v=v)
     deepest = 0.0
@@ -95,7 +100,9 @@ def test_what_slides_from_one_surface_to_another_goes_on_along_where_they_meet(
     normals = np.array([[0.0, 0.0, 1.0], [-np.sin(lean), 0.0, np.cos(lean)]])
     planes = HalfSpaces.resting(np.array([np.zeros(3), [0.01, 0.0, 0.0]]), normals)
     bodies = replace(Obstacles.none(), half_spaces=planes)
-    cloth = ImplicitCloth(e, material, H, NO_NODES, tolerance=1e-6, implicitness=0.7)
+    cloth = ImplicitCloth(
+        e, material, H, NO_NODES, settings=ImplicitSettings(tolerance=1e-6, implicitness=0.7)
+    )
     # pressed to the floor by a step, then thrown
     state, _ = cloth.step(ClothState.at_rest(start), bodies, np.zeros((0, 3)))
     state = replace(state, v=np.tile([2.0, 1.0, 0.0], (len(x), 1)))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.cloth.contact.modes import FREE, SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth
-from drake_dress.models.cloth.filtered_cg import FREE, SLIP, STICK
+from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.inner.one_step import OneStep
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import sheet_elements
@@ -45,7 +45,9 @@ def draped(h: float) -> tuple[Elements, FloatArray, FloatArray, FloatArray]:
 def make(
     e: Elements, h: float, name: str, iterations: int, m: Material = MATERIAL
 ) -> ExplicitBiasCloth:
-    return ExplicitBiasCloth(e, m, h, HELD, tolerance=1e-12, iterations=iterations, inner=name)
+    return ExplicitBiasCloth(
+        e, m, h, HELD, settings=ExplicitSettings(tolerance=1e-12, iterations=iterations, inner=name)
+    )
 
 
 @pytest.mark.parametrize(("h", "enough"), [(0.001, 300), (0.01, 2000), (0.1, 16000)])

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import Influences
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.layers.scenes import two_sheets
 from tests.models.cloth.sheets import sheet_elements
 
@@ -52,7 +53,12 @@ def test_product_and_drive_are_those_of_the_rows() -> None:
 def flying_sheet(rng: np.random.Generator) -> tuple[ImplicitCloth, ClothState]:
     x, e = sheet_elements(6, 6, 0.02)
     cloth = ImplicitCloth(
-        e, Material(), 0.01, NO_NODES, np.zeros(3), tolerance=1e-8, max_iterations=300
+        e,
+        Material(),
+        0.01,
+        NO_NODES,
+        np.zeros(3),
+        settings=ImplicitSettings(tolerance=1e-8, max_iterations=300),
     )
     state = replace(ClothState.at_rest(x), v=0.1 * rng.normal(size=x.shape))
     return cloth, state
@@ -109,7 +115,11 @@ def test_what_is_wrung_and_pushed_together_comes_to_rest(seed: int) -> None:
     sides = [np.flatnonzero(x[:, 0] < 1e-6), np.flatnonzero(x[:, 0] > 0.26 - 1e-6)]
     held = np.concatenate(sides).astype(np.int32)
     inner = ImplicitCloth(
-        e, Material(), 0.01, held, tolerance=0.1, implicitness=0.7, buckling_wavelength=3.0
+        e,
+        Material(),
+        0.01,
+        held,
+        settings=ImplicitSettings(tolerance=0.1, implicitness=0.7, buckling_wavelength=3.0),
     )
     cloth, state = LayeredCloth(inner), ClothState.at_rest(x)
     right = slice(len(sides[0]), None)

@@ -9,11 +9,12 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.layers import LayerSeparation, SeparationRecord, piercing_edges
 from drake_dress.models.cloth.layers import separation as separation_module
 from drake_dress.models.cloth.layers.separation import Impulses
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.garment import COATS, GarmentMesh, make_coat
 from tests.models.cloth.layers.scenes import crumpled, two_sheets
 from tests.models.cloth.sheets import sheet

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.implicit import ClothState, ImplicitCloth
+from drake_dress.models.cloth.implicit import ImplicitCloth
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.neighbours import Passing
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.cloth.layers.separation import LayerSeparation
 from drake_dress.models.cloth.layers.tangles import Tangles
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.layers.scenes import two_sheets
 from tests.models.cloth.sheets import sheet
 
