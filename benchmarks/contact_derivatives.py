@@ -23,7 +23,7 @@ from drake_dress.file_output import output_file, write_text
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
 
 STEPS = (0.001, 0.005, 0.01, 0.05, 0.1)

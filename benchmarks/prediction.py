@@ -33,7 +33,7 @@ from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh

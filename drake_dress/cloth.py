@@ -16,23 +16,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from drake_dress.models.cloth.adjoint import Gradient
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.explicit.adjoint import Gradient
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.explicit.rollout import Rollout, RolloutGradient, roll_back, roll_out
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import Influences
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
-from drake_dress.models.cloth.rollout import Rollout, RolloutGradient, roll_back, roll_out
+from drake_dress.models.cloth.projective.projective_dynamics import (
+    ProjectiveDynamicsCloth,
+    ProjectiveSettings,
+)
 from drake_dress.models.cloth.state import Additions, ClothState
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
 from drake_dress.models.garment.load import load_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 
 if TYPE_CHECKING:
-    from drake_dress.models.cloth.torch_step import MATERIAL, cloth_step, material_tensor
+    from drake_dress.models.cloth.explicit.torch_step import MATERIAL, cloth_step, material_tensor
 
 __all__ = [
     "COATS",
@@ -71,7 +74,7 @@ _OF_TORCH = ("MATERIAL", "cloth_step", "material_tensor")
 def __getattr__(name: str) -> Any:
     """Imports torch with the first name that needs it."""
     if name in _OF_TORCH:
-        from drake_dress.models.cloth import torch_step
+        from drake_dress.models.cloth.explicit import torch_step
 
         return getattr(torch_step, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

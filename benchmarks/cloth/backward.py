@@ -17,7 +17,7 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.garment import GarmentMesh
 
 _ARM_RADIUS = 0.047

@@ -18,7 +18,7 @@ from benchmarks.cloth.motions import at_rest, carried
 from benchmarks.cloth.scene import QUICK_STEPS, SOFT, TIME_STEPS, Scene
 from benchmarks.cloth.table import Table
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import lumped_mass
 

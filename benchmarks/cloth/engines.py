@@ -13,9 +13,12 @@ import numpy as np
 
 from benchmarks.cloth.scene import Scene
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.projective.projective_dynamics import (
+    ProjectiveDynamicsCloth,
+    ProjectiveSettings,
+)
 from drake_dress.models.cloth.state import ClothState
 
 

@@ -26,7 +26,7 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.dressing.linking import arm_linking_number
 
 _STEP = 0.01

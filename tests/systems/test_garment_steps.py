@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.systems.garment_steps import StepsBeside, StepsHere, Surroundings

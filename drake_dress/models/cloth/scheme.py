@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.projective.projective_dynamics import (
+    ProjectiveDynamicsCloth,
+    ProjectiveSettings,
+)
 from drake_dress.models.cloth.state import Additions
 
 # Elements, fabric, gravity (3,) and additions to what steps the garment.

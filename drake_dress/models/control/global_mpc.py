@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, Tape
 from drake_dress.models.control.budget import Budget, Cost, Spending
 from drake_dress.models.control.costs import (
     GarmentCost,
@@ -116,7 +116,7 @@ class GlobalController:
         max_speed: of a gripper, m/s.
         max_iterations: gradient steps per solve.
         frozen_contact: the gradient takes contact as frozen; the exact one does not descend once
-            cloth lies on a limb (see cloth/adjoint.py).
+            cloth lies on a limb (see cloth/explicit/adjoint.py).
         costs: of a user's own, added to those of the dressing.
     """
 

@@ -5,10 +5,10 @@ import pytest
 import scipy.sparse as sp
 
 from drake_dress.models.cloth.contact.modes import FREE, HELD, SLIP, STICK
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
 from drake_dress.models.cloth.factor.masked import SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import Bound, Preconditioner, Stop
 from drake_dress.models.cloth.filtered_stiffness import normal_response
-from drake_dress.models.cloth.inner.filtered import Filtered
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import (
     bending_bound,

@@ -10,8 +10,8 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.state import GRAVITY, ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet, sheet_elements

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.projective.projective_dynamics import (
+    ProjectiveDynamicsCloth,
+    ProjectiveSettings,
+)
 from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.layers.scenes import two_sheets
 

@@ -9,7 +9,7 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.air import AIR_DENSITY, PLATE_DRAG, AirDrag, Wind
 from drake_dress.models.effects.composition import GarmentWithEffects, largest_strain, world_points

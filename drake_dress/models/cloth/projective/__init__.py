@@ -1,1 +1,1 @@
-"""Parts of the Projective Dynamics reference."""
+"""Projective Dynamics, iterated to convergence: the reference."""

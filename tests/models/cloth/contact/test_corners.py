@@ -12,7 +12,7 @@ from drake_dress.models.cloth.contact.corners import held_off_corners
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.distance import nearest_other
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import sheet_elements

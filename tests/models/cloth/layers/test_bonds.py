@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import Influences
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product

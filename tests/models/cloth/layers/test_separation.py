@@ -8,8 +8,8 @@ import pytest
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.layers import LayerSeparation, SeparationRecord, piercing_edges
 from drake_dress.models.cloth.layers import separation as separation_module
 from drake_dress.models.cloth.layers.separation import Impulses

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
-from drake_dress.models.cloth.implicit import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.layered import LayeredCloth
 from drake_dress.models.cloth.layers.neighbours import Passing
 from drake_dress.models.cloth.layers.piercing import piercing_edges

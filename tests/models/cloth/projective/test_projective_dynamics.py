@@ -15,11 +15,14 @@ from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.forces import internal_force
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import bending_matrix, lumped_mass, stretch_matrix
 from drake_dress.models.cloth.projective.iterated_contact import advanced
-from drake_dress.models.cloth.projective_dynamics import ProjectiveDynamicsCloth, ProjectiveSettings
+from drake_dress.models.cloth.projective.projective_dynamics import (
+    ProjectiveDynamicsCloth,
+    ProjectiveSettings,
+)
 from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet, sheet_elements
 

@@ -20,8 +20,8 @@ import numpy as np
 import torch
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.differentiable_once import differentiable_once
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth
+from drake_dress.models.cloth.explicit.differentiable_once import differentiable_once
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.cloth.material import Material
 
 MATERIAL = ("surface_density", "stretch_stiffness", "bending_stiffness", "friction", "margin")

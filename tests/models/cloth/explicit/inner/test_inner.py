@@ -10,8 +10,12 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.modes import FREE, SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.explicit_bias import ContactTypes, ExplicitBiasCloth, ExplicitSettings
-from drake_dress.models.cloth.inner.one_step import OneStep
+from drake_dress.models.cloth.explicit.explicit_bias import (
+    ContactTypes,
+    ExplicitBiasCloth,
+    ExplicitSettings,
+)
+from drake_dress.models.cloth.explicit.inner.one_step import OneStep
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import sheet_elements
 

@@ -41,7 +41,7 @@ from drake_dress.models.cloth.filtered_stiffness import (
 )
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import bending_force, internal_force
-from drake_dress.models.cloth.implicit_contact import ImplicitContact
+from drake_dress.models.cloth.implicit.implicit_contact import ImplicitContact
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.layers.bonds import NO_BONDS, ActingBonds
 from drake_dress.models.cloth.material import Material

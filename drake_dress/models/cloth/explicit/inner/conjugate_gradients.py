@@ -12,10 +12,10 @@ import scipy.sparse as sp
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import HELD, SLIP, STICK
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
+from drake_dress.models.cloth.explicit.inner.solved import FilteredScheme, FilteredSystem, Solved
 from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import Bound, Preconditioner, Stop
-from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
 
 
 class ConjugateGradients(FilteredScheme):

@@ -8,8 +8,8 @@ import scipy.sparse.linalg as spla
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
-from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
+from drake_dress.models.cloth.explicit.inner.solved import FilteredScheme, FilteredSystem, Solved
 
 # Of passes with friction; solves themselves are exact.
 _TOLERANCE = 1e-13

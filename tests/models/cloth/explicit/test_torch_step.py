@@ -6,10 +6,14 @@ import pytest
 import torch
 
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import INNER, ExplicitBiasCloth, ExplicitSettings
-from drake_dress.models.cloth.torch_step import MATERIAL as NAMES
-from drake_dress.models.cloth.torch_step import cloth_step, material_tensor
-from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb, make
+from drake_dress.models.cloth.explicit.explicit_bias import (
+    INNER,
+    ExplicitBiasCloth,
+    ExplicitSettings,
+)
+from drake_dress.models.cloth.explicit.torch_step import MATERIAL as NAMES
+from drake_dress.models.cloth.explicit.torch_step import cloth_step, material_tensor
+from tests.models.cloth.explicit.inner.test_inner import HELD, MATERIAL, draped, limb, make
 from tests.present import present
 
 

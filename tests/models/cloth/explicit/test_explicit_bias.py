@@ -9,7 +9,11 @@ from drake_dress.models.cloth.contact.modes import FREE, SLIP
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles, Solid
 from drake_dress.models.cloth.contact.solid import make_signed_distance_field
 from drake_dress.models.cloth.elements import Elements
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, ExplicitSettings, Tape
+from drake_dress.models.cloth.explicit.explicit_bias import (
+    ExplicitBiasCloth,
+    ExplicitSettings,
+    Tape,
+)
 from drake_dress.models.cloth.material import Material
 from tests.models.cloth.sheets import NO_NODES, sheet_elements
 

@@ -5,14 +5,14 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import (
+from drake_dress.models.cloth.explicit.explicit_bias import (
     ContactTypes,
     ExplicitBiasCloth,
     ExplicitSettings,
     Tape,
 )
-from drake_dress.models.cloth.rollout import Rollout, Seeds, roll_back, roll_out
-from tests.models.cloth.inner.test_inner import HELD, MATERIAL, draped, limb
+from drake_dress.models.cloth.explicit.rollout import Rollout, Seeds, roll_back, roll_out
+from tests.models.cloth.explicit.inner.test_inner import HELD, MATERIAL, draped, limb
 
 STEPS = 9
 

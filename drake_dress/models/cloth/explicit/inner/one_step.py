@@ -15,16 +15,16 @@ import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
-from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
-from drake_dress.models.cloth.filtered_cg import matrix_product
-from drake_dress.models.cloth.inner.binding import (
+from drake_dress.models.cloth.explicit.inner.binding import (
     bind,
     by_all,
     by_neighbours,
     product_rows,
     subtract_columns,
 )
-from drake_dress.models.cloth.inner.interface import directions_of_exact
+from drake_dress.models.cloth.explicit.inner.interface import directions_of_exact
+from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
+from drake_dress.models.cloth.filtered_cg import matrix_product
 from drake_dress.models.cloth.matrices import Csr
 
 # Contacts from which a factor of its own costs less than iterations, and slipping nodes from which

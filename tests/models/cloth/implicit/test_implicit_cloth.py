@@ -8,7 +8,7 @@ import pytest
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.modes import STICK
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.state import ClothState
 from tests.models.cloth.sheets import NO_NODES, sheet_elements

@@ -23,16 +23,16 @@ import numpy as np
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.distance import normal_derivative
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
+from drake_dress.models.cloth.explicit.inner.interface import StepSystem, Unknown
 from drake_dress.models.cloth.forces import (
     force_and_product,
     stiffness_product,
     stiffness_products,
 )
-from drake_dress.models.cloth.inner.interface import StepSystem, Unknown
 from drake_dress.models.cloth.layered import pushed_nodes
 
 if TYPE_CHECKING:
-    from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+    from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, Tape
 
 # Farthest that a node moves where K is differenced along v, m.
 _STEP = 1e-8

@@ -15,7 +15,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.explicit_bias import ExplicitBiasCloth, Tape
+from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, Tape
 
 Observer = Callable[[int, FloatArray, FloatArray, FloatArray], None]
 # The derivative of a loss by positions (n,3), velocities (n,3), held reactions (k,3) of a step.

@@ -42,7 +42,7 @@ from drake_dress.models.cloth.filtered_cg import matrix_product, project
 from drake_dress.models.cloth.filtered_stiffness import filtered_product, prepare_filtered
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import internal_force
-from drake_dress.models.cloth.implicit import ImplicitCloth, ImplicitSettings
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.matrices import Csr, bending_matrix, stretch_matrix

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.one_step import OneStep, OneStepSystem
-from drake_dress.models.cloth.inner.solved import FilteredScheme, FilteredSystem, Solved
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
+from drake_dress.models.cloth.explicit.inner.one_step import OneStep, OneStepSystem
+from drake_dress.models.cloth.explicit.inner.solved import FilteredScheme, FilteredSystem, Solved
 
 
 @dataclass

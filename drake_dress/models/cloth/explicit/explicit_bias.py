@@ -37,7 +37,6 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
-from drake_dress.models.cloth.adjoint import Gradient, run_adjoint
 from drake_dress.models.cloth.contact.detection import (
     ATTEMPTS,
     CLOSE,
@@ -57,14 +56,15 @@ from drake_dress.models.cloth.contact.friction import (
 from drake_dress.models.cloth.contact.modes import FREE, HELD, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements
+from drake_dress.models.cloth.explicit.adjoint import Gradient, run_adjoint
+from drake_dress.models.cloth.explicit.inner.conjugate_gradients import ConjugateGradients
+from drake_dress.models.cloth.explicit.inner.direct import Direct
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
+from drake_dress.models.cloth.explicit.inner.interface import InnerIteration, StepSystem, Unknown
+from drake_dress.models.cloth.explicit.inner.one_step import OneStep
+from drake_dress.models.cloth.explicit.inner.stationary import Stationary
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.forces import force_and_product
-from drake_dress.models.cloth.inner.conjugate_gradients import ConjugateGradients
-from drake_dress.models.cloth.inner.direct import Direct
-from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.interface import InnerIteration, StepSystem, Unknown
-from drake_dress.models.cloth.inner.one_step import OneStep
-from drake_dress.models.cloth.inner.stationary import Stationary
 from drake_dress.models.cloth.layered import inverse_mass, pushed_nodes
 from drake_dress.models.cloth.layers.separation import LayerSeparation, SeparationRecord
 from drake_dress.models.cloth.material import Material

@@ -11,9 +11,9 @@ import scipy.sparse as sp
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
-from drake_dress.models.cloth.inner.filtered import Filtered
-from drake_dress.models.cloth.inner.interface import directions_of_exact
-from drake_dress.models.cloth.inner.oblique import hold_obliquely
+from drake_dress.models.cloth.explicit.inner.filtered import Filtered
+from drake_dress.models.cloth.explicit.inner.interface import directions_of_exact
+from drake_dress.models.cloth.explicit.inner.oblique import hold_obliquely
 
 
 @dataclass

@@ -1,0 +1,1 @@
+"""The paper's scheme with bias: explicit iteration, dry friction, exact derivatives."""

@@ -1,0 +1,1 @@
+"""The linearly implicit scheme, which steps the simulated garment."""
