@@ -28,9 +28,7 @@ def main(arguments: list[str]) -> None:
                 render_still(
                     log.faces,
                     log.garment_position(i),
-                    a[i],
-                    b[i],
-                    radius,
+                    (a[i], b[i], radius),
                     np.stack([log.gripper_position[side][i] for side in ("left", "right")]),
                     CameraPose(tuple(eye), tuple(target)),
                     SIZE,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.discrepancy.generate import Sensors, measured, record_all
+from drake_dress.discrepancy.generate import Sensors, Session, measured, record_all
 from drake_dress.discrepancy.hidden import NOTHING, draw_hidden, hideable
 from drake_dress.discrepancy.outside import OUTSIDE
 from drake_dress.discrepancy.recording import Recording
@@ -115,6 +115,7 @@ def make(
     seeds = [case.seed, *case.hide.encode()]
     hidden = draw_hidden(case.hide, np.random.default_rng(seeds), case.size)
     sensors = Sensors(marker_noise=case.marker_noise, force_noise=case.force_noise)
+    session = Session(duration=DURATION, sensors=sensors)
     key = json.dumps(
         [case.hide, case.seed, case.size, DURATION, *[repr(e) for e in hidden], str(scenario)]
     )
@@ -122,7 +123,7 @@ def make(
     if path.exists():
         clean = pickle.loads(path.read_bytes())
     else:
-        clean = record_all(scenario, base, hidden, seeds, DURATION, sensors, workers)
+        clean = record_all(scenario, base, hidden, seeds, session, workers)
         cache.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(".partial")
         partial.write_bytes(pickle.dumps(clean))

@@ -129,11 +129,9 @@ def make_dataset(
         base,
         hidden,
         seeds,
-        session.duration,
-        session.sensors,
+        session,
         workers,
         lambda motion: stage(f"recorded {motion}"),
-        session.motions,
     )
     return Dataset([measured(r, session.sensors, rng) for r in clean], tuple(hidden))
 
@@ -223,11 +221,9 @@ def record_all(
     base: Path,
     effects: Sequence[Effect],
     seed: Sequence[int],
-    duration: float,
-    sensors: Sensors,
+    session: Session,
     workers: int | None = None,
     done: Callable[[str], None] = lambda _: None,
-    motions: Sequence[str] = USUAL,
 ) -> list[Recording]:
     """Returns a recording of each motion without noise; they run side by side.
 
@@ -236,12 +232,11 @@ def record_all(
         base: directory that a mesh file's name is relative to.
         effects: of the truth.
         seed: of what is drawn; each motion draws from its own source.
-        duration: of each, s.
-        sensors: their rate and number are used.
+        session: what is recorded; of its sensors, rate and number are used.
         workers: processes; by default as many as there are cores.
         done: told the name of each motion that is there.
-        motions: of `MOTIONS`.
     """
+    motions, duration, sensors = session.motions, session.duration, session.sensors
     lab = truth(scenario, base, effects)
     names = iter(motions)
     with WorkerPool(min(len(motions), workers or worker_count())) as pool:

@@ -279,9 +279,7 @@ def _pictures(log: RunLog, m: Measures) -> str:
         picture = render_still(
             log.faces,
             log.garment_position(i),
-            a[i],
-            b[i],
-            radius,
+            (a[i], b[i], radius),
             grippers,
             camera,
             _STILL_SIZE,

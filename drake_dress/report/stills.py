@@ -64,9 +64,7 @@ class CameraPose:
 def render_still(
     faces: IntArray,
     position: FloatArray,
-    capsule_a: FloatArray,
-    capsule_b: FloatArray,
-    capsule_radius: FloatArray,
+    person: tuple[FloatArray, FloatArray, FloatArray],
     grippers: FloatArray,
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
@@ -78,9 +76,7 @@ def render_still(
     Args:
         faces: (F,3) of the garment; a triangle's outside is where its normal points.
         position: (n,3) nodes, world, m.
-        capsule_a: (c,3) first ends of the person's capsules, world, m.
-        capsule_b: (c,3) their second ends, m.
-        capsule_radius: (c,), m.
+        person: ends (c,3), (c,3) and radii (c,) of the person's capsules, world, m.
         grippers: (g,3), world, m.
         camera: where it is taken from.
         size: width, height in pixels.
@@ -89,13 +85,13 @@ def render_still(
     """
     scene = _Scene()
     scene.add_garment(faces, position)
-    scene.add_capsules(capsule_a, capsule_b, capsule_radius, SKIN_COLOR)
+    scene.add_capsules(*person, SKIN_COLOR)
     if arms is not None:
         scene.add_capsules(*arms, ARM_COLOR)
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
-        floor = floor_height(position, capsule_a, capsule_b, capsule_radius)
+        floor = floor_height(position, *person)
     middle = [camera.target[0], camera.target[1], floor - 0.01]
     scene.add(Cylinder(_FLOOR_RADIUS, 0.02), RigidTransform(middle), _FLOOR_COLOR)
     return scene.picture(camera, size)

@@ -15,7 +15,7 @@ def _picture(offset: float) -> np.ndarray:
     return render_still(
         garment.faces,
         position,
-        *synthetic.capsules(joints),
+        synthetic.capsules(joints),
         grippers=np.array([[0.0, 0.3, 1.5]]),
         camera=CameraPose((2.8, 0.4, 1.5), (0.0, 0.0, 1.1)),
         size=(320, 240),
