@@ -18,7 +18,9 @@ def make_sheet() -> tuple[cloth.ExplicitBiasCloth, torch.Tensor]:
     faces = np.concatenate([corner + [0, 1, SIDE + 1], corner + [0, SIDE + 1, SIDE]])
     on_rod = np.flatnonzero(np.abs(rest[:, 0] - 0.15) < 0.06)
     elements = cloth.make_elements(rest, faces)
-    sheet = cloth.ExplicitBiasCloth(elements, cloth.Material(), 0.05, on_rod, settings=cloth.ExplicitSettings(iterations=20))
+    sheet = cloth.ExplicitBiasCloth(
+        elements, cloth.Material(), 0.05, on_rod, settings=cloth.ExplicitSettings(iterations=20)
+    )
     return sheet, torch.from_numpy(rest)
 
 
