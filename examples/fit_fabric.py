@@ -6,22 +6,16 @@ import torch
 from drake_dress import cloth
 
 TRUE, GUESS = 60.0, 150.0  # N/m
-STRETCH = cloth.MATERIAL.index("stretch_stiffness")
+STRETCH, SOLVER = cloth.MATERIAL.index("stretch_stiffness"), cloth.ExplicitSettings(iterations=5)
 
 
 def make_strip() -> tuple[cloth.ExplicitBiasCloth, torch.Tensor]:
     """Returns a strip of 8 by 40 cm, held at its top, and its nodes (n,3), m."""
     u, z = np.meshgrid(np.arange(5) * 0.02, np.arange(21) * -0.02)
     rest = np.stack([u.ravel(), np.zeros(u.size), z.ravel()], axis=1)
-    corner = np.arange(u.size).reshape(u.shape)[:-1, :-1].reshape(-1, 1)
-    elements = cloth.make_elements(rest, np.concatenate([corner + [0, 5, 1], corner + [1, 5, 6]]))
-    strip = cloth.ExplicitBiasCloth(
-        elements,
-        cloth.Material(),
-        0.05,
-        np.arange(5),
-        settings=cloth.ExplicitSettings(iterations=5),
-    )
+    k = np.arange(u.size).reshape(u.shape)[:-1, :-1].reshape(-1, 1)
+    e = cloth.make_elements(rest, np.concatenate([k + [0, 5, 1], k + [1, 5, 6]]))
+    strip = cloth.ExplicitBiasCloth(e, cloth.Material(), 0.05, np.arange(5), settings=SOLVER)
     return strip, torch.from_numpy(rest)
 
 
