@@ -45,28 +45,21 @@ class ArmMeasures:
         return np.asarray(inside.all(axis=1), dtype=bool)
 
 
-def arm_capsules(
-    log: RunLog, samples: npt.NDArray[np.integer]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Returns both arms as capsules: ends (k,c,3), (k,c,3) and radii (c,), m; c = 0 without arms.
+def arm_poses(log: RunLog, samples: npt.NDArray[np.integer]) -> FloatArray:
+    """Returns (k,a,8,4,4) X_WL of base and links of the arms; a = 0 without arms.
 
     Args:
         log: of the run.
         samples: (k,) which are wanted.
     """
     if "/arm/left/base" not in log.file:
-        none = np.zeros((len(samples), 0, 3))
-        return none, none, np.zeros(0)
+        return np.zeros((len(samples), 0, 8, 4, 4))
     placed = []
     for side in SIDES:
         arm = panda(np.asarray(log.file[f"/arm/{side}/base"]))
         q = np.asarray(log.file[f"/arm/{side}/q"], dtype=np.float64)[samples]
-        placed.append([SHAPE.placed(arm.links(row)) for row in np.nan_to_num(q)])
-    a, b = (
-        np.concatenate([np.stack([getattr(c, end) for c in arm]) for arm in placed], axis=1)
-        for end in ("first", "second")
-    )
-    return a, b, np.concatenate([arm[0].radius for arm in placed])
+        placed.append(np.stack([arm.links(row)[:-1] for row in np.nan_to_num(q)]))
+    return np.stack(placed, axis=1)
 
 
 def arm_extremes(log: RunLog, side: Side) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

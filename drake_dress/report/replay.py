@@ -7,14 +7,14 @@ import time as clock
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Capsule, Meshcat, Rgba, Sphere
+from pydrake.geometry import Capsule, Mesh, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arm.description import link_meshes
 from drake_dress.models.sides import SIDES
-from drake_dress.report.arms import arm_capsules
+from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.web_page import open_page
 from drake_dress.systems.garment_visualizer import DressingScene
@@ -118,31 +118,31 @@ class MeshcatReplay:
             self.sample = sample
 
     def _add_bodies(self) -> None:
-        for name, color, (a, b, radius) in self._bodies(0):
-            for k, r in enumerate(radius):
-                length = float(np.linalg.norm(b[k] - a[k]))
-                shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
-                self._meshcat.SetObject(f"dressing/{name}/{k}", shape, color)
-
-    def _bodies(self, i: int) -> list[tuple[str, Rgba, tuple[FloatArray, FloatArray, FloatArray]]]:
-        """Returns name, colour and capsules of the person and of arms at a sample."""
         a, b, radius = self._log.capsules
-        arm_a, arm_b, arm_radius = arm_capsules(self._log, np.array([i]))
-        return [
-            ("person", _SKIN, (a[i], b[i], radius)),
-            ("arms", _ARM, (arm_a[0], arm_b[0], arm_radius)),
-        ]
+        for k, r in enumerate(radius):
+            length = float(np.linalg.norm(b[0, k] - a[0, k]))
+            shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
+            self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
+        for arm in range(arm_poses(self._log, np.array([0])).shape[1]):
+            for k, file in enumerate(link_meshes()):
+                for j, (path, X_LM) in enumerate(file):
+                    name = f"dressing/arms/{arm}/{k}/{j}"
+                    self._meshcat.SetObject(name, Mesh(str(path)), _ARM)
+                    self._meshcat.SetTransform(name, RigidTransform(X_LM))
 
     def _show(self, i: int) -> None:
         log = self._log
         self.scene.show_garment(log.garment_position(i))
         self.scene.show_grippers(np.stack([log.gripper_position[side][i] for side in SIDES]))
         self.scene.show_stage(log.stage[i])
-        for name, _, (first, second, _) in self._bodies(i):
-            for k, (a, b) in enumerate(zip(first, second, strict=True)):
-                axis = b - a
-                rotation = RotationMatrix()
-                if np.linalg.norm(axis) > 1e-6:
-                    rotation = RotationMatrix.MakeFromOneVector(axis, 2)
-                pose = RigidTransform(rotation, 0.5 * (a + b))
-                self._meshcat.SetTransform(f"dressing/{name}/{k}", pose)
+        first, second, _ = log.capsules
+        for k, (a, b) in enumerate(zip(first[i], second[i], strict=True)):
+            axis = b - a
+            rotation = RotationMatrix()
+            if np.linalg.norm(axis) > 1e-6:
+                rotation = RotationMatrix.MakeFromOneVector(axis, 2)
+            pose = RigidTransform(rotation, 0.5 * (a + b))
+            self._meshcat.SetTransform(f"dressing/person/{k}", pose)
+        for arm, poses in enumerate(arm_poses(log, np.array([i]))[0]):
+            for k, X in enumerate(poses):
+                self._meshcat.SetTransform(f"dressing/arms/{arm}/{k}", RigidTransform(X))

@@ -14,12 +14,14 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_bytes
+from drake_dress.models.arm.solids import panda_solids
 from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.sides import SIDES
-from drake_dress.report.arms import arm_capsules
+from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.stills import floor_height
@@ -74,14 +76,11 @@ def _page(log: RunLog, fps: float) -> bytes:
     step = max(_RESOLUTION, float((position.max(axis=(0, 1)) - low).max()) / _INT16_STEPS)
     a, b, radius = log.capsules
     a, b = np.nan_to_num(a[frames]), np.nan_to_num(b[frames])
-    body_count = len(radius)
-    arm_a, arm_b, arm_radius = arm_capsules(log, frames)
-    a, b = np.concatenate([a, arm_a], axis=1), np.concatenate([b, arm_b], axis=1)
-    radius = np.concatenate([radius, arm_radius])
+    arms = arm_poses(log, frames)
     meta = {
         "frames": len(frames),
         "nodes": position.shape[1],
-        "body": body_count,
+        "arms": arms.shape[1],
         "low": low.tolist(),
         "step": step,
         "time": [round(float(t), 4) for t in log.time[frames]],
@@ -97,7 +96,10 @@ def _page(log: RunLog, fps: float) -> bytes:
         if all(np.isfinite(log.gripper_force[side][frames]).all() for side in SIDES)
         else None,
         "loops": {name: loop.tolist() for name, loop in log.loops.items()},
-        "floor": floor_height(position[0], a[0], b[0], radius),
+        "floor": min(
+            floor_height(position[0], a[0], b[0], radius),
+            float(arms[0, ..., 2, 3].min(initial=np.inf)),
+        ),
         "center": log.joint_position[0].mean(axis=0).tolist(),
     }
     grippers = np.stack([log.gripper_position[side][frames] for side in SIDES], axis=1)
@@ -108,12 +110,37 @@ def _page(log: RunLog, fps: float) -> bytes:
         "capsuleB": _base64(b.astype("<f4").tobytes()),
         "radius": _base64(radius.astype("<f4").tobytes()),
         "grippers": _base64(np.nan_to_num(grippers).astype("<f4").tobytes()),
+        **_arm_blobs(arms),
     }
     template = resources.files("drake_dress.report").joinpath("viewer.html").read_text("utf-8")
     page = template.replace('"@META@"', json.dumps(meta, allow_nan=False))
     for name, blob in blobs.items():
         page = page.replace(f"@{name}@", blob)
     return page.encode("utf-8")
+
+
+def _arm_blobs(poses: FloatArray) -> dict[str, str]:
+    """Returns the links' solids, one after the other, and where they are at (k,a,8,4,4) poses."""
+    solids = panda_solids() if poses.shape[1] else ()
+    empty, none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
+    count = [(len(s.vertices), s.faces.size) for s in solids]
+    # of each link x, y, z (quaternion w last) and its place
+    turn = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat() if count else empty
+    place = poses[..., :3, 3].reshape(-1, 3)
+    placed = np.hstack([turn, place]) if count else empty
+    return {
+        "armSize": _base64(np.array(count, dtype="<u4").tobytes()),
+        "armVertices": _base64(
+            np.concatenate([empty, *(s.vertices for s in solids)]).astype("<f4").tobytes()
+        ),
+        "armNormals": _base64(
+            np.concatenate([empty, *(s.normals for s in solids)]).astype("<f4").tobytes()
+        ),
+        "armFaces": _base64(
+            np.concatenate([none, *(s.faces for s in solids)]).astype("<u4").tobytes()
+        ),
+        "armPoses": _base64(placed.astype("<f4").tobytes()),
+    }
 
 
 def _frames(time: FloatArray, fps: float) -> IndexArray:

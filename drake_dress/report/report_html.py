@@ -13,7 +13,7 @@ import numpy.typing as npt
 from drake_dress.drawing import as_png, plain_settings
 from drake_dress.file_output import write_text
 from drake_dress.models.sides import SIDES
-from drake_dress.report.arms import arm_capsules
+from drake_dress.report.arms import arm_poses
 from drake_dress.report.course import course_parts
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, measure
@@ -275,7 +275,6 @@ def _pictures(log: RunLog, m: Measures) -> str:
         target = log.joint_position[i].mean(axis=0) - [0.0, 0.0, 0.12]
         eye = target + 2.9 * np.array([np.cos(azimuth), np.sin(azimuth), 0.22])
         camera = CameraPose(tuple(eye), tuple(target))
-        arms = arm_capsules(log, np.array([i]))
         picture = render_still(
             log.faces,
             log.garment_position(i),
@@ -283,7 +282,7 @@ def _pictures(log: RunLog, m: Measures) -> str:
             grippers,
             camera,
             _STILL_SIZE,
-            arms=(arms[0][0], arms[1][0], arms[2]),
+            arms=arm_poses(log, np.array([i]))[0],
         )
         caption = f"{name}, t = {log.time[i]:.1f} s"
         figures.append(

@@ -30,6 +30,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
+from drake_dress.models.arm.solids import panda_solids
 from drake_dress.models.arrays import FloatArray, IntArray
 
 _Color = tuple[float, float, float]
@@ -69,7 +70,7 @@ def render_still(
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
     floor: float | None = None,
-    arms: tuple[FloatArray, FloatArray, FloatArray] | None = None,
+    arms: FloatArray | None = None,
 ) -> npt.NDArray[np.uint8]:
     """Returns a picture (height, width, 3), RGB.
 
@@ -81,15 +82,17 @@ def render_still(
         camera: where it is taken from.
         size: width, height in pixels.
         floor: height of the floor, m; None: just below everything shown.
-        arms: ends (k,3), (k,3) and radii (k,) of capsules that are robot arms, m.
+        arms: (a,8,4,4) X_WL of base and links of robot arms.
     """
     scene = _Scene()
     scene.add_garment(faces, position)
     scene.add_capsules(*person, SKIN_COLOR)
     if arms is not None:
-        scene.add_capsules(*arms, ARM_COLOR)
+        scene.add_arms(arms)
+    # with arms, it is only what their hands hold
+    gripper = [_GRIPPER_SIZE * (0.5 if arms is not None and len(arms) else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
-        scene.add(Box(*[_GRIPPER_SIZE] * 3), RigidTransform(p), GRIPPER_COLOR)
+        scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
         floor = floor_height(position, *person)
     middle = [camera.target[0], camera.target[1], floor - 0.01]
@@ -143,6 +146,16 @@ class _Scene:
         self.add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
         lining = position - _LINING_OFFSET * normals
         self.add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
+
+    def add_arms(self, poses: FloatArray) -> None:
+        """Adds robot arms with base and links at `poses` (a,8,4,4)."""
+        for arm in poses:
+            for X, solid in zip(arm, panda_solids(), strict=True):
+                R = X[:3, :3]
+                vertices = solid.vertices @ R.T + X[:3, 3]
+                self.add(
+                    _mesh(solid.faces, vertices, solid.normals @ R.T), RigidTransform(), ARM_COLOR
+                )
 
     def add_capsules(
         self, first: FloatArray, second: FloatArray, radius: FloatArray, color: _Color

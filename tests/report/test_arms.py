@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import base64
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arm_extremes import ArmExtremes
-from drake_dress.report.arms import arm_capsules, measure_arms
+from drake_dress.report.arms import arm_poses, measure_arms
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import SuccessRules, summarize
+from tests.present import present
 from tests.report import synthetic
 
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
@@ -97,16 +100,18 @@ def test_a_dressing_by_arms_that_broke_a_rule_is_none(
 def test_arms_are_seen_where_their_joints_put_them(tmp_path: Path) -> None:
     summary(tmp_path, ArmSample(HOME + 0.3, STILL, HOME, STILL))
     with RunLog.open(tmp_path / "run.h5") as log:
-        first, second, radius = arm_capsules(log, np.array([2, 3]))
-        body = len(log.capsules[2])
+        poses = arm_poses(log, np.array([2, 3]))
         write_replay_html(log, tmp_path / "replay.html")
-    count = len(radius) // 2
-    placed = SHAPE.placed(panda(bases()["left"]).links(HOME + 0.3))
-    np.testing.assert_allclose(first[1, :count], placed.first)
-    np.testing.assert_allclose(second[1, :count], placed.second)
+        frames = len(log)
+    np.testing.assert_allclose(poses[1, 0], panda(bases()["left"]).links(HOME + 0.3)[:-1])
     # the other arm did not move
-    np.testing.assert_array_equal(first[0, count:], first[1, count:])
-    assert f'"body": {body},' in (tmp_path / "replay.html").read_text(encoding="utf-8")
+    np.testing.assert_array_equal(poses[0, 1], poses[1, 1])
+    page = (tmp_path / "replay.html").read_text(encoding="utf-8")
+    assert '"arms": 2,' in page
+    found = re.search(r'id="armPoses">([^<]*)<', page)
+    shown = np.frombuffer(base64.b64decode(present(found)[1]), "<f4").reshape(-1, 2, 8, 7)
+    assert len(shown) <= frames
+    np.testing.assert_allclose(shown[-1, 1, :, 4:], poses[1, 1, :, :3, 3], atol=1e-6)
 
 
 def test_a_log_without_arms_has_no_such_figures(tmp_path: Path) -> None:
@@ -114,7 +119,7 @@ def test_a_log_without_arms_has_no_such_figures(tmp_path: Path) -> None:
     synthetic.write(tmp_path / "run.h5", garment, synthetic.dressing(garment))
     with RunLog.open(tmp_path / "run.h5") as log:
         assert measure_arms(log) is None
-        assert arm_capsules(log, np.arange(3))[0].shape == (3, 0, 3)
+        assert arm_poses(log, np.arange(3)).shape == (3, 0, 8, 4, 4)
         assert "arm_tracking_mm" not in summarize(log, wall_time=1.0)
 
 

@@ -17,8 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from trimesh.transformations import rotation_matrix, translation_matrix
 
 from drake_dress.caches import user_cache
+from drake_dress.models.arm.panda import FLANGE, HAND_TURN
+from drake_dress.models.arrays import FloatArray
 
 PACKAGE = "example-robot-data"
 _FOLDER = "robots/panda_description"
@@ -28,6 +31,20 @@ _FORM = 2
 _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 # Of each finger, m: two layers of cloth.
 _OPENING = 0.001
+# Of the fingers' joints from the hand's frame along its z, m.
+_FINGERS = 0.0584
+
+
+def _hand_parts() -> tuple[tuple[str, FloatArray], ...]:
+    z = [0.0, 0.0, 1.0]
+    hand = translation_matrix([0.0, 0.0, FLANGE]) @ rotation_matrix(HAND_TURN, z)
+    finger = translation_matrix([0.0, _OPENING, _FINGERS])
+    other = rotation_matrix(np.pi, z)
+    return ("hand", hand), ("finger", hand @ finger), ("finger", hand @ other @ finger)
+
+
+# Names of meshes that are part of the last link, each with its pose X_LM (4,4).
+HAND_PARTS = _hand_parts()
 
 
 def panda_urdf(cache: Path | None = None) -> Path:
@@ -58,6 +75,22 @@ def panda_urdf(cache: Path | None = None) -> Path:
         finally:
             shutil.rmtree(made, ignore_errors=True)
     return urdf
+
+
+def link_meshes() -> tuple[tuple[tuple[Path, FloatArray], ...], ...]:
+    """Returns of the base and of links 1 to 7 their glTF files, each with its pose X_LM (4,4).
+
+    The hand and its fingers are part of the last link.
+
+    Raises:
+        FileNotFoundError: the package is not there, or has no Panda.
+    """
+    folder = panda_urdf().parent
+    files: list[tuple[tuple[Path, FloatArray], ...]] = []
+    for i in range(8):
+        files.append(((folder / f"link{i}" / "model.gltf", np.eye(4)),))
+    files[-1] += tuple((folder / name / "model.gltf", X) for name, X in HAND_PARTS)
+    return tuple(files)
 
 
 def panda_source() -> Path:
