@@ -9,7 +9,8 @@ BIN := $(VENV)/bin
 setup: $(VENV)/.installed
 
 demo: setup
-	$(BIN)/drake-dress run scenarios/dummy_standing.yaml
+	$(BIN)/drake-dress run scenarios/dummy_standing.yaml \
+	    --set station.arms.model=panda --set controller.method=full
 
 # One thread for each of the processes side by side; what meets in real time runs by itself.
 test: $(VENV)/.installed-test lint

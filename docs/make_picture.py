@@ -7,6 +7,7 @@ import sys
 import matplotlib.image
 import numpy as np
 
+from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.stills import CameraPose, render_still
 
@@ -23,7 +24,7 @@ def main(arguments: list[str]) -> None:
         for t in wanted:
             i = int(np.argmin(np.abs(log.time - t)))
             target = log.joint_position[i].mean(axis=0) - [0.1, 0.0, 0.1]
-            eye = target + 2.6 * np.array([-0.85, 0.5, 0.3])
+            eye = target + 3.3 * np.array([0.35, 0.92, 0.25])
             frames.append(
                 render_still(
                     log.faces,
@@ -32,6 +33,7 @@ def main(arguments: list[str]) -> None:
                     np.stack([log.gripper_position[side][i] for side in ("left", "right")]),
                     CameraPose(tuple(eye), tuple(target)),
                     SIZE,
+                    arms=arm_poses(log, np.array([i]))[0],
                 )
             )
     matplotlib.image.imsave(picture, np.concatenate(frames, axis=1))

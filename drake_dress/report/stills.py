@@ -30,7 +30,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
-from drake_dress.models.arm.solids import panda_solids
+from drake_dress.models.arm.description import link_meshes
 from drake_dress.models.arrays import FloatArray, IntArray
 
 _Color = tuple[float, float, float]
@@ -38,12 +38,13 @@ _Color = tuple[float, float, float]
 OUTSIDE_COLOR = (0.22, 0.44, 0.70)
 LINING_COLOR = (0.87, 0.62, 0.28)
 SKIN_COLOR = (0.87, 0.70, 0.58)
-ARM_COLOR = (0.90, 0.91, 0.92)
 GRIPPER_COLOR = (0.25, 0.26, 0.28)
 _FLOOR_COLOR = (0.76, 0.77, 0.79)
 _BACKGROUND = (0.95, 0.96, 0.97)
 _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
+# A glTF file, such as a link of an arm, makes VTK shade physically, which is this much darker.
+_PHYSICAL = 2.6
 _LINING_OFFSET = 2e-3  # m, so that the lining does not fight with the outside for the pixel
 
 
@@ -84,13 +85,14 @@ def render_still(
         floor: height of the floor, m; None: just below everything shown.
         arms: (a,8,4,4) X_WL of base and links of robot arms.
     """
-    scene = _Scene()
+    with_arms = arms is not None and len(arms) > 0
+    scene = _Scene(with_arms)
     scene.add_garment(faces, position)
     scene.add_capsules(*person, SKIN_COLOR)
     if arms is not None:
         scene.add_arms(arms)
     # with arms, it is only what their hands hold
-    gripper = [_GRIPPER_SIZE * (0.5 if arms is not None and len(arms) else 1.0)] * 3
+    gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
@@ -125,17 +127,19 @@ def node_normals(faces: IntArray, position: FloatArray) -> FloatArray:
 class _Scene:
     """What a picture shows: shapes in the world, each of one colour."""
 
-    def __init__(self) -> None:
+    def __init__(self, with_arms: bool) -> None:
         self._graph: SceneGraph = SceneGraph()
-        self._graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters()))
+        brightness = _PHYSICAL if with_arms else 1.0
+        self._graph.AddRenderer("vtk", MakeRenderEngineVtk(_render_parameters(brightness)))
         self._source = self._graph.RegisterSource("still")
 
-    def add(self, shape: Shape, X_WG: RigidTransform, color: _Color) -> None:
-        """Adds a shape."""
+    def add(self, shape: Shape, X_WG: RigidTransform, color: _Color | None = None) -> None:
+        """Adds a shape; one of a file that has its own colours is given none."""
         name = f"g{self._graph.model_inspector().num_geometries()}"
         instance = GeometryInstance(X_WG, shape, name)
         properties = PerceptionProperties()
-        properties.AddProperty("phong", "diffuse", Rgba(*color, 1.0))
+        if color is not None:
+            properties.AddProperty("phong", "diffuse", Rgba(*color, 1.0))
         properties.AddProperty("label", "id", RenderLabel(1))
         instance.set_perception_properties(properties)
         self._graph.RegisterAnchoredGeometry(self._source, instance)
@@ -150,12 +154,9 @@ class _Scene:
     def add_arms(self, poses: FloatArray) -> None:
         """Adds robot arms with base and links at `poses` (a,8,4,4)."""
         for arm in poses:
-            for X, solid in zip(arm, panda_solids(), strict=True):
-                R = X[:3, :3]
-                vertices = solid.vertices @ R.T + X[:3, 3]
-                self.add(
-                    _mesh(solid.faces, vertices, solid.normals @ R.T), RigidTransform(), ARM_COLOR
-                )
+            for X_WL, meshes in zip(arm, link_meshes(), strict=True):
+                for path, X_LM in meshes:
+                    self.add(Mesh(str(path)), RigidTransform(X_WL @ X_LM))
 
     def add_capsules(
         self, first: FloatArray, second: FloatArray, radius: FloatArray, color: _Color
@@ -185,14 +186,19 @@ def _mesh(faces: IntArray, position: FloatArray, normals: FloatArray) -> Mesh:
     return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "garment")))
 
 
-def _render_parameters() -> RenderEngineVtkParams:
+def _render_parameters(brightness: float) -> RenderEngineVtkParams:
     # A key light from the front left above casts the shadows; lamps on all sides, which cast
     # none, keep the shaded side readable.
     def lamp(x: float, y: float, z: float, intensity: float) -> LightParameter:
-        return LightParameter(type="point", frame="world", position=(x, y, z), intensity=intensity)
+        return LightParameter(
+            type="point", frame="world", position=(x, y, z), intensity=brightness * intensity
+        )
 
     key = LightParameter(
-        type="directional", frame="world", direction=(-0.6, -0.35, -1.2), intensity=0.55
+        type="directional",
+        frame="world",
+        direction=(-0.6, -0.35, -1.2),
+        intensity=0.55 * brightness,
     )
     return RenderEngineVtkParams(
         default_clear_color=_BACKGROUND,
