@@ -14,7 +14,7 @@ import pytest
 from drake_dress import explain
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.discrepancy.candidates import candidates
-from drake_dress.discrepancy.hidden import draw_hidden
+from drake_dress.discrepancy.hidden_effect import draw_hidden
 from drake_dress.discrepancy.results import extended_yaml
 from drake_dress.discrepancy.sentences import plain
 from drake_dress.errors import UserError
@@ -79,7 +79,7 @@ def test_the_extended_scenario_has_it_and_says_where_it_is_from(tmp_path: Path) 
 
 
 def test_recordings_come_as_files_arrays_or_made_ones(tmp_path: Path) -> None:
-    from drake_dress.discrepancy.writing import write_recordings
+    from drake_dress.discrepancy.measured_log import write_recordings
 
     (made,) = recordings(("sway",), duration=1.0)
     arrays = explain.Measurement(

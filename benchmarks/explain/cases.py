@@ -13,9 +13,9 @@ import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.generate import Sensors, Session, measured, record_all
-from drake_dress.discrepancy.hidden import NOTHING, draw_hidden, hideable
-from drake_dress.discrepancy.outside import OUTSIDE
+from drake_dress.discrepancy.hidden_effect import NOTHING, draw_hidden, hideable
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.discrepancy.unlisted_effects import UNLISTED
 from drake_dress.models.effects.effect import Effect
 
 DURATION = 4.0
@@ -70,7 +70,7 @@ def cases(
         if "coarse" in groups and k < draws["coarse"]:
             add("coarse", NOTHING, k)
         if "outside" in groups and k < draws["outside"]:
-            for name in OUTSIDE:
+            for name in UNLISTED:
                 add("outside", name, k)
     return found
 

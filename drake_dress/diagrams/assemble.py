@@ -57,7 +57,7 @@ class Parts:
     policy: DressingPolicy
     limits: SafetyLimits
     page: Meshcat | None
-    beside: bool = False
+    in_worker: bool = False
     own: OwnParts = NOTHING
 
 
@@ -85,7 +85,7 @@ def parts(
     meshes: Garments,
     limits: SafetyLimits,
     page: Meshcat | None = None,
-    beside: bool = False,
+    in_worker: bool = False,
     own: OwnParts = NOTHING,
 ) -> Parts:
     """Returns the parts of a scenario's diagram.
@@ -95,13 +95,13 @@ def parts(
         meshes: its garments.
         limits: within which it starts.
         page: where the run is shown, if it is.
-        beside: whether the true garment is stepped, and the global controller solves, in
+        in_worker: whether the true garment is stepped, and the global controller solves, in
             processes of their own.
         own: parts of a user's own.
     """
-    station = plant_station(scenario, meshes.plant, page, meshes.belief, beside)
+    station = plant_station(scenario, meshes.plant, page, meshes.belief, in_worker)
     policy = controller_policy(scenario, meshes.belief, station.person, own.costs)
-    return Parts(scenario, meshes, station, policy, limits, page, beside, own)
+    return Parts(scenario, meshes, station, policy, limits, page, in_worker, own)
 
 
 def hardware_parts(
@@ -163,7 +163,7 @@ def wired(
         p.limits,
         p.own.predictor or predictor(p.scenario),
         local,
-        p.beside,
+        p.in_worker,
         None if p.own.controller is None else own_controller(p.own.controller),
     )
     return make_dressing(p.station, p.garments.plant, control, writer, p.page)

@@ -67,7 +67,7 @@ def plant_station(
     mesh: GarmentMesh,
     meshcat: Meshcat | None,
     belief: GarmentMesh | None = None,
-    beside: bool = False,
+    in_worker: bool = False,
 ) -> SimulatedStation:
     """Returns the simulated station with the scenario's person and garment.
 
@@ -76,12 +76,12 @@ def plant_station(
         mesh: the true garment.
         meshcat: where it is shown, if it is.
         belief: the controller's garment, of which there are estimates then.
-        beside: whether the true garment is stepped in a process of its own.
+        in_worker: whether the true garment is stepped in a process of its own.
     """
     sight = None
     if belief is not None:
         sight = Sight(barycentric_transfer(mesh, belief), 1.0 / scenario.controller.command_rate)
-    p = replace(station_parameters(scenario, mesh), beside=beside)
+    p = replace(station_parameters(scenario, mesh), in_worker=in_worker)
     return make_simulated_station(p, meshcat, sight)
 
 

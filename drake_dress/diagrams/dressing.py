@@ -65,8 +65,8 @@ class LocalSetup:
     joints_count: int
     record: list[LocalProblem] | None = None
 
-    def system(self, beside: bool = False) -> LocalCompensation:
-        """Returns it as a system; `beside` the rest it solves on a thread."""
+    def system(self, in_worker: bool = False) -> LocalCompensation:
+        """Returns it as a system; with `in_worker` it solves on a background thread."""
         return LocalCompensation(
             self.controller,
             self.period,
@@ -75,7 +75,7 @@ class LocalSetup:
             self.joints_count,
             self.feedback,
             self.record,
-            beside,
+            in_worker,
         )
 
 
@@ -130,7 +130,7 @@ class ControlSetup:
         limits: that the governor keeps between controllers and grippers.
         predictor: of the person's arms; by default they are believed to stay.
         local: the local controller between plan and governor; the plan is followed when None.
-        beside: whether controllers solve in the background, the global one in a worker process.
+        in_worker: whether controllers solve in the background, the global one in a worker process.
         own: the user's system that requests velocities in place of all of these; see `OwnParts`.
     """
 
@@ -139,7 +139,7 @@ class ControlSetup:
     limits: SafetyLimits
     predictor: MotionPredictor = field(default_factory=StillPredictor)
     local: LocalSetup | None = None
-    beside: bool = False
+    in_worker: bool = False
     own: Any = None
 
 
@@ -198,7 +198,7 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
             rates.global_period,
             rates.global_delay,
             waits=not w.of.in_real_time,
-            beside=control.beside,
+            in_worker=control.in_worker,
         ),
     )
     asking = w.add(*_plan_to_request(control))
@@ -254,7 +254,7 @@ def _plan_to_request(control: ControlSetup) -> tuple[str, Any]:
         return "own_controller", control.own
     if control.local is None:
         return "plan_follower", PlanFollower()
-    return "local_controller", control.local.system(control.beside)
+    return "local_controller", control.local.system(control.in_worker)
 
 
 def _add_own_inputs(w: Wiring, mpc: GlobalMpc, controller: Any) -> None:

@@ -25,7 +25,7 @@ from drake_dress.machine import left_out_of_garbage
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_writer import RunLogWriter
-from drake_dress.systems.apart import Apart
+from drake_dress.systems.worker_process import WorkerProcess
 
 # Is said when statuses come.
 OPEN = "the lab is open"
@@ -61,7 +61,7 @@ def run_lab(
         raise UserError(str(source), "station.hardware.lcm_url", str(error)) from error
     take = None
     if scenario.station.cameras:
-        take = Apart(Studio(station_parameters(scenario, meshes.plant))).submit
+        take = WorkerProcess(Studio(station_parameters(scenario, meshes.plant))).submit
     with claimed("--out", out):
         with (
             caught_interrupt() as interrupt,

@@ -121,14 +121,14 @@ def _parts(
     meshes: Garments,
     limits: SafetyLimits,
     page: Meshcat | None,
-    beside: bool,
+    in_worker: bool,
     own: OwnParts,
 ) -> Parts:
     """Returns the parts of the diagram; a problem with arms or hardware is the user's to know."""
     arms, hardware = "station.arms", "station.hardware"
     try:
         if scenario.station.kind == "simulated":
-            return parts(scenario, meshes, limits, page, beside, own)
+            return parts(scenario, meshes, limits, page, in_worker, own)
         with caught_interrupt() as interrupt:
             print(f"listening: {scenario.station.hardware.lcm_url}", flush=True)
             p = hardware_parts(

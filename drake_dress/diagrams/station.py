@@ -122,7 +122,7 @@ class StationParameters:
     """What the simulated station is made of; SI units.
 
     `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
-    `beside`: the garment is stepped in a process of its own.
+    `in_worker` steps the garment in a worker process.
     """
 
     mesh: GarmentMesh
@@ -150,7 +150,7 @@ class StationParameters:
     placement: ArmPlacement | None = None
     mode: str
     cameras: tuple[Camera, ...] = ()
-    beside: bool = False
+    in_worker: bool = False
 
 
 @dataclass(frozen=True)
@@ -303,7 +303,7 @@ def _add_cloth(
             PersonBodies(person.capsules, person.body_indices),
             p.grasp_stiffness,
             Mounts(p.effects),
-            p.beside,
+            p.in_worker,
         ),
     )
     for name in ("body_poses", "body_spatial_velocities"):

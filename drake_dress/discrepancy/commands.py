@@ -15,11 +15,11 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
 from drake_dress.discrepancy.explained import Explained, explained
 from drake_dress.discrepancy.generate import Sensors, Session, make_dataset
-from drake_dress.discrepancy.hidden import NOTHING, RANDOM
+from drake_dress.discrepancy.hidden_effect import NOTHING, RANDOM
+from drake_dress.discrepancy.measured_log import write_recordings
 from drake_dress.discrepancy.motions import USUAL
 from drake_dress.discrepancy.reading import all_notes, read_recordings
 from drake_dress.discrepancy.results import write_json
-from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.errors import UserError
 from drake_dress.file_output import (
     DATASET_FILES,

@@ -14,13 +14,13 @@ from typing import Any
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Cause, Explanation, Score, explain
+from drake_dress.discrepancy.prediction_windows import Windows, windows
 from drake_dress.discrepancy.reading import all_notes
 from drake_dress.discrepancy.recording import Recording
+from drake_dress.discrepancy.residual_map import Spot, spots
 from drake_dress.discrepancy.results import as_json, extended_yaml, write_json
 from drake_dress.discrepancy.sentences import headline
 from drake_dress.discrepancy.suggestion import suggest
-from drake_dress.discrepancy.where import Spot, spots
-from drake_dress.discrepancy.windows import Windows, windows
 from drake_dress.file_output import EXPLAIN_FILES, claimed, remove_results, write_text
 from drake_dress.models.effects.effect import Effect
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.discrepancy.hidden import NOTHING, draw_hidden
+from drake_dress.discrepancy.hidden_effect import NOTHING, draw_hidden
 from drake_dress.discrepancy.lab import Lab, Numerics
 from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording

@@ -11,9 +11,9 @@ import numpy as np
 from drake_dress import __version__
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
+from drake_dress.discrepancy.prediction_windows import Windows
+from drake_dress.discrepancy.residual_map import Spot, worst
 from drake_dress.discrepancy.sentences import headline, plain, values
-from drake_dress.discrepancy.where import Spot, worst
-from drake_dress.discrepancy.windows import Windows
 from drake_dress.drawing import plain_settings
 from drake_dress.report.page import chart, embedded, html_page
 

@@ -12,8 +12,8 @@ from drake_dress.diagrams.build import effects as effects_on
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
-from drake_dress.discrepancy.where import Spot, worst
-from drake_dress.discrepancy.windows import Windows
+from drake_dress.discrepancy.prediction_windows import Windows
+from drake_dress.discrepancy.residual_map import Spot, worst
 from drake_dress.file_output import write_text
 from drake_dress.models.effects.registry import EFFECTS, own_effects
 from drake_dress.yaml_text import read_yaml, write_yaml

@@ -22,7 +22,7 @@ from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.sides import SIDES
-from drake_dress.systems.garment_steps import Steps, StepsBeside, StepsHere, Surroundings
+from drake_dress.systems.garment_steps import Steps, StepsHere, StepsInWorker, Surroundings
 from drake_dress.systems.person_bodies import PersonBodies
 
 # By which a rehearsal lets the garment into the person, m.
@@ -72,7 +72,7 @@ class ClothPlant(LeafSystem):
         grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
         mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
             limbs that do not know of it.
-        beside: whether steps are made in a process of their own, so that another core can do them.
+        in_worker: whether a worker process makes the steps, on another core.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class ClothPlant(LeafSystem):
         person: PersonBodies,
         grasp_stiffness: float,
         mounts: Mounts | None = None,
-        beside: bool = False,
+        in_worker: bool = False,
     ) -> None:
         super().__init__()
         self.cloth = cloth
@@ -94,7 +94,7 @@ class ClothPlant(LeafSystem):
         self._offset = start[cloth.held] - start_grippers[self._side]
         self._person = person
         self._surroundings = Surroundings(person.radius, len(cloth.held))
-        self._steps: Steps = (StepsBeside if beside else StepsHere)(cloth, self._surroundings)
+        self._steps: Steps = (StepsInWorker if in_worker else StepsHere)(cloth, self._surroundings)
         # what the step under way was begun with
         self._begun: tuple[ClothState, FloatArray] | None = None
 

@@ -106,11 +106,11 @@ class StepsHere:
         return self._cloth.step(state, *self._surroundings.of(around))[0]
 
 
-class StepsBeside:
-    """Steps that are made in a process of their own from when they are begun.
+class StepsInWorker:
+    """Steps the garment in a worker process.
 
     States come in shared memory, in two places in turn, so that one is read while the next is made.
-    The process begins at once and ends with this one, however that ends.
+    The worker starts at once and ends with this process, however that ends.
 
     Args:
         cloth: steps the garment; it is copied.

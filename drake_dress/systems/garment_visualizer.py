@@ -13,7 +13,7 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.sides import SIDES
 
 STAGE_NAMES = ("prepare", "dress", "done")
-OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
+UNLISTED = Rgba(0.22, 0.44, 0.70, 1.0)
 LINING = Rgba(0.87, 0.62, 0.28, 1.0)
 _GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)
 _TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1.0)}
@@ -107,7 +107,7 @@ class DressingScene:
             self._label_at[2] = position[:, 2].max() + _TEXT_ABOVE
         # Two one-sided meshes rather than one double-sided: inside and outside can be told apart.
         for name, color, side in (
-            ("outside", OUTSIDE, Meshcat.SideOfFaceToRender.kFrontSide),
+            ("outside", UNLISTED, Meshcat.SideOfFaceToRender.kFrontSide),
             ("lining", LINING, Meshcat.SideOfFaceToRender.kBackSide),
         ):
             self._meshcat.SetTriangleMesh(

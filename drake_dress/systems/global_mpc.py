@@ -17,7 +17,7 @@ from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
 from drake_dress.models.dressing.stages import Stage
 from drake_dress.models.immutable import Immutable
-from drake_dress.systems.apart import Apart
+from drake_dress.systems.worker_process import WorkerProcess
 
 # Between looks for a plan where the world does not wait, s.
 _LOOKING_PERIOD = 0.01
@@ -97,23 +97,24 @@ class GlobalMpc(LeafSystem):
     wall time of the last solve that ended, s, and the count of solves ended. age: (1,) since what
     the plan in use answers was seen, s.
 
-    A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine. It runs meanwhile on a thread,
-    or `beside` in a process of its own, which the rest of the diagram slows down less. Where the
-    world does not wait, `waits` is False: it runs in a process, a plan is used from
-    k·period + delay on or from when it is there, if that is later, and no solve begins before the
-    one before it has ended. What the plan before it does until then is part of the prediction and
-    not changed. But no plan is used beyond its end by more than a period: then the plan is to rest,
-    until there is another. A solve that fails, or takes longer than `patience`, was the last one.
+    A solve starts from what is seen at k·period, and its plan is used from k·period + delay on,
+    however long it really took: the run is the same on any machine. It runs on a background thread,
+    or with `in_worker` in a worker process, which the rest of the diagram slows down less.
+
+    Where the world does not wait, `waits` is False. Solves then run in a worker process, one at a
+    time, and a plan is used from k·period + delay on, or as soon as it is there if that is later.
+    The prediction includes what the last plan does until then. If no new plan has come a period
+    after the end of the last one, the grippers rest. A solve that fails, or takes longer than
+    `patience`, ends planning.
 
     Args:
         policy: does the work.
-        period: between solves, s.
-        delay: from what is seen to the use of the plan, s, less than the period and as long as
-            the policy's committed steps.
+        period: time between solves, s.
+        delay: time from an observation to the use of its plan, s; less than the period and as long
+            as the policy's committed steps.
         waits: whether the world waits for a solve that takes longer than its delay.
-        patience: with a solve, where it does not, s.
-        beside: whether solves run in a process of their own where the world waits, too.
+        patience: longest time of a solve where the world does not wait, s.
+        in_worker: whether solves run in a worker process where the world waits, too.
 
     All that a run changes stands in its context: several simulators of one diagram give what each
     gives alone. They share the thread or process that solves, one solve after another; where the
@@ -127,7 +128,7 @@ class GlobalMpc(LeafSystem):
         delay: float,
         waits: bool = True,
         patience: float = 10.0,
-        beside: bool = False,
+        in_worker: bool = False,
     ) -> None:
         super().__init__()
         _check_delay(policy, period, delay)
@@ -137,12 +138,12 @@ class GlobalMpc(LeafSystem):
         self._patience = patience
         self._waits = waits
         solve = _Solve(policy)
-        self._apart = Apart(solve) if beside or not waits else None
-        if self._apart is None:
+        self._worker = WorkerProcess(solve) if in_worker or not waits else None
+        if self._worker is None:
             threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
             self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)
         else:
-            self._submit = self._apart.submit
+            self._submit = self._worker.submit
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon
         self._node_count = m
         self._idle = GlobalPlan(
@@ -280,9 +281,9 @@ class GlobalMpc(LeafSystem):
     def _fail(self, why: str, progress: _Progress, state: State) -> None:
         self._set_progress(state, _Progress(None, progress.begun_at, f"global controller: {why}"))
         state.get_mutable_abstract_state(self._plan).set_value(self._idle)
-        if self._apart is not None:
+        if self._worker is not None:
             # nobody waits for it, the end of this process included
-            self._apart.kill()
+            self._worker.kill()
 
     def _finish(self, context: Context, state: State) -> None:
         progress = self._progress_in(context)

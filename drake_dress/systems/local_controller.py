@@ -58,23 +58,23 @@ class LocalCompensation(LeafSystem):
 
     plan: GlobalPlan. garment_position: (3m,) of the controller's garment, m.
     predicted_joint_position: ((M+1)·18,), m, row 0 now, then every `joints_step`. Gripper positions
-    and requests: (3,) m and m/s. request_time: (1,) when was seen what the requests answer, s: a
-    solver that hangs makes them stale. solve_time: (2,) wall time of the last solve that ended, s,
-    and the count of solves ended.
+    and requests: (3,) m and m/s. request_time: (1,) time of the observation that the requests are based on, s: a
+    solver that hangs makes them stale. solve_time: (2,) wall time of the last finished solve, s,
+    and the number of finished solves.
 
-    A solve starts from what is seen at k·period and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine. It may run `beside` the rest of
-    the diagram meanwhile, on a thread.
+    A solve starts from what is seen at k·period, and its plan is used from k·period + delay on,
+    however long it really took: the run is the same on any machine. With `in_worker`, it solves on
+    a background thread.
 
     Args:
         controller: does the work.
-        period: between solves, s.
-        delay: from what is seen to the use of a plan, s, less than the period.
+        period: time between solves, s.
+        delay: time from an observation to the use of its plan, s; less than the period.
         joints_step: between predicted joints, s.
         joints_count: M, how many there are beyond now.
         feedback: whether to correct between solves.
         record: takes each problem solved, if given, of all contexts.
-        beside: whether to solve on a thread, while the rest of the diagram waits for others.
+        in_worker: whether to solve on a background thread.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class LocalCompensation(LeafSystem):
         joints_count: int,
         feedback: bool = True,
         record: list[Any] | None = None,
-        beside: bool = False,
+        in_worker: bool = False,
     ) -> None:
         super().__init__()
         if not 0.0 < delay < period:
@@ -95,7 +95,7 @@ class LocalCompensation(LeafSystem):
         self._joints_step = joints_step
         self._feedback = feedback
         self._record = record
-        self._threads = ThreadPoolExecutor(1, "local-controller") if beside else None
+        self._threads = ThreadPoolExecutor(1, "local-controller") if in_worker else None
         self._solving = self.DeclareAbstractState(Value(_Solving()))
         resting = controller.resting(0.0)
         self._memory = self.DeclareAbstractState(Value(_Memory(LocalState(), resting)))

@@ -17,7 +17,7 @@ from benchmarks.explain.tables import (
     tables,
 )
 from benchmarks.kept import read_results, write_results
-from drake_dress.discrepancy.hidden import SIZES
+from drake_dress.discrepancy.hidden_effect import SIZES
 from drake_dress.errors import UserError
 from tests.models.effects.own import registered
 

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from drake_dress.discrepancy.explanation import Cause, Explanation, Score
+from drake_dress.discrepancy.measured_log import write_recordings
 from drake_dress.discrepancy.motions import MOTIONS
 from drake_dress.discrepancy.sentences import headline
 from drake_dress.discrepancy.suggestion import suggest
-from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.models.effects.air import Wind
 from drake_dress.models.effects.contact import Adhesion, Friction
 from drake_dress.models.effects.registry import EFFECTS

@@ -13,10 +13,10 @@ from drake_dress.discrepancy.candidates import candidates
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
 from drake_dress.discrepancy.lab import Numerics
+from drake_dress.discrepancy.prediction_windows import windows
 from drake_dress.discrepancy.report import report_page
+from drake_dress.discrepancy.residual_map import spots
 from drake_dress.discrepancy.results import as_json, extended_yaml
-from drake_dress.discrepancy.where import spots
-from drake_dress.discrepancy.windows import windows
 from drake_dress.models.effects.mass import SurfaceDensity
 from tests.discrepancy.data import SCENARIO, quick_scenario, recordings
 from tests.present import present

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from drake_dress.discrepancy.measured_log import write_recordings
 from drake_dress.discrepancy.reading import read_recordings
 from drake_dress.discrepancy.recording import Recording
-from drake_dress.discrepancy.writing import write_recordings
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.coat import COATS, make_coat

@@ -67,10 +67,10 @@ def _check(system: System, begin: Begin, see: See, times: np.ndarray) -> None:
     ],
 )
 def test_garments_in_two_contexts_do_not_know_of_each_other(
-    integrator: str, layered: bool, beside: bool
+    integrator: str, layered: bool, in_worker: bool
 ) -> None:
     """They drape over arms, so that factors of the linear systems are made anew on the way."""
-    station = draped_station(integrator=integrator, self_collision=layered, beside=beside)
+    station = draped_station(integrator=integrator, self_collision=layered, in_worker=in_worker)
     _check(
         station.diagram,
         lambda context, which: _pull(station, context, which),

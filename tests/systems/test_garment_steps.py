@@ -17,7 +17,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.state import ClothState
-from drake_dress.systems.garment_steps import StepsBeside, StepsHere, Surroundings
+from drake_dress.systems.garment_steps import StepsHere, StepsInWorker, Surroundings
 from tests.models.cloth.sheets import sheet_elements
 from tests.systems.draped import H, draped_station
 
@@ -41,8 +41,8 @@ def cloth() -> ImplicitCloth:
 
 
 @pytest.fixture
-def beside() -> Iterator[StepsBeside]:
-    steps = StepsBeside(cloth(), AROUND)
+def in_worker() -> Iterator[StepsInWorker]:
+    steps = StepsInWorker(cloth(), AROUND)
     yield steps
     steps._process.kill()
 
@@ -70,67 +70,67 @@ def test_surroundings_stand_in_one_array() -> None:
     np.testing.assert_array_equal(motion, velocity)
 
 
-def test_numbers_are_those_of_steps_made_here(beside: StepsBeside) -> None:
+def test_numbers_are_those_of_steps_made_here(in_worker: StepsInWorker) -> None:
     here = StepsHere(cloth(), AROUND)
     states = {}
-    for steps in (here, beside):
+    for steps in (here, in_worker):
         state, found = ClothState.at_rest(SHEET), []
         for k in range(60):
             steps.begin(state, AROUND.flat(BAR, STILL + 0.1 * np.sin(0.1 * k)))
             state = steps.end()
             found.append(copied(state))
         states[type(steps)] = found
-    assert all(same(a, b) for a, b in zip(states[StepsHere], states[StepsBeside], strict=True))
+    assert all(same(a, b) for a, b in zip(states[StepsHere], states[StepsInWorker], strict=True))
     assert (states[StepsHere][-1].owner >= 0).any()
 
 
-def test_a_step_may_begin_anywhere_and_be_forgotten(beside: StepsBeside) -> None:
+def test_a_step_may_begin_anywhere_and_be_forgotten(in_worker: StepsInWorker) -> None:
     here = StepsHere(cloth(), AROUND)
     around = AROUND.flat(BAR, STILL)
     moved = ClothState.at_rest(SHEET + np.array([0.0, 0.0, 0.3]))
-    beside.begin(ClothState.at_rest(SHEET), around)
-    last = beside.end()
-    beside.begin(last, around)
-    beside.begin(moved, around)
+    in_worker.begin(ClothState.at_rest(SHEET), around)
+    last = in_worker.end()
+    in_worker.begin(last, around)
+    in_worker.begin(moved, around)
     here.begin(moved, around)
-    assert same(beside.end(), here.end())
+    assert same(in_worker.end(), here.end())
 
 
-def test_a_result_lasts_while_the_next_step_is_made(beside: StepsBeside) -> None:
+def test_a_result_lasts_while_the_next_step_is_made(in_worker: StepsInWorker) -> None:
     around = AROUND.flat(BAR, STILL)
-    beside.begin(ClothState.at_rest(SHEET), around)
-    first = beside.end()
+    in_worker.begin(ClothState.at_rest(SHEET), around)
+    first = in_worker.end()
     kept = copied(first)
-    beside.begin(first, around)
-    beside.end()
+    in_worker.begin(first, around)
+    in_worker.end()
     assert same(first, kept)
 
 
-def test_what_is_not_finite_is_told_and_does_not_end_it(beside: StepsBeside) -> None:
+def test_what_is_not_finite_is_told_and_does_not_end_it(in_worker: StepsInWorker) -> None:
     around = AROUND.flat(BAR, STILL)
-    beside.begin(ClothState.at_rest(SHEET), AROUND.flat(BAR, np.full((2, 3), np.nan)))
+    in_worker.begin(ClothState.at_rest(SHEET), AROUND.flat(BAR, np.full((2, 3), np.nan)))
     with pytest.raises(ValueError, match="held"):
-        beside.end()
-    beside.begin(ClothState.at_rest(SHEET), around)
-    assert np.isfinite(beside.end().x).all()
+        in_worker.end()
+    in_worker.begin(ClothState.at_rest(SHEET), around)
+    assert np.isfinite(in_worker.end().x).all()
 
 
-def test_what_was_not_begun_does_not_end(beside: StepsBeside) -> None:
-    for steps in (beside, StepsHere(cloth(), AROUND)):
+def test_what_was_not_begun_does_not_end(in_worker: StepsInWorker) -> None:
+    for steps in (in_worker, StepsHere(cloth(), AROUND)):
         with pytest.raises(RuntimeError, match="begun"):
             steps.end()
 
 
-def test_a_process_that_is_gone_is_told(beside: StepsBeside) -> None:
+def test_a_process_that_is_gone_is_told(in_worker: StepsInWorker) -> None:
     around = AROUND.flat(BAR, STILL)
-    beside.begin(ClothState.at_rest(SHEET), around)
-    state = beside.end()
-    assert beside._process.pid is not None
-    os.kill(beside._process.pid, signal.SIGKILL)
+    in_worker.begin(ClothState.at_rest(SHEET), around)
+    state = in_worker.end()
+    assert in_worker._process.pid is not None
+    os.kill(in_worker._process.pid, signal.SIGKILL)
     with pytest.raises(RuntimeError, match="ended"):
         for _ in range(2):
-            beside.begin(state, around)
-            state = beside.end()
+            in_worker.begin(state, around)
+            state = in_worker.end()
 
 
 def test_it_ends_with_who_began_it() -> None:
@@ -176,19 +176,19 @@ def advanced(made: SimulatedStation) -> tuple[Simulator, np.ndarray]:
 
 
 def test_a_station_does_the_same_either_way() -> None:
-    made = draped_station(beside=True)
+    made = draped_station(in_worker=True)
     try:
         _, there = advanced(made)
     finally:
         steps = made.cloth._steps
-        assert isinstance(steps, StepsBeside)
+        assert isinstance(steps, StepsInWorker)
         steps._process.kill()
-    _, here = advanced(draped_station(beside=False))
+    _, here = advanced(draped_station(in_worker=False))
     np.testing.assert_array_equal(there, here)
 
 
 def test_a_copy_of_a_context_goes_on_as_the_first_does() -> None:
-    made = draped_station(beside=False)
+    made = draped_station(in_worker=False)
     simulator, _ = advanced(made)
     copy = simulator.get_context().Clone()
     port = made.cloth.GetOutputPort("garment_position")
@@ -203,7 +203,7 @@ def test_a_copy_of_a_context_goes_on_as_the_first_does() -> None:
 
 
 def test_the_garment_is_one_step_behind_grippers_and_bodies() -> None:
-    made = draped_station(beside=False)
+    made = draped_station(in_worker=False)
     simulator = Simulator(made.diagram)
     context = simulator.get_mutable_context()
     for i, side in enumerate(("left", "right")):

@@ -29,11 +29,11 @@ def controller() -> LocalController:
 
 
 def simulator(
-    controller: LocalController, feedback: bool = True, beside: bool = False
+    controller: LocalController, feedback: bool = True, in_worker: bool = False
 ) -> tuple[LocalCompensation, Simulator, list[LocalProblem]]:
     """Returns a simulator of the system alone: a coat behind a person, and a plan to rest."""
     problems: list[LocalProblem] = []
-    system = LocalCompensation(controller, PERIOD, DELAY, 0.2, 5, feedback, problems, beside)
+    system = LocalCompensation(controller, PERIOD, DELAY, 0.2, 5, feedback, problems, in_worker)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
     mesh = controller.planner.mesh
@@ -63,11 +63,11 @@ def asked(system: LocalCompensation, simulator: Simulator) -> np.ndarray:
 
 @pytest.mark.parametrize("beside", [False, True])
 def test_a_solution_is_used_after_its_delay_and_says_when_it_was_seen(
-    controller: LocalController, beside: bool
+    controller: LocalController, in_worker: bool
 ) -> None:
-    system, sim, problems = simulator(controller, beside=beside)
+    system, sim, problems = simulator(controller, in_worker=in_worker)
     sim.AdvanceTo(0.9 * DELAY)
-    assert beside or len(problems) == 1
+    assert in_worker or len(problems) == 1
     np.testing.assert_array_equal(asked(system, sim), 0.0)
     sim.AdvanceTo(1.1 * DELAY)
     assert np.linalg.norm(asked(system, sim), axis=1).min() > 0.01
@@ -88,8 +88,8 @@ def test_it_solves_at_its_rate_and_tells_how_long_it_took(controller: LocalContr
 
 def test_the_same_twice_is_the_same_also_on_a_thread(controller: LocalController) -> None:
     runs = []
-    for beside in (False, True):
-        system, sim, _ = simulator(controller, beside=beside)
+    for in_worker in (False, True):
+        system, sim, _ = simulator(controller, in_worker=in_worker)
         sim.AdvanceTo(0.1)
         runs.append(asked(system, sim))
     np.testing.assert_array_equal(runs[0], runs[1])
@@ -116,7 +116,7 @@ def test_a_delay_of_a_period_or_more_is_refused(controller: LocalController) -> 
 
 def test_solves_in_two_contexts_do_not_know_of_each_other(controller: LocalController) -> None:
     """Also while they are under way on the thread, and in a copy of a context."""
-    system, first, _ = simulator(controller, beside=True)
+    system, first, _ = simulator(controller, in_worker=True)
     second = Simulator(system, first.get_context().Clone())
     port = system.GetInputPort("garment_position")
     moved = port.Eval(second.get_context()) + 0.01
@@ -135,7 +135,7 @@ def test_solves_in_two_contexts_do_not_know_of_each_other(controller: LocalContr
     in_turn = go_on(first, second)
     alone = []
     for offset in (0.0, 0.01):
-        other, sim, _ = simulator(controller, beside=True)
+        other, sim, _ = simulator(controller, in_worker=True)
         where = other.GetInputPort("garment_position")
         context = sim.get_mutable_context()
         where.FixValue(context, where.Eval(context) + offset)

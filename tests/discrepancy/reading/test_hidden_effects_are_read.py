@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from drake_dress.diagrams.garment import build_garment
-from drake_dress.discrepancy.hidden import draw_hidden
+from drake_dress.discrepancy.hidden_effect import draw_hidden
+from drake_dress.discrepancy.measured_log import write_recordings
 from drake_dress.discrepancy.reading import read_recordings
-from drake_dress.discrepancy.writing import write_recordings
 from tests.discrepancy.data import quick_scenario, recordings
 
 # Every motion, and the effects that change sizes, forces, axes and clocks most.

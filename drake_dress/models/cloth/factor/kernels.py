@@ -17,7 +17,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from drake_dress.models.cloth.factor.lanes import FOUR, less, load, more, store, times
+from drake_dress.models.cloth.factor.vector_rows import FOUR, less, load, more, store, times
 from drake_dress.models.vectorised import vectorised
 
 _INDICES, _VALUES, _LANES = nb.int32[::1], nb.float64[::1], nb.float64[:, ::1]

@@ -26,8 +26,8 @@ from drake_dress.models.cloth.factor.kernels import (
     substitute,
     take_rows,
 )
-from drake_dress.models.cloth.factor.lanes import EIGHT, FOUR
 from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern
+from drake_dress.models.cloth.factor.vector_rows import EIGHT, FOUR
 
 # A part is made for fewer nodes than all by this.
 _MANY = 3

@@ -18,6 +18,7 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.cloth.elements import Elements
+from drake_dress.models.cloth.layers.impact_zones import Union, Zone, make_zone
 from drake_dress.models.cloth.layers.motion import Motion, relative_motion
 from drake_dress.models.cloth.layers.neighbours import PairFinder, Pairs, Passing
 from drake_dress.models.cloth.layers.passes import (
@@ -27,7 +28,6 @@ from drake_dress.models.cloth.layers.passes import (
     transpose_impulses,
 )
 from drake_dress.models.cloth.layers.topology import make_topology
-from drake_dress.models.cloth.layers.zones import Union, Zone, make_zone
 from drake_dress.models.cloth.vectors import largest_length
 
 # Relative motion in one part of a step, by the mean edge length.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from drake_dress.diagrams.garment import build_garment
-from drake_dress.discrepancy.hidden import ALL_SIZES, SIZES, draw_hidden
-from drake_dress.discrepancy.outside import OUTSIDE, MagnetisedCuff, SlidingLayer, Snag
+from drake_dress.discrepancy.hidden_effect import ALL_SIZES, SIZES, draw_hidden
+from drake_dress.discrepancy.unlisted_effects import UNLISTED, MagnetisedCuff, SlidingLayer, Snag
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.effects.effect import Sheet
 from drake_dress.models.effects.registry import EFFECTS
@@ -22,8 +22,8 @@ def sheet() -> Sheet:
 
 
 def test_what_explains_does_not_know_them() -> None:
-    assert not set(OUTSIDE) & set(EFFECTS)
-    assert set(ALL_SIZES) == set(SIZES) | set(OUTSIDE)
+    assert not set(UNLISTED) & set(EFFECTS)
+    assert set(ALL_SIZES) == set(SIZES) | set(UNLISTED)
     assert set(SIZES) == set(EFFECTS)
     drawn = [draw_hidden("random", np.random.default_rng(k)) for k in range(80)]
     assert {e.NAME for effects in drawn for e in effects} <= set(EFFECTS)

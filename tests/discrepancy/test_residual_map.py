@@ -6,7 +6,7 @@ import pytest
 from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.lab import Lab
 from drake_dress.discrepancy.recording import Recording
-from drake_dress.discrepancy.where import KINDS, Spot, limbs_touched, spots, worst
+from drake_dress.discrepancy.residual_map import KINDS, Spot, limbs_touched, spots, worst
 from drake_dress.discrepancy.whitening import whiten
 from drake_dress.models.arrays import FloatArray
 from tests.discrepancy.data import SCENARIO, quick_scenario

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from drake_dress.models.cloth.layers.zones import Union, make_zone
+from drake_dress.models.cloth.layers.impact_zones import Union, make_zone
 
 
 def _zone() -> tuple[np.ndarray, ...]:

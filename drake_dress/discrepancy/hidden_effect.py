@@ -1,4 +1,4 @@
-"""What may be hidden in generated data: every effect at a size that matters, drawn at random."""
+"""Draws the effect that is hidden in generated data, at a size that matters."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from drake_dress.discrepancy.outside import OUTSIDE
+from drake_dress.discrepancy.unlisted_effects import UNLISTED
 from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS, HOW_TO_LOAD, own_effects
@@ -25,7 +25,7 @@ def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effec
         rng: source of chance.
         size: factor on how strong it is.
     """
-    kind = EFFECTS.get(name) or OUTSIDE[name]
+    kind = EFFECTS.get(name) or UNLISTED[name]
     draw = kind.draw if name in own_effects() else ALL_SIZES[name]
     return kind(**draw(rng, size))
 

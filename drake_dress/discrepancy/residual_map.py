@@ -1,4 +1,4 @@
-"""Where, when and in which signal the simulation is off most, beyond noise."""
+"""Where, when and in which signal the residual exceeds noise most."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work that is done in a process of its own, so that it takes no time from who waits for it."""
+"""Calls in a worker process, which take no time from the process that waits for them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _NICENESS = 10
 _worker: Callable[..., Any] | None = None
 
 
-class Apart:
-    """Calls `work` in another process, one call at a time.
+class WorkerProcess:
+    """Calls `work` in a worker process, one call at a time.
 
-    The process begins at once, ends with this one however that ends, and leaves Ctrl-C to it.
+    The worker starts at once, ends with this process however that ends, and ignores Ctrl-C.
 
     Args:
         work: can be pickled, as can what it takes and returns.

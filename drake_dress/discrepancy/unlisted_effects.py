@@ -1,6 +1,6 @@
-"""Effects that the list of `models/effects` lacks, for data that hide what nobody thought of.
+"""Effects that are missing from the list of `models/effects`, to hide in generated data.
 
-They exist in generated data only: what explains data must not know them, and has to say so.
+`explain` does not know them, and has to say that something is unexplained.
 """
 
 from __future__ import annotations
@@ -108,4 +108,4 @@ class SlidingLayer(ForceEffect):
         return force
 
 
-OUTSIDE: Mapping[str, type[Effect]] = {e.NAME: e for e in (MagnetisedCuff, Snag, SlidingLayer)}
+UNLISTED: Mapping[str, type[Effect]] = {e.NAME: e for e in (MagnetisedCuff, Snag, SlidingLayer)}
