@@ -59,8 +59,8 @@ class LocalCompensation(LeafSystem):
     plan: GlobalPlan. garment_position: (3m,) of the controller's garment, m.
     predicted_joint_position: ((M+1)·18,), m, row 0 now, then every `joints_step`. Gripper positions
     and requests: (3,) m and m/s. request_time: (1,) time of the observation that the requests are
-    based on, s; old if a solver hangs. solve_time: (2,) wall time of the last finished solve, s, and
-    the number of finished solves.
+    based on, s; old if a solver hangs. solve_time: (2,) wall time of the last finished solve, s,
+    and the number of finished solves.
 
     A solve starts from what is seen at k·period, and its plan is used from k·period + delay on,
     however long it really took: the run is the same on any machine. With `in_worker`, it solves on
