@@ -58,7 +58,7 @@ def _check(system: System, begin: Begin, see: See, times: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(
-    ("integrator", "layered", "beside"),
+    ("integrator", "layered", "in_worker"),
     [
         ("implicit", False, False),
         ("implicit", True, False),

@@ -138,7 +138,7 @@ def test_it_ends_with_who_began_it() -> None:
     code = (
         "from tests.systems import test_garment_steps as t\n"
         "if __name__ == '__main__':\n"
-        "    steps = t.StepsBeside(t.cloth(), t.AROUND)\n"
+        "    steps = t.StepsInWorker(t.cloth(), t.AROUND)\n"
         "    steps.begin(t.ClothState.at_rest(t.SHEET), t.AROUND.flat(t.BAR, t.STILL))\n"
         "    steps.end()\n"
         "    print(steps._process.pid, flush=True)\n"

@@ -61,7 +61,7 @@ def asked(system: LocalCompensation, simulator: Simulator) -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("in_worker", [False, True])
 def test_a_solution_is_used_after_its_delay_and_says_when_it_was_seen(
     controller: LocalController, in_worker: bool
 ) -> None:
