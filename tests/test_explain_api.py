@@ -22,13 +22,6 @@ from tests.discrepancy.data import QUICK, SCENARIO, recordings
 from tests.models.effects.own import HemChain, registered
 
 
-def test_all_names_are_there_and_described() -> None:
-    for name in explain.__all__:
-        value = getattr(explain, name)
-        if callable(value):
-            assert value.__doc__
-
-
 def test_an_effect_of_a_users_own_is_a_candidate_with_its_shape() -> None:
     rest = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 3))
     assert "hem_chain" not in {c.name for c in candidates(rest)}

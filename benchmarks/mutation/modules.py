@@ -45,7 +45,11 @@ MODULES = {
         (f"{_MODELS}/dressing/linking.py",), ("tests/models/dressing/test_linking.py",)
     ),
     "constrained_ddp": Module(
-        (f"{_MODELS}/control/constrained_ddp.py", f"{_MODELS}/control/ddp_passes.py"),
+        (
+            f"{_MODELS}/control/constrained_ddp.py",
+            f"{_MODELS}/control/ddp_passes.py",
+            f"{_MODELS}/control/linear_dynamics.py",
+        ),
         (
             "tests/models/control/test_constrained_ddp.py",
             "tests/models/control/test_linear_quadratic.py",

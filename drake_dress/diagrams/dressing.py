@@ -155,7 +155,7 @@ class _Controllers:
     """
 
     mpc: GlobalMpc
-    asking: PlanFollower | LocalCompensation | Any
+    asking: Any
     governor: SafetyGovernor
     arms: ArmController | None
 

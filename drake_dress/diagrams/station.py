@@ -63,8 +63,10 @@ from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
 from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.control.person_model import PersonModel, person_capsules
@@ -486,16 +488,17 @@ def robots_at_start(
 
 def plant_integrator(p: StationParameters) -> Integrator:
     """Returns what steps the plant's garment, held by both grippers."""
-    scheme = Scheme(
-        p.mesh.held,
-        p.time_step,
-        p.integrator == "projective_dynamics",
-        p.tolerance,
-        p.iterations,
-        implicitness=p.implicitness,
-        buckling_wavelength=p.buckling_wavelength,
-    )
-    integrator = _with_effects(p, scheme)
+    settings: ImplicitSettings | ProjectiveSettings
+    if p.integrator == "projective_dynamics":
+        settings = ProjectiveSettings(quasi_newton=True)
+    else:
+        settings = ImplicitSettings(
+            p.tolerance,
+            p.iterations,
+            implicitness=p.implicitness,
+            buckling_wavelength=p.buckling_wavelength,
+        )
+    integrator = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings))
     return LayeredCloth(integrator) if p.self_collision else integrator
 
 
@@ -507,13 +510,8 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
 
 def settled(p: StationParameters, hung: FloatArray) -> FloatArray:
     """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
-    scheme = Scheme(
-        p.mesh.held,
-        p.time_step,
-        damping=_SETTLING_DAMPING,
-        buckling_wavelength=p.buckling_wavelength,
-    )
-    cloth = _with_effects(p, scheme)
+    settings = ImplicitSettings(buckling_wavelength=p.buckling_wavelength)
+    cloth = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings, _SETTLING_DAMPING))
     state = ClothState.at_rest(hung)
     still = np.zeros((len(p.mesh.held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):

@@ -13,7 +13,9 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
 from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.composition import GarmentWithEffects, body_with_effects
 from drake_dress.models.effects.effect import Effect
@@ -122,17 +124,14 @@ class Lab:
             time_step: in place of the numerics', s.
         """
         n = self.numerics
-        scheme = Scheme(
-            self.held[0],
-            time_step or n.time_step,
-            n.integrator == "projective_dynamics" and damping is None,
-            n.tolerance,
-            n.iterations,
-            _ACCURACY,
-            predicted=True,
-            damping=damping,
-            sampled=True,
-        )
+        settings: ImplicitSettings | ProjectiveSettings
+        if n.integrator == "projective_dynamics" and damping is None:
+            settings = ProjectiveSettings(
+                _ACCURACY, quasi_newton=True, predicted=True, sample_elements=True
+            )
+        else:
+            settings = ImplicitSettings(n.tolerance, n.iterations)
+        scheme = Scheme(self.held[0], time_step or n.time_step, settings, damping)
         return GarmentWithEffects(
             self.garment.rest_position,
             self.garment.faces,

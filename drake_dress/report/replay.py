@@ -124,8 +124,8 @@ class MeshcatReplay:
             shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
             self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
         for arm in range(arm_poses(self._log, np.array([0])).shape[1]):
-            for k, file in enumerate(link_meshes()):
-                for j, (path, X_LM) in enumerate(file):
+            for k, meshes in enumerate(link_meshes()):
+                for j, (path, X_LM) in enumerate(meshes):
                     name = f"dressing/arms/{arm}/{k}/{j}"
                     self._meshcat.SetObject(name, Mesh(str(path)), _ARM)
                     self._meshcat.SetTransform(name, RigidTransform(X_LM))

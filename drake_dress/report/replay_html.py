@@ -121,24 +121,22 @@ def _page(log: RunLog, fps: float) -> bytes:
 
 def _arm_blobs(poses: FloatArray) -> dict[str, str]:
     """Returns the links' solids, one after the other, and where they are at (k,a,8,4,4) poses."""
-    solids = panda_solids() if poses.shape[1] else ()
-    empty, none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
-    count = [(len(s.vertices), s.faces.size) for s in solids]
+    if not poses.shape[1]:
+        return dict.fromkeys(("armSize", "armVertices", "armNormals", "armFaces", "armPoses"), "")
+    solids = panda_solids()
     # of each link x, y, z (quaternion w last) and its place
-    turn = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat() if count else empty
-    place = poses[..., :3, 3].reshape(-1, 3)
-    placed = np.hstack([turn, place]) if count else empty
+    turn = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat()
+    placed = np.hstack([turn, poses[..., :3, 3].reshape(-1, 3)])
+    count = np.array([(len(s.vertices), s.faces.size) for s in solids])
+    vertices, normals, faces = (
+        np.concatenate([getattr(s, name) for s in solids])
+        for name in ("vertices", "normals", "faces")
+    )
     return {
-        "armSize": _base64(np.array(count, dtype="<u4").tobytes()),
-        "armVertices": _base64(
-            np.concatenate([empty, *(s.vertices for s in solids)]).astype("<f4").tobytes()
-        ),
-        "armNormals": _base64(
-            np.concatenate([empty, *(s.normals for s in solids)]).astype("<f4").tobytes()
-        ),
-        "armFaces": _base64(
-            np.concatenate([none, *(s.faces for s in solids)]).astype("<u4").tobytes()
-        ),
+        "armSize": _base64(count.astype("<u4").tobytes()),
+        "armVertices": _base64(vertices.astype("<f4").tobytes()),
+        "armNormals": _base64(normals.astype("<f4").tobytes()),
+        "armFaces": _base64(faces.astype("<u4").tobytes()),
         "armPoses": _base64(placed.astype("<f4").tobytes()),
     }
 

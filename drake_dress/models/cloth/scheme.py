@@ -27,28 +27,14 @@ class Scheme:
     Attributes:
         held: (k,) nodes whose motion is prescribed.
         time_step: s.
-        projective: Projective Dynamics instead of the linearly implicit scheme.
-        tolerance: relative residual of the implicit scheme's solver.
-        iterations: of it, at most.
-        accuracy: distance to the fixed point at which Projective Dynamics stops, m.
-        predicted: whether it starts from the linearly implicit step.
+        settings: of the linearly implicit scheme or of Projective Dynamics, which they choose.
         damping: in place of the fabric's, s.
-        implicitness: θ of the implicit scheme.
-        buckling_wavelength: of it, in spacings of the mesh; 0: compression never gives way.
-        sampled: whether Projective Dynamics has contact between nodes too.
     """
 
     held: IntArray
     time_step: float
-    projective: bool = False
-    tolerance: float = 5e-3
-    iterations: int = 40
-    accuracy: float = 1e-5
-    predicted: bool = False
+    settings: ImplicitSettings | ProjectiveSettings = ImplicitSettings()
     damping: float | None = None
-    sampled: bool = False
-    implicitness: float = 1.0
-    buckling_wavelength: float = 0.0
 
     def __call__(
         self, elements: Elements, material: Material, gravity: FloatArray, additions: Additions
@@ -56,22 +42,7 @@ class Scheme:
         """Returns what steps the garment."""
         if self.damping is not None:
             material = replace(material, damping=self.damping)
-        if self.projective:
-            iterated = ProjectiveSettings(
-                tolerance=self.accuracy,
-                quasi_newton=True,
-                predicted=self.predicted,
-                sample_elements=self.sampled,
-            )
-            return ProjectiveDynamicsCloth(
-                elements, material, self.time_step, self.held, gravity, additions, iterated
-            )
-        settings = ImplicitSettings(
-            tolerance=self.tolerance,
-            max_iterations=self.iterations,
-            implicitness=self.implicitness,
-            buckling_wavelength=self.buckling_wavelength,
-        )
-        return ImplicitCloth(
-            elements, material, self.time_step, self.held, gravity, additions, settings
-        )
+        given = (elements, material, self.time_step, self.held, gravity, additions)
+        if isinstance(self.settings, ProjectiveSettings):
+            return ProjectiveDynamicsCloth(*given, self.settings)
+        return ImplicitCloth(*given, self.settings)

@@ -234,8 +234,8 @@ class SleeveDirection:
 
 
 @dataclass(frozen=True)
-class HandCorridor:
-    """What hangs ahead of a hand that is to go in; see corridor.py. Lengths in m."""
+class _Cylinder:
+    """w times what is in a cylinder, see corridor.py; lengths in m."""
 
     weight: float
     radius: float
@@ -248,45 +248,45 @@ class HandCorridor:
     def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
         """See `SleeveCost`."""
         if self._counts(step, side):
-            slope.x += self.weight * self._found(step, side)[1]
+            self._add(self._found(step, side)[1], side, slope)
 
     def _counts(self, step: PlannedStep, side: int) -> bool:
-        return step.target(side).corridor is not None
+        return self.weight > 0.0 and self._place(step, side) is not None
 
     def _found(self, step: PlannedStep, side: int) -> tuple[float, FloatArray]:
-        way, j = step.target(side).corridor, step.index
-        assert way is not None
-        return corridor_cost(step.x, way.hand[j], way.into[j], self.radius, self.length)
+        place = self._place(step, side)
+        assert place is not None
+        return corridor_cost(step.x, *place, self.radius, self.length)
+
+    def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
+        """Returns where it begins (3,), m, and the unit vector (3,) along it, if there is one."""
+        raise NotImplementedError
+
+    def _add(self, crossing: FloatArray, side: int, slope: Slope) -> None:
+        """Adds the derivative, of what is in the cylinder by the nodes (n,3)."""
+        slope.x += self.weight * crossing
 
 
 @dataclass(frozen=True)
-class ForearmPassage:
-    """What would cross the forearm if the hand were in the armhole now. Lengths in m."""
+class HandCorridor(_Cylinder):
+    """What hangs ahead of a hand that is to go in."""
 
-    weight: float
-    radius: float
-    length: float
+    def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
+        way = step.target(side).corridor
+        return None if way is None else (way.hand[step.index], way.into[step.index])
 
-    def value(self, step: PlannedStep, side: int) -> float:
-        """See `SleeveCost`."""
-        return self.weight * self._found(step, side)[0] if self._counts(step, side) else 0.0
 
-    def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
-        """See `SleeveCost`."""
-        if not self._counts(step, side):
-            return
-        crossing = self._found(step, side)[1]
-        slope.x += self.weight * crossing
-        slope.p_c[side] -= self.weight * crossing.sum(axis=0)
+@dataclass(frozen=True)
+class ForearmPassage(_Cylinder):
+    """What would cross the forearm if the hand were in the armhole now."""
 
-    def _counts(self, step: PlannedStep, side: int) -> bool:
-        return step.target(side).passage is not None and self.weight > 0.0
-
-    def _found(self, step: PlannedStep, side: int) -> tuple[float, FloatArray]:
+    def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
         into = step.target(side).passage
-        assert into is not None
-        center = step.sleeves[side].p_c
-        return corridor_cost(step.x, center, -into[step.index], self.radius, self.length)
+        return None if into is None else (step.sleeves[side].p_c, -into[step.index])
+
+    def _add(self, crossing: FloatArray, side: int, slope: Slope) -> None:
+        super()._add(crossing, side, slope)
+        slope.p_c[side] -= self.weight * crossing.sum(axis=0)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.control.linear_dynamics import advance, pull_back, roll
 from drake_dress.models.control.small_matrices import (
     add_curvature,
     complete_basis,
@@ -172,28 +173,6 @@ def _evaluate(cost, x, v, x_slope, v_slope):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _roll(a, b, v, x):  # type: ignore[no-untyped-def]
-    """Fills the states (N+1,n) that inputs `v` (N,m) lead to from zero."""
-    x[0] = 0.0
-    for t in range(v.shape[0]):
-        _advance(a, b, t, x[t], v[t], x[t + 1])
-
-
-@nb.njit(nogil=True, error_model="numpy", forceinline=True)
-def _advance(a, b, t, x, v, after):  # type: ignore[no-untyped-def]
-    """Fills the state `after` step `t` from `x` (n,) with input `v` (m,)."""
-    for i in range(x.shape[0]):
-        s = x[i]
-        if a is not None:
-            s = 0.0
-            for e in range(x.shape[0]):
-                s += a[t, i, e] * x[e]
-        for c in range(v.shape[0]):
-            s += b[t, i, c] * v[c]
-        after[i] = s
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
 def backward(a, b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-untyped-def]
     """Fills the law of each step, the last one first.
 
@@ -271,21 +250,7 @@ def _act(a, b, p_xx, p_x, r, v_slope, law, i):  # type: ignore[no-untyped-def]
         q_vv[c, c] += r[c]
     if a is not None:
         for c in range(m):
-            _pull_back(a[i], q_vx[c])
-
-
-@nb.njit(nogil=True, error_model="numpy", forceinline=True)
-def _pull_back(a, row):  # type: ignore[no-untyped-def]
-    """Turns a `row` (n,) on the state after a step into one on the state before: row · a."""
-    n = row.shape[0]
-    before = np.empty(n)
-    for e in range(n):
-        s = 0.0
-        for d in range(n):
-            s += row[d] * a[d, e]
-        before[e] = s
-    for e in range(n):
-        row[e] = before[e]
+            pull_back(a[i], q_vx[c])
 
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
@@ -348,7 +313,7 @@ def _gather(a, b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-
                 s += rows[k, m + e] * b[i, e, c]
             rows[k, c] = s
         if a is not None:
-            _pull_back(a[i], rows[k, m : m + n])
+            pull_back(a[i], rows[k, m : m + n])
     law.number[i] = number
     return number, without_room
 
@@ -439,10 +404,10 @@ def _cost_to_go(a, law, i, both, p_xx, p_x):  # type: ignore[no-untyped-def]
     gain, feedforward, q_vx = law.gain[i], law.feedforward[i], law.q_vx[i]
     if a is not None:
         for d in range(n):
-            _pull_back(a[i], p_xx[d])
+            pull_back(a[i], p_xx[d])
         for e in range(n):
-            _pull_back(a[i], p_xx[:, e])
-        _pull_back(a[i], p_x)
+            pull_back(a[i], p_xx[:, e])
+        pull_back(a[i], p_x)
     for d in range(n):
         for e in range(d + 1):
             s = p_xx[d, e]
@@ -482,7 +447,7 @@ def _forward(a, b, law, dx, dv, x_multiplier, v_multiplier):  # type: ignore[no-
             for e in range(n):
                 s += law.gain[i, c, e] * dx[i, e]
             dv[i, c] = s
-        _advance(a, b, i, dx[i], dv[i], dx[i + 1])
+        advance(a, b, i, dx[i], dv[i], dx[i + 1])
         for c in range(m):
             s = law.q_v[i, c]
             for e in range(n):
@@ -614,7 +579,7 @@ def sweep(a, b, cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: igno
     x_linear, v_linear = np.empty_like(on_x.radius), np.empty_like(on_v.radius)
     x_found, v_found = np.zeros_like(on_x.radius), np.zeros_like(on_v.radius)
 
-    _roll(a, b, v, x)
+    roll(a, b, v, x)
     excess = measure(on_x, x) + measure(on_v, v)
     value = _evaluate(cost, x, v, x_slope, v_slope)
     _begin(on_x)
@@ -643,7 +608,7 @@ def sweep(a, b, cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: igno
             for t in range(steps):
                 for c in range(m):
                     v_new[t, c] = v[t, c] + factor * dv[t, c]
-            _roll(a, b, v_new, x_new)
+            roll(a, b, v_new, x_new)
             new_value = _evaluate(cost, x_new, v_new, x_scratch, v_scratch)
             new = new_value + price * (_excess(on_x, x_new) + _excess(on_v, v_new))
             allowed = 1e-4 * factor * min(slope, 0.0) + 1e-12 * (1.0 + abs(merit))

@@ -13,6 +13,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from drake_dress.models.control.linear_dynamics import advance, pull_back, roll
+
 # Share of the way to the border of the positive numbers that a step may go.
 _BORDER_SHARE = 0.995
 # Excess at first as a share of the bound.
@@ -85,7 +87,7 @@ def interior_point(  # type: ignore[no-untyped-def]
     factor, gain = np.empty((steps, m, m)), np.empty((steps, m, n))
     dx, dv = np.zeros((steps + 1, n)), np.zeros((steps, m))
 
-    _roll(a, b, v, x)
+    roll(a, b, v, x)
     _values(matrix, offset, radius, n_x, v, x, slope, value)
     steepness = 0.0
     for t in range(steps):
@@ -149,7 +151,7 @@ def interior_point(  # type: ignore[no-untyped-def]
                     excess[t, k] += primal * d_excess[t, k]
                     multiplier[t, k] += dual * d_multiplier[t, k]
                     spare[t, k] -= dual * d_multiplier[t, k]
-        _roll(a, b, v, x)
+        roll(a, b, v, x)
         _values(matrix, offset, radius, n_x, v, x, slope, value)
         mu, mismatch = 0.0, 0.0
         for t in range(steps):
@@ -167,28 +169,6 @@ def interior_point(  # type: ignore[no-untyped-def]
             if excess[t, k] <= spare[t, k]:
                 excess[t, k] = 0.0
     return iteration, done
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy")
-def _roll(a, b, v, x):  # type: ignore[no-untyped-def]
-    x[0] = 0.0
-    for t in range(v.shape[0]):
-        _advance(a, b, t, x[t], v[t], x[t + 1])
-
-
-@nb.njit(nogil=True, error_model="numpy", forceinline=True)
-def _advance(a, b, t, x, v, after):  # type: ignore[no-untyped-def]
-    """Fills the state `after` step `t` from `x` (n,) with input `v` (m,)."""
-    for d in range(x.shape[0]):
-        if a is None:
-            s = x[d] + v[d]
-        else:
-            s = 0.0
-            for e in range(x.shape[0]):
-                s += a[t, d, e] * x[e]
-            for c in range(v.shape[0]):
-                s += b[t, d, c] * v[c]
-        after[d] = s
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
@@ -368,7 +348,7 @@ def _newton(  # type: ignore[no-untyped-def]
             work[c] = s / factor[t, c, c]
         for c in range(m):
             dv[t, c] = -work[c]
-        _advance(a, b, t, dx[t], dv[t], dx[t + 1])
+        advance(a, b, t, dx[t], dv[t], dx[t + 1])
 
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
@@ -383,14 +363,7 @@ def _slope_through_dynamics(a, b, t, p, into_v):  # type: ignore[no-untyped-def]
             for d in range(n):
                 s += b[t, d, c] * p[d]
             into_v[c] = s
-        before = np.empty(n)
-        for e in range(n):
-            s = 0.0
-            for d in range(n):
-                s += a[t, d, e] * p[d]
-            before[e] = s
-        for e in range(n):
-            p[e] = before[e]
+        pull_back(a[t], p)
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")

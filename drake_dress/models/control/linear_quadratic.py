@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.norm_bounds import NormBound, NormBounds, stacked_bounds
+from drake_dress.models.control.norm_bounds import NormBound, NormBounds, stacked_bounds, violation
 from drake_dress.models.control.reduced_problem import ReducedProblem
 
 
@@ -69,8 +69,7 @@ class LinearQuadraticProblem:
 
     def violation(self, v: FloatArray) -> float:
         """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""
-        over = self.state_bounds.excess(self.states(v))[1:].max(initial=0.0)
-        return float(max(0.0, over, self.input_bounds.excess(v).max(initial=0.0)))
+        return violation(self.state_bounds, self.states(v), self.input_bounds, v)
 
     def reduced(self) -> ReducedProblem:
         """Returns it for states as they differ from those without inputs, and diagonal weights.

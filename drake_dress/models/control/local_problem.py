@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.norm_bounds import NormBounds
+from drake_dress.models.control.norm_bounds import NormBounds, violation
 from drake_dress.models.control.reduced_problem import ReducedProblem
 
 
@@ -70,8 +70,7 @@ class LocalProblem:
 
     def violation(self, v: FloatArray) -> float:
         """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""
-        over = self.state_bounds.excess(self.states(v))[1:].max(initial=0.0)
-        return float(max(0.0, over, self.input_bounds.excess(v).max(initial=0.0)))
+        return violation(self.state_bounds, self.states(v), self.input_bounds, v)
 
     def reduced(self) -> ReducedProblem:
         """Returns it in the sums of inputs, u: x = x_0 + B u has m coordinates in place of n."""

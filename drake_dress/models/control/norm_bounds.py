@@ -45,6 +45,15 @@ class NormBounds:
         return np.where(bounded, t, 0.0)
 
 
+def violation(of_states: NormBounds, x: FloatArray, of_inputs: NormBounds, v: FloatArray) -> float:
+    """Returns by how much states `x` (N+1,n) and inputs `v` (N,m) exceed the worst bound, or 0.
+
+    Bounds on x_0 do not count: no input changes it.
+    """
+    over = of_states.excess(x)[1:].max(initial=0.0)
+    return float(max(0.0, over, of_inputs.excess(v).max(initial=0.0)))
+
+
 @dataclass(frozen=True)
 class NormBound:
     """‖C z + d‖ ≤ φ at all steps.

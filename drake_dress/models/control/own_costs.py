@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar, get_type_hints
 
 from drake_dress.errors import UserError
 from drake_dress.models.control.costs import GarmentCost
+from drake_dress.models.register import check_name, enter
 
 Kind = TypeVar("Kind", bound=type)
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")
 _costs: dict[str, type] = {}
 COSTS: Mapping[str, type] = MappingProxyType(_costs)
 """A live view: it grows with `register_cost`."""
@@ -36,11 +35,7 @@ def register_cost(kind: Kind) -> Kind:
     made: Any = vars(kind).get("__dataclass_params__") if isinstance(kind, type) else None
     if made is None or not made.frozen:
         raise UserError(source, "", "expected a class with @dataclass(frozen=True)")
-    name: Any = getattr(kind, "NAME", None)
-    if not (isinstance(name, str) and _NAME.fullmatch(name)):
-        raise UserError(
-            source, "NAME", f"is {name!r}, expected lower-case letters, digits and _, as ceiling"
-        )
+    check_name(source, kind, "ceiling")
     hints = get_type_hints(kind)
     for entry in dataclasses.fields(kind):
         if hints[entry.name] is not float or not isinstance(entry.default, int | float):
@@ -48,10 +43,7 @@ def register_cost(kind: Kind) -> Kind:
     for method in ("value", "add_slope"):
         if not callable(getattr(kind, method, None)):
             raise UserError(source, method, "is missing, expected the methods of GarmentCost")
-    there = _costs.get(name)
-    if there is not None and _place(there) != _place(kind):
-        raise UserError(source, "NAME", f"is {name!r}, which {_place(there)} has, expected another")
-    _costs[name] = kind
+    enter(_costs, source, kind)
     return kind
 
 
@@ -81,8 +73,3 @@ def registered_costs(values: Mapping[str, Mapping[str, float]]) -> tuple[Garment
         except ValueError as error:
             raise UserError("controller.costs", name, str(error)) from error
     return tuple(found)
-
-
-def _place(kind: type) -> str:
-    """Returns where a class is defined."""
-    return f"{kind.__module__}.{kind.__qualname__}"

@@ -16,7 +16,6 @@ import copy
 import dataclasses
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -47,6 +46,7 @@ from drake_dress.models.effects.effect import (
     StretchEffect,
 )
 from drake_dress.models.human.body import BodyMeasures
+from drake_dress.models.register import check_name, is_name
 
 KINDS: tuple[type[Effect], ...] = (
     ForceEffect,
@@ -67,7 +67,6 @@ KINDS: tuple[type[Effect], ...] = (
 # Kinds whose `apply` gives what it is given, changed.
 _CHANGING = (MaterialEffect, ShapeEffect, GravityEffect, BodyEffect, ClockEffect, CameraEffect)
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")
 # Parameters are checked at this share of their typical size.
 _SHARE = 0.8
 # Step of the differences, in typical sizes, and how far derivatives may be off, relative to the
@@ -94,11 +93,7 @@ def check_class(kind: type[Effect]) -> None:
         raise UserError(
             source, "", "is no frozen dataclass, expected @dataclass(frozen=True) on the class"
         )
-    name = getattr(kind, "NAME", None)
-    if not (isinstance(name, str) and _NAME.fullmatch(name)):
-        raise UserError(
-            source, "NAME", f"is {name!r}, expected lower-case letters, digits and _, as air_drag"
-        )
+    check_name(source, kind, "air_drag")
     for entry in dataclasses.fields(kind):
         if not entry.metadata:
             raise UserError(source, entry.name, "has no unit and bounds, expected = parameter(…)")
@@ -147,7 +142,7 @@ def sample_of(kind: type[Effect]) -> tuple[Any, ...]:
 
 def _check_parameter(source: str, p: Parameter) -> None:
     """Holds one parameter's name, unit and bounds against each other."""
-    if not _NAME.fullmatch(p.name) or p.name.endswith("_std"):
+    if not is_name(p.name) or p.name.endswith("_std"):
         raise UserError(
             source, p.name, "is no name of a parameter, expected lower case, not ending in _std"
         )

@@ -32,6 +32,7 @@ from drake_dress.models.effects.grip import GripperCompliance, GripperLatency, G
 from drake_dress.models.effects.mass import GravityTilt, LocalMass, SurfaceDensity
 from drake_dress.models.effects.person import LimbCompliance, LimbRadius
 from drake_dress.models.effects.sensing import CameraRotation, CameraTranslation, TimeOffset
+from drake_dress.models.register import enter
 
 Kind = TypeVar("Kind", bound=type[Effect])
 
@@ -97,10 +98,7 @@ def register_effect(kind: Kind) -> Kind:
     name = kind.NAME
     if name in BUILT_IN or name in _RESERVED:
         raise UserError(source, "NAME", f"is {name!r}, a name of the package, expected another")
-    there = _effects.get(name)
-    if there is not None and _place(there) != _place(kind):
-        raise UserError(source, "NAME", f"is {name!r}, which {_place(there)} has, expected another")
-    _effects[name] = kind
+    enter(_effects, source, kind)
     return kind
 
 
@@ -118,8 +116,3 @@ def unregister_effect(name: str) -> None:
 def own_effects() -> tuple[str, ...]:
     """Returns the names of registered effects, in the order in which they came."""
     return tuple(name for name in _effects if name not in BUILT_IN)
-
-
-def _place(kind: type[Effect]) -> str:
-    """Returns where a class is defined."""
-    return f"{kind.__module__}.{kind.__qualname__}"

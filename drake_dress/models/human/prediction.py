@@ -5,7 +5,6 @@ A predictor sees joints, never what the person wants.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -14,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.register import is_name
 
 # Rows of the joints, parents first: each hangs on the one before it by a limb of fixed length.
 _LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))
@@ -195,7 +195,7 @@ def register_predictor(name: str, make: Callable[[], MotionPredictor]) -> None:
     Raises:
         ValueError: the name is one of the package's, or no name.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+    if not is_name(name):
         raise ValueError(f"the name is {name!r}, expected lower-case letters, digits and _")
     if _predictors.get(name) in (StillPredictor, ConstantVelocityPredictor):
         raise ValueError(f"the name {name} is one of the package's, expected another")

@@ -6,6 +6,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.effects.composition import GarmentWithEffects
@@ -43,7 +44,7 @@ def cloth(
 ) -> GarmentWithEffects:
     """Returns a garment with effects, of a sheet held at nodes."""
     x, faces = mesh or sheet_mesh()
-    scheme = Scheme(np.asarray(held, dtype=np.int32), step, tolerance=1e-8, iterations=300)
+    scheme = Scheme(np.asarray(held, dtype=np.int32), step, ImplicitSettings(1e-8, 300))
 
     warp = np.tile([0.0, 0.0, -1.0], (len(faces), 1))
     return GarmentWithEffects(x, faces, warp, material, effects, scheme)

@@ -9,6 +9,8 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
+from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
 from drake_dress.models.cloth.scheme import Scheme
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.air import AirDrag
@@ -34,15 +36,10 @@ def swung(
     x, faces = sheet_mesh()
     top = np.flatnonzero(x[:, 2] == 0.0).astype(np.int32)
 
-    make = Scheme(
-        top,
-        step,
-        scheme == "projective",
-        tolerance=1e-6,
-        iterations=200,
-        accuracy=1e-7,
-        predicted=True,
-    )
+    settings: ImplicitSettings | ProjectiveSettings = ImplicitSettings(1e-6, 200)
+    if scheme == "projective":
+        settings = ProjectiveSettings(1e-7, quasi_newton=True, predicted=True)
+    make = Scheme(top, step, settings)
     warp = np.tile([0.0, 0.0, -1.0], (len(faces), 1))
     garment = GarmentWithEffects(x, faces, warp, SOFT, effects, make)
     state = ClothState.at_rest(x)
@@ -84,7 +81,10 @@ def test_contact_effects_slow_a_sheet_that_slides(
     none = np.zeros(0, dtype=np.int32)
     step = 2e-3
 
-    make = Scheme(none, step, scheme == "projective", tolerance=1e-8, accuracy=1e-7)
+    settings: ImplicitSettings | ProjectiveSettings = ImplicitSettings(1e-8)
+    if scheme == "projective":
+        settings = ProjectiveSettings(1e-7, quasi_newton=True)
+    make = Scheme(none, step, settings)
     warp = np.tile([0.0, 1.0, 0.0], (len(faces), 1))
     garment = GarmentWithEffects(x, faces[:, ::-1], warp, MATERIAL, [effect], make)
     v = np.tile([0.5, 0.0, 0.0], (len(x), 1))

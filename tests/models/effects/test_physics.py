@@ -9,7 +9,7 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth
+from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.air import AIR_DENSITY, PLATE_DRAG, AirDrag, Wind
 from drake_dress.models.effects.composition import GarmentWithEffects, largest_strain, world_points
@@ -273,7 +273,7 @@ def test_friction_across_and_along_the_warp_differ_as_the_contrast_says() -> Non
             np.tile([1.0, 0.0, 0.0], (len(faces), 1)),
             MATERIAL,
             [tilt, AnisotropicFriction(contrast=0.5)],
-            Scheme(np.zeros(0, dtype=np.int32), STEP, tolerance=1e-8, iterations=300),
+            Scheme(np.zeros(0, dtype=np.int32), STEP, ImplicitSettings(1e-8, 300)),
         )
         down = np.array([*direction, 0.0])
         start = np.tile(0.05 * down, (len(x), 1))
