@@ -10,9 +10,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import controller_policy, described_person, station_parameters
+from drake_dress.diagrams.assemble import described_person
 from drake_dress.diagrams.scenario import Scenario, load_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.report.log import RunLog
 
@@ -64,6 +64,5 @@ def logged_scenario(log: RunLog) -> Scenario:
 def logged_policy(log: RunLog) -> tuple[Scenario, DressingPolicy]:
     """Returns the scenario of a run and what planned in it, as the present code has both."""
     scenario = logged_scenario(log)
-    meshes, _ = garments(scenario, Path(log.file.filename))
-    person = described_person(station_parameters(scenario, meshes.belief))
-    return scenario, controller_policy(scenario, meshes.belief, person)
+    setup = read_setup(scenario, Path(log.file.filename))
+    return scenario, setup.policy(described_person(setup.station))

@@ -26,14 +26,15 @@ import scipy.sparse as sp
 from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario
 from benchmarks.parser import output_file
-from drake_dress.diagrams.build import material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.sections.person import measures, posture
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
+from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.person_model import PersonModel, person_obstacles
 from drake_dress.models.dressing.sleeve import SleeveState, loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -202,7 +203,7 @@ def _foresee(runs: Sequence[Run], variant: Variant | None) -> Foresight:
 def _cloth(run: Run, belief: GarmentMesh, variant: Variant) -> ExplicitBiasCloth:
     return ExplicitBiasCloth(
         make_elements(belief.rest_position, belief.faces),
-        material(run.scenario.controller.material),
+        Material(**vars(run.scenario.controller.material)),
         variant.time_step,
         belief.held,
         settings=ExplicitSettings(tolerance=1e-2, iterations=variant.iterations),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,9 @@ from benchmarks.cloth.table import Table
 from benchmarks.logged import logged_scenario, opened
 from benchmarks.parser import OneLineParser, exit_with
 from drake_dress.diagrams.arms import ArmReachError, set_up_arms
-from drake_dress.diagrams.build import placement
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.schema import Arms
+from drake_dress.diagrams.sections.station import placement
 from drake_dress.errors import UserError
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.resolved_rate import GripperGoal
@@ -118,8 +118,7 @@ def follow(run: Recorded, arms: Arms) -> Followed:
     Raises:
         ArmReachError: they do not reach where the run begins.
     """
-    station = replace(run.scenario.station, arms=arms)
-    stands = placement(replace(run.scenario, station=station))
+    stands = placement(arms, run.scenario.person)
     assert stands is not None
     setup = set_up_arms(stands, run.grippers[0], run.person(0))
     pair, q, rate = setup.pair, setup.start, np.zeros_like(setup.start)

@@ -25,11 +25,12 @@ from typing import Any
 from pydrake.geometry import Meshcat
 
 from drake_dress.diagrams import scenario as scenarios
-from drake_dress.diagrams.assemble import garments, parts, wired
+from drake_dress.diagrams.assemble import parts, wired
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.own_parts import NOTHING, OwnParts
 from drake_dress.diagrams.run import RunOptions, run_scenario
 from drake_dress.diagrams.scenario import Scenario, apply_variation, checked_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.file_output import RUN_FILES, prove_directory
 from drake_dress.models.control.costs import GarmentCost, PlannedStep, Slope
 from drake_dress.models.control.local_control import GlobalPlan
@@ -136,8 +137,7 @@ def make_dressing(
     if scenario.station.kind != "simulated":
         raise ValueError(f"the station is {scenario.station.kind}, expected simulated; see `run`")
     drawn = apply_variation(checked_scenario(scenario))
-    meshes, limits = garments(drawn, Path(base) / "scenario")
-    return wired(parts(drawn, meshes, limits, meshcat, own=own))
+    return wired(parts(read_setup(drawn, Path(base) / "scenario"), meshcat, own=own))
 
 
 def run(

@@ -11,11 +11,11 @@ import numpy as np
 from drake import lcmt_panda_status, lcmt_point_cloud
 
 from benchmarks.inputs.trials import Expect, Trial
-from drake_dress.diagrams.build import arm, beliefs, posture
-from drake_dress.diagrams.build import measures as measures_of
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.hardware_station import Beliefs
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.sections.hardware import beliefs
+from drake_dress.diagrams.setup import station_parameters
 from drake_dress.errors import UserError
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.arrays import FloatArray
@@ -66,13 +66,9 @@ def _believed() -> tuple[GarmentMesh, Beliefs, FloatArray]:
     """Returns garment, what is believed, and where the person's six points are, m."""
     scenario = load_scenario(_SCENARIO)
     mesh = build_garment(scenario.garment, scenario.controller.spacing, _SCENARIO.parent)
-    body, stance = measures_of(scenario.person), posture(scenario.person)
-    points = []
-    for side, pose in zip(
-        SIDES, (scenario.person.left_arm, scenario.person.right_arm), strict=True
-    ):
-        points.append(arm_points(body, stance, side, arm(pose)))
-    return mesh, beliefs(scenario, mesh), np.concatenate(points)
+    p = station_parameters(scenario, mesh)
+    points = [arm_points(p.measures, p.posture, side, p.arms[side]) for side in SIDES]
+    return mesh, beliefs(scenario.station.hardware.beliefs, p), np.concatenate(points)
 
 
 def _damaged(rng: Rng, message: bytes) -> tuple[str, bytes]:

@@ -12,8 +12,8 @@ import numpy as np
 import yaml
 
 from benchmarks.inputs.trials import Expect, Trial, place
-from drake_dress.diagrams.assemble import garments
 from drake_dress.diagrams.scenario import apply_variation, load_scenario, resolved_yaml
+from drake_dress.diagrams.setup import read_setup
 
 Rng = np.random.Generator
 _FOLDER = Path(__file__).parents[2] / "scenarios"
@@ -41,7 +41,7 @@ def draw_scenario(rng: Rng) -> Trial:
             return "it is another scenario now"
         wrong = _out_of_bounds(yaml.safe_load(resolved_yaml(scenario)))
         if wrong is None:
-            garments(apply_variation(scenario), path)
+            read_setup(apply_variation(scenario), path)
         return wrong
 
     return Trial(f"{mutate.__name__[1:]} {source.stem} {told}", expect, use)

@@ -18,8 +18,9 @@ from pydrake.systems.analysis import Simulator
 from rich.progress import Progress
 
 from benchmarks.local.recorded import write_problems
-from drake_dress.diagrams.assemble import garments, parts, wired
+from drake_dress.diagrams.assemble import parts, wired
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.errors import UserError
 from drake_dress.models.control.local_problem import LocalProblem
 
@@ -37,12 +38,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         settings = ["controller.method=full", *options.set]
         scenario = apply_variation(load_scenario(options.scenario, settings, options.seed))
-        meshes, limits = garments(scenario, options.scenario)
+        setup = read_setup(scenario, options.scenario)
     except UserError as error:
         print(f"record: {error}", file=sys.stderr)
         return 2
     problems: list[LocalProblem] = []
-    dressing = wired(parts(scenario, meshes, limits), record=problems)
+    dressing = wired(parts(setup), record=problems)
     simulator = Simulator(dressing.diagram)
     context = dressing.mpc.GetMyContextFromRoot(simulator.get_context())
     with Progress(disable=not sys.stderr.isatty()) as progress:

@@ -17,10 +17,10 @@ import numpy as np
 
 from benchmarks.plant.motion import DressingMotion
 from benchmarks.plant.replaying import Replayed, replay
-from drake_dress.diagrams.build import station_parameters
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
+from drake_dress.diagrams.setup import station_parameters
 from drake_dress.diagrams.station import plant_integrator
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.layered import Integrator

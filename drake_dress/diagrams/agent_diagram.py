@@ -7,13 +7,8 @@ from dataclasses import dataclass
 from pydrake.systems.framework import Diagram
 
 from drake_dress.diagrams.assemble import Parts
-from drake_dress.diagrams.build import rates
-from drake_dress.diagrams.dressing import (
-    ControlSetup,
-    add_governor,
-    command_grippers,
-    wire_governor,
-)
+from drake_dress.diagrams.dressing import add_governor, command_grippers, wire_governor
+from drake_dress.diagrams.planning import ControlSetup
 from drake_dress.diagrams.wiring import Wiring
 from drake_dress.systems.agent_request import AgentRequest
 from drake_dress.systems.safety_governor import SafetyGovernor
@@ -39,7 +34,7 @@ def make_agent_diagram(p: Parts) -> AgentDiagram:
     run; nothing plans.
     """
     w = Wiring(p.station)
-    control = ControlSetup(p.policy, rates(p.scenario), p.limits)
+    control = ControlSetup(p.policy, p.setup.rates, p.setup.limits)
     agent = w.add("agent", AgentRequest())
     governor = add_governor(w, control)
     wire_governor(w, agent, governor)

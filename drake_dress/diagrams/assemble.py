@@ -1,27 +1,15 @@
-"""From a scenario to the whole diagram."""
+"""From a scenario's setup to the whole diagram."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from pydrake.geometry import Meshcat
+from pydrake.multibody.plant import MultibodyPlant
 
-from drake_dress.diagrams.build import (
-    controller_policy,
-    described_person,
-    hardware_parameters,
-    local_setup,
-    planned_arms,
-    plant_station,
-    predictor,
-    rates,
-    safety_limits,
-    station_parameters,
-)
-from drake_dress.diagrams.dressing import ControlSetup, Dressing, make_dressing
-from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.arms import ArmSetup
+from drake_dress.diagrams.dressing import Dressing, make_dressing
 from drake_dress.diagrams.hardware_station import (
     at_start,
     listen,
@@ -29,119 +17,154 @@ from drake_dress.diagrams.hardware_station import (
     open_bus,
 )
 from drake_dress.diagrams.own_parts import NOTHING, OwnParts, own_controller
-from drake_dress.diagrams.scenario import Scenario
-from drake_dress.diagrams.station import Station, start_grippers
-from drake_dress.errors import UserError
+from drake_dress.diagrams.person import Person, add_person
+from drake_dress.diagrams.planning import ControlSetup
+from drake_dress.diagrams.sections.controller import local_setup, predictor
+from drake_dress.diagrams.sections.hardware import hardware_parameters
+from drake_dress.diagrams.setup import Setup
+from drake_dress.diagrams.station import (
+    Sight,
+    SimulatedStation,
+    Station,
+    StationParameters,
+    make_simulated_station,
+    robots_at_start,
+)
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
-from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log_writer import RunLogWriter
 
 
 @dataclass(frozen=True)
-class Garments:
-    """The plant's garment, and the controller's."""
-
-    plant: GarmentMesh
-    belief: GarmentMesh
-
-
-@dataclass(frozen=True)
 class Parts:
-    """What the diagram of a scenario is made of, before it is wired."""
+    """The parts of a scenario's diagram, before they are wired.
 
-    scenario: Scenario
-    garments: Garments
+    Attributes:
+        setup: the scenario's values.
+        station: simulated or hardware.
+        policy: of the global controller.
+        page: Meshcat page on which the run is shown, if it is.
+        in_worker: whether garment and global controller run in worker processes.
+        own: parts of a user's own.
+    """
+
+    setup: Setup
     station: Station
     policy: DressingPolicy
-    limits: SafetyLimits
-    page: Meshcat | None
+    page: Meshcat | None = None
     in_worker: bool = False
     own: OwnParts = NOTHING
 
 
-def garments(scenario: Scenario, source: Path) -> tuple[Garments, SafetyLimits]:
-    """Returns the scenario's garments, and the limits that its start is within.
+def simulated_station(
+    setup: Setup, page: Meshcat | None = None, in_worker: bool = False
+) -> SimulatedStation:
+    """Returns the simulated station, with estimates of the controller's garment.
 
     Args:
-        scenario: with nothing left to draw.
-        source: its file, for messages and paths relative to it.
-
-    Raises:
-        UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
+        setup: the scenario's values.
+        page: Meshcat page on which the run is shown, if it is.
+        in_worker: whether the garment is stepped in a worker process.
     """
-    plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
-    belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
-    limits = safety_limits(scenario)
-    broken = limits.broken_at(start_grippers(station_parameters(scenario, plant)))
-    if broken is not None:
-        raise UserError(str(source), "safety", f"{broken} at the start")
-    return Garments(plant, belief), limits
+    transfer = barycentric_transfer(setup.garments.plant, setup.garments.belief)
+    sight = Sight(transfer, setup.rates.command_period)
+    return make_simulated_station(replace(setup.station, in_worker=in_worker), page, sight)
 
 
 def parts(
-    scenario: Scenario,
-    meshes: Garments,
-    limits: SafetyLimits,
-    page: Meshcat | None = None,
-    in_worker: bool = False,
-    own: OwnParts = NOTHING,
+    setup: Setup, page: Meshcat | None = None, in_worker: bool = False, own: OwnParts = NOTHING
 ) -> Parts:
-    """Returns the parts of a scenario's diagram.
+    """Returns the parts of a simulated scenario's diagram.
 
     Args:
-        scenario: with nothing left to draw.
-        meshes: its garments.
-        limits: within which it starts.
-        page: where the run is shown, if it is.
-        in_worker: whether the true garment is stepped, and the global controller solves, in
-            processes of their own.
+        setup: the scenario's values.
+        page: Meshcat page on which the run is shown, if it is.
+        in_worker: whether the garment is stepped, and the global controller solves, in worker
+            processes.
         own: parts of a user's own.
+
+    Raises:
+        ArmReachError: the arms do not reach where the run begins.
     """
-    station = plant_station(scenario, meshes.plant, page, meshes.belief, in_worker)
-    policy = controller_policy(scenario, meshes.belief, station.person, own.costs)
-    return Parts(scenario, meshes, station, policy, limits, page, in_worker, own)
+    station = simulated_station(setup, page, in_worker)
+    return Parts(setup, station, setup.policy(station.person, own.costs), page, in_worker, own)
 
 
 def hardware_parts(
-    scenario: Scenario,
-    meshes: Garments,
-    limits: SafetyLimits,
+    setup: Setup,
     page: Meshcat | None = None,
     told: Callable[[str], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
     own: OwnParts = NOTHING,
 ) -> Parts:
-    """Returns the parts of a scenario's diagram whose station is behind messages.
+    """Returns the parts of a diagram whose station is hardware behind LCM messages.
+
+    The true garment is unknown, so the controller's garment replaces it.
 
     Args:
-        scenario: with nothing left to draw.
-        meshes: its garments; the controller's alone is used, and stands for both then.
-        limits: within which it starts.
-        page: where the run is shown, if it is.
-        told: is called with each source that is heard.
-        stopped: whether to give up waiting.
+        setup: the scenario's values.
+        page: Meshcat page on which the run is shown, if it is.
+        told: called with the name of each source when its first message arrives.
+        stopped: returns whether to give up waiting.
         own: parts of a user's own.
 
     Raises:
         ArmReachError: the arms do not reach where the run begins.
         StationSilentError: a source is silent.
-        NotAtStartError: an arm is elsewhere.
-        NoBusError: there is no such bus.
+        NotAtStartError: an arm is not at its start.
+        NoBusError: the bus cannot be opened.
     """
-    at = station_parameters(scenario, meshes.belief)
-    person = described_person(at)
-    planned = planned_arms(at, person)
-    policy = controller_policy(scenario, meshes.belief, person, own.costs)
-    p = hardware_parameters(scenario, meshes.belief)
-    # subscriptions in Python end with their bus: a run has none
+    setup = setup.as_estimated()
+    person = described_person(setup.station)
+    planned = planned_arms(setup.station, person)
+    policy = setup.policy(person, own.costs)
+    p = hardware_parameters(setup.scenario.station, setup.station)
+    # Subscriptions from Python live as long as their bus: the run opens one without any.
     heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
     robots = at_start(p, planned, heard.joints)
-    lcm = open_bus(p.links.lcm_url)
-    station = make_hardware_station(p, lcm, person, robots, heard)
-    believed = Garments(meshes.belief, meshes.belief)
-    return Parts(scenario, believed, station, policy, limits, page, own=own)
+    station = make_hardware_station(p, open_bus(p.links.lcm_url), person, robots, heard)
+    return Parts(setup, station, policy, page, own=own)
+
+
+def described_person(p: StationParameters) -> Person:
+    """Returns the person in a plant of its own, which is never simulated."""
+    return add_person(
+        MultibodyPlant(p.body_time_step), p.measures, p.posture, p.arms, p.joints, turns=False
+    )
+
+
+def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
+    """Returns both arms where a run begins.
+
+    Raises:
+        ArmReachError: they do not reach there, or not where a dressing leads.
+    """
+    if p.placement is None:
+        raise ValueError("grippers float, expected arms")
+    return robots_at_start(p, p.placement, p.measures, person)
+
+
+def control_setup(p: Parts, record: list[LocalProblem] | None = None) -> ControlSetup:
+    """Returns the controllers of a scenario.
+
+    Args:
+        p: its parts.
+        record: list to which the local controller appends the problems that it solves.
+    """
+    controller, own = p.setup.scenario.controller, p.own
+    local = None if own.controller is not None else local_setup(controller, p.policy)
+    if local is not None and record is not None:
+        local = replace(local, record=record)
+    return ControlSetup(
+        p.policy,
+        p.setup.rates,
+        p.setup.limits,
+        own.predictor or predictor(controller),
+        local,
+        p.in_worker,
+        None if own.controller is None else own_controller(own.controller),
+    )
 
 
 def wired(
@@ -150,20 +173,9 @@ def wired(
     """Returns the diagram.
 
     Args:
-        p: of which it is made; they serve one diagram.
+        p: its parts, which serve one diagram.
         writer: open log, if one is kept.
-        record: takes the local problems that are solved, if given.
+        record: list to which the local controller appends the problems that it solves.
     """
-    local = None if p.own.controller is not None else local_setup(p.scenario, p.policy)
-    if local is not None and record is not None:
-        local = replace(local, record=record)
-    control = ControlSetup(
-        p.policy,
-        rates(p.scenario),
-        p.limits,
-        p.own.predictor or predictor(p.scenario),
-        local,
-        p.in_worker,
-        None if p.own.controller is None else own_controller(p.own.controller),
-    )
-    return make_dressing(p.station, p.garments.plant, control, writer, p.page)
+    control = control_setup(p, record)
+    return make_dressing(p.station, p.setup.garments.plant, control, writer, p.page)

@@ -15,8 +15,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from drake_dress.diagrams.build import placement
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.sections.station import placement
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_bytes, write_text
 from drake_dress.models.arm.panda import LIMITS, panda
@@ -62,7 +62,7 @@ def calibrate_camera(
     Raises:
         UserError: a file cannot be used, or no pose can be found.
     """
-    where = placement(scenario)
+    where = placement(scenario.station.arms, scenario.person)
     if where is None:
         raise UserError(str(source), "station.arms.model", "is floating, expected panda")
     arm = panda(where.base(side))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,71 +12,18 @@ from pydrake.systems.framework import Diagram
 from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.arms import ArmSetup
+from drake_dress.diagrams.planning import ControlSetup, LocalSetup, add_planning
 from drake_dress.diagrams.station import MOTION, Station
 from drake_dress.diagrams.wiring import Wiring
-from drake_dress.models.control.local_control import LocalController, LocalState
-from drake_dress.models.control.local_problem import LocalProblem
-from drake_dress.models.control.policy import DressingPolicy
-from drake_dress.models.control.safety import SafetyLimits
+from drake_dress.models.control.local_control import LocalState
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_controller import ArmController
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
-from drake_dress.systems.human_predictor import HumanPredictor
-from drake_dress.systems.local_controller import LocalCompensation
-from drake_dress.systems.plan_follower import PlanFollower
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.safety_governor import SafetyGovernor
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Periods and delays of the controllers, and of the plant, s."""
-
-    global_period: float
-    global_delay: float
-    command_period: float
-    log_period: float
-    arm_period: float
-    plant_period: float
-    arm_offset: float = 0.0005
-
-
-@dataclass(frozen=True)
-class LocalSetup:
-    """The local controller, and how often it is asked.
-
-    Attributes:
-        controller: does the work.
-        period: between solves, s. delay: of their use, s.
-        feedback: whether it corrects between solves.
-        joints_step: between the joints predicted for it, s; joints_count: how many beyond now.
-        record: takes each problem that it solves, if given.
-    """
-
-    controller: LocalController
-    period: float
-    delay: float
-    feedback: bool
-    joints_step: float
-    joints_count: int
-    record: list[LocalProblem] | None = None
-
-    def system(self, in_worker: bool = False) -> LocalCompensation:
-        """Returns it as a system; with `in_worker` it solves on a background thread."""
-        return LocalCompensation(
-            self.controller,
-            self.period,
-            self.delay,
-            self.joints_step,
-            self.joints_count,
-            self.feedback,
-            self.record,
-            in_worker,
-        )
 
 
 @dataclass(frozen=True)
@@ -121,41 +68,18 @@ class Dressing:
 
 
 @dataclass(frozen=True)
-class ControlSetup:
-    """The controllers: what they are made of, and how they are timed and limited.
-
-    Attributes:
-        policy: of the global controller, with the controller's garment.
-        rates: of controllers and log.
-        limits: that the governor keeps between controllers and grippers.
-        predictor: of the person's arms; by default they are believed to stay.
-        local: the local controller between plan and governor; the plan is followed when None.
-        in_worker: whether controllers solve in the background, the global one in a worker process.
-        own: the user's system that requests velocities in place of all of these; see `OwnParts`.
-    """
-
-    policy: DressingPolicy
-    rates: Rates
-    limits: SafetyLimits
-    predictor: MotionPredictor = field(default_factory=StillPredictor)
-    local: LocalSetup | None = None
-    in_worker: bool = False
-    own: Any = None
-
-
-@dataclass(frozen=True)
 class _Controllers:
     """The systems that control the grippers, from the plan down to the arms' joints.
 
     Attributes:
         mpc: the global controller.
-        asking: what turns plans into requested velocities.
+        requests: what turns plans into requested velocities.
         governor: of safety.
         arms: of the joints; None where grippers float.
     """
 
     mpc: GlobalMpc
-    asking: Any
+    requests: Any
     governor: SafetyGovernor
     arms: ArmController | None
 
@@ -189,32 +113,11 @@ def make_dressing(
 
 def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
     """Adds the controllers, wired to each other and to the station."""
-    policy, rates, p = control.policy, control.rates, control.policy.parameters
-    predicted = w.add("human_predictor", HumanPredictor(control.predictor, p.time_step, p.horizon))
-    mpc = w.add(
-        "global_mpc",
-        GlobalMpc(
-            policy,
-            rates.global_period,
-            rates.global_delay,
-            waits=not w.of.in_real_time,
-            in_worker=control.in_worker,
-        ),
-    )
-    asking = w.add(*_plan_to_request(control))
+    planning = add_planning(w.builder, control, w.feed, waits=not w.of.in_real_time)
     governor = add_governor(w, control)
-    w.connect(w.station, "estimate.joint_position", predicted, "joint_position")
-    for quantity in MOTION:
-        w.connect(w.station, f"estimate.garment_{quantity}", mpc, f"garment_{quantity}")
-    w.connect(predicted, "predicted_joint_position", mpc, "predicted_joint_position")
-    if control.own is not None:
-        _add_own_inputs(w, mpc, control.own)
-    else:
-        w.connect(mpc, "plan", asking, "plan")
-    if control.local is not None:
-        _add_local_inputs(w, control.local, control.predictor, asking)
-    wire_governor(w, asking, governor)
-    return _Controllers(mpc, asking, governor, command_grippers(w, control, governor))
+    wire_governor(w, planning.requests, governor)
+    arms = command_grippers(w, control, governor)
+    return _Controllers(planning.mpc, planning.requests, governor, arms)
 
 
 def add_governor(w: Wiring, control: ControlSetup) -> SafetyGovernor:
@@ -248,58 +151,20 @@ def command_grippers(
     return None
 
 
-def _plan_to_request(control: ControlSetup) -> tuple[str, Any]:
-    """Returns name and system of what turns plans into requested velocities."""
-    if control.own is not None:
-        return "own_controller", control.own
-    if control.local is None:
-        return "plan_follower", PlanFollower()
-    return "local_controller", control.local.system(control.in_worker)
-
-
-def _add_own_inputs(w: Wiring, mpc: GlobalMpc, controller: Any) -> None:
-    """Connects those of its input ports that a user's controller has."""
-    sources = {
-        "plan": mpc.GetOutputPort("plan"),
-        "garment_position": w.station.GetOutputPort("estimate.garment_position"),
-        "joint_position": w.station.GetOutputPort("estimate.joint_position"),
-    }
-    for side in SIDES:
-        for quantity in ("position", "force"):
-            measured = w.station.GetOutputPort(f"{side}_gripper.{quantity}_measured")
-            sources[f"{side}_gripper_{quantity}"] = measured
-    for name, source in sources.items():
-        if controller.HasInputPort(name):
-            w.builder.Connect(source, controller.GetInputPort(name))
-
-
-def _add_local_inputs(
-    w: Wiring, local: LocalSetup, believed: MotionPredictor, controller: LocalCompensation
-) -> None:
-    """Gives the local controller what it sees, and a prediction at steps of its own."""
-    soon = w.add(
-        "near_human_predictor", HumanPredictor(believed, local.joints_step, local.joints_count)
-    )
-    w.connect(w.station, "estimate.joint_position", soon, "joint_position")
-    w.connect(w.station, "estimate.garment_position", controller, "garment_position")
-    w.connect(soon, "predicted_joint_position", controller, "predicted_joint_position")
-    _show_grippers(w, controller, "position")
-
-
-def wire_governor(w: Wiring, asking: Any, governor: SafetyGovernor) -> None:
-    """Gives the governor what the station measures, and the requests of a system.
+def wire_governor(w: Wiring, requests: Any, governor: SafetyGovernor) -> None:
+    """Connects the governor to the station's measurements and to a system's requests.
 
     Args:
-        w: the diagram in the making.
-        asking: with outputs `{left,right}_velocity_request` and `request_time`.
+        w: the diagram being built.
+        requests: a system with outputs `{left,right}_velocity_request` and `request_time`.
         governor: of safety.
     """
-    w.connect(asking, "request_time", governor, "request_time")
+    w.connect(requests, "request_time", governor, "request_time")
     w.connect(w.station, "permission", governor, "permission")
     w.connect(w.station, "estimate.joint_position", governor, "joint_position")
     _show_grippers(w, governor, "position", "force")
     for side in SIDES:
-        w.connect(asking, f"{side}_velocity_request", governor, f"{side}_velocity_request")
+        w.connect(requests, f"{side}_velocity_request", governor, f"{side}_velocity_request")
 
 
 def _show_grippers(w: Wiring, system: Any, *quantities: str) -> None:
@@ -369,7 +234,7 @@ def _add_recorder(
                 measured = f"{side}_arm.{quantity}_measured"
                 w.connect(w.station, measured, recorder, f"{side}_arm_{quantity}")
     if control.local is not None:
-        w.connect(controllers.asking, "solve_time", recorder, "local_solve_time")
+        w.connect(controllers.requests, "solve_time", recorder, "local_solve_time")
     if w.sees_truth:
         for name in ("contact", "contact_force", "body_poses"):
             w.connect(w.station, f"cheat_{name}", recorder, name)

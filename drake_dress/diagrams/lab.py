@@ -10,13 +10,13 @@ from pydrake.systems.analysis import Simulator
 from rich.console import Console
 
 from drake_dress.diagrams.arms import ArmReachError
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import plant_station, station_parameters
+from drake_dress.diagrams.assemble import simulated_station
 from drake_dress.diagrams.hardware_station import NoBusError, open_bus
 from drake_dress.diagrams.lab_diagram import Lab, make_lab
 from drake_dress.diagrams.run import NOT_DRESSED, concluded
 from drake_dress.diagrams.run_log import open_run_log
 from drake_dress.diagrams.scenario import Scenario, apply_variation
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.diagrams.studio import Studio
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed, remove_results
@@ -50,24 +50,24 @@ def run_lab(
     scenario = apply_variation(scenario)
     if scenario.station.arms.model != "panda":
         raise UserError(str(source), "station.arms.model", "is floating, expected panda")
-    meshes, _ = garments(scenario, source)
+    setup = read_setup(scenario, source)
     url = scenario.station.hardware.lcm_url
     try:
         lcm = open_bus(url)
-        station = plant_station(scenario, meshes.plant, None, meshes.belief)
+        station = simulated_station(setup)
     except ArmReachError as error:
         raise UserError(str(source), "station.arms", str(error)) from error
     except NoBusError as error:
         raise UserError(str(source), "station.hardware.lcm_url", str(error)) from error
     take = None
     if scenario.station.cameras:
-        take = WorkerProcess(Studio(station_parameters(scenario, meshes.plant))).submit
+        take = WorkerProcess(Studio(setup.station)).submit
     with claimed("--out", out):
         with (
             caught_interrupt() as interrupt,
-            open_run_log(out, scenario, meshes, station) as writer,
+            open_run_log(out, setup, station) as writer,
         ):
-            lab = make_lab(scenario, station, lcm, meshes.plant, meshes.belief, writer, take)
+            lab = make_lab(setup, station, lcm, writer, take)
             simulator = _rehearsed(lab, realtime_rate)
             # a look at all garbage takes 0.1 s, for which no status would be sent
             with left_out_of_garbage():

@@ -18,16 +18,14 @@ from pydrake.systems.lcm import (
     SerializerInterface,
 )
 
-from drake_dress.diagrams.build import cameras as station_cameras
-from drake_dress.diagrams.build import links
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.hardware_station import control_modes
-from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.sections.hardware import links
+from drake_dress.diagrams.setup import Setup
 from drake_dress.diagrams.station import ARM_STATUS, MOTION, SimulatedStation
 from drake_dress.diagrams.studio import add_picture_messages
 from drake_dress.diagrams.wiring import Wiring
 from drake_dress.models.arm.panda import LIMITS
-from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.injection import InjectedFault
@@ -70,40 +68,36 @@ class Lab:
 
 
 def make_lab(
-    scenario: Scenario,
+    setup: Setup,
     station: SimulatedStation,
     lcm: DrakeLcm,
-    mesh: GarmentMesh,
-    belief: GarmentMesh,
     writer: RunLogWriter | None,
     take: Take | None = None,
 ) -> Lab:
     """Returns a station behind its messages.
 
     Args:
-        scenario: of the lab.
+        setup: of the lab's scenario.
         station: with arms and estimates.
         lcm: its bus.
-        mesh: the true garment.
-        belief: the one that is reported of.
         writer: of the lab's own log, if one is kept.
         take: has pictures taken elsewhere; they are taken on the way, which holds up the arms,
             when None.
     """
-    make = _LabMaker(scenario, station, lcm)
+    make = _LabMaker(setup, station, lcm)
     for side in SIDES:
         make.receive_commands(side)
         make.send_status(side)
     garment = [make.station.GetOutputPort(f"estimate.garment_{q}") for q in MOTION]
-    make.send_points("garment", len(belief.rest_position), garment)
+    make.send_points("garment", len(setup.garments.belief.rest_position), garment)
     make.send_points("person", 6, [make.noisy_person()])
-    for camera in station_cameras(scenario):
+    for camera in setup.station.cameras:
         if take is None:
             make.send_pictures(camera)
         else:
             make.send_pictures_taken_elsewhere(camera, take)
     if writer is not None:
-        make.record(mesh, belief, writer)
+        make.record(writer)
     diagram = make.builder.Build()
     diagram.set_name("lab")
     return Lab(diagram, station, make.watch, make.player, lcm)
@@ -112,10 +106,11 @@ def make_lab(
 class _LabMaker(Wiring):
     """A lab's diagram in the making: station, bus, and who plays its faults."""
 
-    def __init__(self, scenario: Scenario, station: SimulatedStation, lcm: DrakeLcm) -> None:
+    def __init__(self, setup: Setup, station: SimulatedStation, lcm: DrakeLcm) -> None:
         super().__init__(station)
-        self.scenario, self.lcm = scenario, lcm
-        self.hardware, self.links = scenario.station.hardware, links(scenario)
+        scenario = setup.scenario
+        self.setup, self.scenario, self.lcm = setup, scenario, lcm
+        self.hardware, self.links = scenario.station.hardware, links(scenario.station)
         self.faults = [
             InjectedFault(f.kind, f.source, f.start, f.duration) for f in scenario.lab.faults
         ]
@@ -231,18 +226,18 @@ class _LabMaker(Wiring):
             self.connect(self.station, name, outbox, port)
         self.connect(self.player, "since", outbox, "since")
 
-    def record(self, mesh: GarmentMesh, belief: GarmentMesh, writer: RunLogWriter) -> None:
+    def record(self, writer: RunLogWriter) -> None:
         """Adds what writes the lab's own log."""
         recorder = self.add(
             "run_recorder",
             RunRecorder(
                 writer,
-                mesh,
-                len(belief.rest_position),
+                self.setup.garments.plant,
+                len(self.setup.garments.belief.rest_position),
                 self.of.person.placed_capsules,
-                1.0 / self.scenario.log.rate,
-                1.0 / self.scenario.controller.command_rate,
-                arm_period=self.scenario.plant.body_time_step,
+                self.setup.rates.log_period,
+                self.setup.rates.command_period,
+                arm_period=self.setup.rates.plant_period,
                 has_control=False,
             ),
         )

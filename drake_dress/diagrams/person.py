@@ -36,6 +36,7 @@ from pydrake.systems.framework import Context
 from drake_dress.diagrams.body_contact import add_body_contact
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.human.arm import JOINT_NAMES, Arm, Arms
 from drake_dress.models.human.body import (
     ArmPose,
@@ -243,6 +244,15 @@ def person_arms(
         np.stack([[np.minimum(limits[0], r), np.maximum(limits[1], r)] for r in rest]),
         np.array([joints.shoulder_stiffness] * 3 + [joints.elbow_stiffness]),
         np.array([joints.shoulder_damping] * 3 + [joints.elbow_damping]),
+    )
+
+
+def person_model(body: BodyMeasures, stance: Posture, person: Person) -> PersonModel:
+    """Returns the controllers' model of a person: capsules, shoulders and limb radii."""
+    return PersonModel(
+        capsules=person.capsules,
+        shoulders=np.stack([shoulder_joint(body, stance, side) for side in SIDES]),
+        radius=(body.upper_arm_radius, body.forearm_radius, body.hand_radius),
     )
 
 

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress.diagrams.arms import ArmReachError
-from drake_dress.diagrams.assemble import Garments, Parts, garments, hardware_parts, parts, wired
+from drake_dress.diagrams.assemble import Parts, hardware_parts, parts, wired
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.hardware_station import (
     NoBusError,
@@ -27,11 +27,11 @@ from drake_dress.diagrams.own_parts import NOTHING, OwnParts
 from drake_dress.diagrams.pace import SteadyPace
 from drake_dress.diagrams.run_log import open_run_log
 from drake_dress.diagrams.scenario import Scenario, apply_variation
+from drake_dress.diagrams.setup import Setup, read_setup
 from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.machine import left_out_of_garbage
-from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.replay_html import write_replay_html
@@ -87,10 +87,9 @@ def run_scenario(
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
             hardware is silent, or not where the run begins; or another run writes to `out`.
     """
-    scenario = apply_variation(scenario)
-    meshes, limits = garments(scenario, source)
+    setup = read_setup(apply_variation(scenario), source)
     page = _open_meshcat(options.told) if options.meshcat else None
-    p = _parts(scenario, source, meshes, limits, page, options.in_workers, own)
+    p = _parts(setup, page, options.in_workers, own)
     rate = options.realtime_rate
     if p.station.in_real_time:
         rate = rate or 1.0
@@ -99,7 +98,7 @@ def run_scenario(
         begin = clock.perf_counter()
         with (
             caught_interrupt() as interrupt,
-            open_run_log(out, scenario, p.garments, p.station) as writer,
+            open_run_log(out, p.setup, p.station) as writer,
         ):
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
@@ -115,26 +114,17 @@ def run_scenario(
         return concluded(out, wall_time, options.report, by, options.told)
 
 
-def _parts(
-    scenario: Scenario,
-    source: Path,
-    meshes: Garments,
-    limits: SafetyLimits,
-    page: Meshcat | None,
-    in_worker: bool,
-    own: OwnParts,
-) -> Parts:
-    """Returns the parts of the diagram; a problem with arms or hardware is the user's to know."""
+def _parts(setup: Setup, page: Meshcat | None, in_worker: bool, own: OwnParts) -> Parts:
+    """Returns the parts of the diagram; problems with arms or hardware become user errors."""
+    source, station = str(setup.source), setup.scenario.station
     arms, hardware = "station.arms", "station.hardware"
     try:
-        if scenario.station.kind == "simulated":
-            return parts(scenario, meshes, limits, page, in_worker, own)
+        if station.kind == "simulated":
+            return parts(setup, page, in_worker, own)
         with caught_interrupt() as interrupt:
-            print(f"listening: {scenario.station.hardware.lcm_url}", flush=True)
+            print(f"listening: {station.hardware.lcm_url}", flush=True)
             p = hardware_parts(
-                scenario,
-                meshes,
-                limits,
+                setup,
                 page,
                 lambda name: print(f"heard: {name.replace('_', ' ')}", flush=True),
                 interrupt.is_set,
@@ -144,13 +134,13 @@ def _parts(
             raise interrupt.error()
         return p
     except ArmReachError as error:
-        raise UserError(str(source), arms, str(error)) from error
+        raise UserError(source, arms, str(error)) from error
     except NoBusError as error:
-        raise UserError(str(source), f"{hardware}.lcm_url", str(error)) from error
+        raise UserError(source, f"{hardware}.lcm_url", str(error)) from error
     except (StationSilentError, NotAtStartError) as error:
         if isinstance(error, StationSilentError) and interrupt.is_set():
             raise interrupt.error() from None
-        raise UserError(str(source), hardware, str(error)) from error
+        raise UserError(source, hardware, str(error)) from error
 
 
 def _open_meshcat(told: Callable[[str], None]) -> Meshcat | None:

@@ -6,26 +6,23 @@ from pathlib import Path
 
 from drake_dress import __version__
 from drake_dress.diagrams.arms import arm_bases
-from drake_dress.diagrams.assemble import Garments
-from drake_dress.diagrams.scenario import Scenario, resolved_yaml
+from drake_dress.diagrams.scenario import resolved_yaml
+from drake_dress.diagrams.setup import Setup
 from drake_dress.diagrams.station import Station
 from drake_dress.file_output import RUN_FILES
 from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 
 
-def open_run_log(
-    out: Path, scenario: Scenario, garments: Garments, station: Station
-) -> RunLogWriter:
-    """Returns the log in a folder, begun with what does not change.
+def open_run_log(out: Path, setup: Setup, station: Station) -> RunLogWriter:
+    """Returns a log with its constant content written.
 
     Args:
-        out: folder; the results of a run before are removed from it.
-        scenario: with its variation drawn.
-        garments: of plant and controller.
-        station: of which the log is.
+        out: folder; the results of an earlier run are removed from it.
+        setup: of the scenario.
+        station: that is logged.
     """
-    person = station.person
+    person, scenario, garments = station.person, setup.scenario, setup.garments
     return RunLogWriter(
         out / RUN_FILES[0],
         LogContent(

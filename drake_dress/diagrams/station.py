@@ -58,7 +58,13 @@ from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
 from drake_dress.diagrams.cameras import Camera, export_cameras
 from drake_dress.diagrams.oracles import export_oracles
 from drake_dress.diagrams.panda_driver import SimPandaDriver
-from drake_dress.diagrams.person import JointParameters, Person, add_person, person_arms
+from drake_dress.diagrams.person import (
+    JointParameters,
+    Person,
+    add_person,
+    person_arms,
+    person_model,
+)
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.arrays import FloatArray
@@ -69,7 +75,7 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
 from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
 from drake_dress.models.cloth.state import ClothState
-from drake_dress.models.control.person_model import PersonModel, person_capsules
+from drake_dress.models.control.person_model import person_capsules
 from drake_dress.models.effects.composition import (
     GarmentWithEffects,
     body_with_effects,
@@ -86,7 +92,6 @@ from drake_dress.models.human.body import (
     Posture,
     arm_points,
     shoulder_height,
-    shoulder_joint,
 )
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log_writer import RunLogWriter
@@ -437,12 +442,7 @@ def _joined(builder: DiagramBuilder, first: OutputPort, second: OutputPort) -> O
 def person_at_rest(p: StationParameters, body: BodyMeasures, person: Person) -> Capsules:
     """Returns the person's capsules before anything moves."""
     joints = np.concatenate([arm_points(body, p.posture, side, p.arms[side]) for side in SIDES])
-    model = PersonModel(
-        capsules=person.capsules,
-        shoulders=np.stack([shoulder_joint(body, p.posture, side) for side in SIDES]),
-        radius=(body.upper_arm_radius, body.forearm_radius, body.hand_radius),
-    )
-    return Capsules(*person_capsules(model, joints))
+    return Capsules(*person_capsules(person_model(body, p.posture, person), joints))
 
 
 def hung_garment(p: StationParameters) -> FloatArray:

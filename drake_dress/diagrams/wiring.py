@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, InputPort
 
 from drake_dress.diagrams.station import Station
 
@@ -39,3 +39,7 @@ class Wiring:
     def connect(self, source: Any, output: str, target: Any, port: str) -> None:
         """Connects an output of one system to an input of another."""
         self.builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
+
+    def feed(self, output: str, port: InputPort) -> None:
+        """Connects an output of the station to an input port."""
+        self.builder.Connect(self.station.GetOutputPort(output), port)

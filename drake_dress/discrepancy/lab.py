@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drake_dress.diagrams.build import arm, effects, material, measures, posture
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.sections.effects import effects
+from drake_dress.diagrams.sections.person import arms, measures, posture
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
@@ -89,12 +90,12 @@ class Lab:
         )
         return Lab(
             build_garment(scenario.garment, numerics.spacing, base),
-            material(p.material),
+            Material(**vars(p.material)),
             numerics,
             measures(scenario.person),
             posture(scenario.person),
-            {"left": arm(scenario.person.left_arm), "right": arm(scenario.person.right_arm)},
-            effects(scenario),
+            arms(scenario.person),
+            effects(scenario.effects),
         )
 
     @property

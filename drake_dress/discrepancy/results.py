@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from drake_dress import __version__
-from drake_dress.diagrams.build import effects as effects_on
 from drake_dress.diagrams.scenario import Scenario, resolved_yaml
+from drake_dress.diagrams.sections.effects import effects
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import DISCRETISATION, Explanation
 from drake_dress.discrepancy.prediction_windows import Windows
@@ -81,7 +81,7 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
     """Returns the scenario with what was found, as YAML that `drake-dress run` takes."""
     content = read_yaml("scenario", resolved_yaml(scenario))
     found: dict[str, Any] = {}
-    for effect in effects_on(scenario):
+    for effect in effects(scenario.effects):
         found[effect.NAME] = effect.values()
     for c in explanation.causes:
         if c.effect is None:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.build import local_setup
 from drake_dress.diagrams.controller_diagram import make_controller_diagram
 from drake_dress.diagrams.release import release
+from drake_dress.diagrams.sections.controller import local_setup
 from drake_dress.gym.environment import DressingEnv
 from drake_dress.gym.observations import Observation
 from drake_dress.models.sides import SIDES
@@ -52,7 +52,7 @@ class ControllerPolicy:
         """Begins anew, with the person and garment of the environment's episode."""
         parts = self._env.parts
         self.close()
-        local = local_setup(parts.scenario, parts.policy)
+        local = local_setup(parts.setup.scenario.controller, parts.policy)
         self._has_local = local is not None
         # what the controllers request is used from their delay on
         self._delay = 0.0 if local is None else local.delay

@@ -126,7 +126,7 @@ class Observer:
     def _update_stages(self, x: FloatArray, joints: FloatArray) -> None:
         """Updates the stages as often as the scenario's global controller does."""
         parts, now = self._world.parts, self._world.time
-        if now < self._looks * parts.scenario.controller.global_mpc.period - 1e-9:
+        if now < self._looks * parts.setup.scenario.controller.global_mpc.period - 1e-9:
             return
         self._looks += 1
         self._stages, _ = parts.policy.planner.assign(self._stages, x, joints, now)

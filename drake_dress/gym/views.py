@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.diagrams.build import measures, posture
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.schema import Camera
+from drake_dress.diagrams.sections.person import measures, posture
 from drake_dress.models.human.body import shoulder_height
 
 # From behind and aside, where both openings and both hands are seen.

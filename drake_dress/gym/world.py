@@ -11,10 +11,11 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.agent_diagram import make_agent_diagram
 from drake_dress.diagrams.arms import ArmReachError
-from drake_dress.diagrams.assemble import Garments, Parts, garments, parts
+from drake_dress.diagrams.assemble import Parts, parts
 from drake_dress.diagrams.garment import build_garment_like
 from drake_dress.diagrams.release import release
 from drake_dress.diagrams.scenario import Scenario, apply_variation
+from drake_dress.diagrams.setup import Garments, read_setup
 from drake_dress.errors import UserError
 from drake_dress.gym.reward import Loads
 from drake_dress.models.arrays import FloatArray, IntArray
@@ -99,12 +100,12 @@ class World:
     @property
     def truth(self) -> GarmentMesh:
         """The plant's garment at rest."""
-        return self.parts.garments.plant
+        return self.parts.setup.garments.plant
 
     @property
     def belief(self) -> GarmentMesh:
         """The controller's garment at rest."""
-        return self.parts.garments.belief
+        return self.parts.setup.garments.belief
 
     def value(self, port: str) -> FloatArray:
         """Returns a copy of a vector port of the station, by its name, in rows of three."""
@@ -157,11 +158,11 @@ def draw(nominal: Scenario, seed: int) -> Scenario:
 
 
 def _parts(drawn: Scenario, nominal: Scenario, source: Path) -> Parts:
-    meshes, limits = garments(drawn, source)
+    setup = read_setup(drawn, source)
     belief = build_garment_like(
         drawn.garment, nominal.garment, nominal.controller.spacing, source.parent
     )
     try:
-        return parts(drawn, Garments(meshes.plant, belief), limits)
+        return parts(replace(setup, garments=Garments(setup.garments.plant, belief)))
     except ArmReachError as error:
         raise UserError(str(source), "station.arms", f"seed {drawn.seed}: {error}") from error

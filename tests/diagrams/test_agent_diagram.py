@@ -3,8 +3,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.agent_diagram import make_agent_diagram
-from drake_dress.diagrams.assemble import Parts, garments, parts, wired
+from drake_dress.diagrams.assemble import Parts, parts, wired
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.models.sides import SIDES
 from drake_dress.shipped import shipped_scenario
 
@@ -15,8 +16,7 @@ COARSE = ("plant.spacing=0.05", "plant.self_collision=false")
 def made_of(*overrides: str) -> Parts:
     """Returns the parts of a scenario with a coarse garment."""
     scenario = apply_variation(load_scenario(SOURCE, [*COARSE, *overrides]))
-    meshes, limits = garments(scenario, SOURCE)
-    return parts(scenario, meshes, limits)
+    return parts(read_setup(scenario, SOURCE))
 
 
 def test_an_agent_that_asks_as_the_controllers_do_has_their_run() -> None:

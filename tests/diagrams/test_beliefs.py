@@ -10,19 +10,14 @@ from drake import lcmt_panda_status
 from pydrake.lcm import DrakeLcm
 
 from drake_dress.__main__ import main
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import (
-    beliefs,
-    described_person,
-    hardware_parameters,
-    planned_arms,
-    station_parameters,
-)
+from drake_dress.diagrams.assemble import described_person, planned_arms
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.hardware_station import Heard, StationSilentError, listen
 from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.diagrams.scenario.ranges import range_of
 from drake_dress.diagrams.scenario.schema import Beliefs
+from drake_dress.diagrams.sections.hardware import beliefs, hardware_parameters
+from drake_dress.diagrams.setup import read_setup, station_parameters
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.garment_belief import GarmentTrack, judge_garment
 from drake_dress.models.supervision.person_belief import PersonTrack, judge_person
@@ -63,7 +58,7 @@ def test_a_dressing_is_believed_from_its_first_message_to_its_last(
 ) -> None:
     scenario, log = dressing
     mesh = build_garment(scenario.garment, scenario.controller.spacing, LAB.parent)
-    bounds = beliefs(scenario, mesh)
+    bounds = beliefs(scenario.station.hardware.beliefs, station_parameters(scenario, mesh))
     nodes = np.asarray(log.file["estimate/garment/position"], dtype=float)
     joints = np.asarray(log.file["estimate/human/joint_position"], dtype=float)
     velocity = np.gradient(nodes, log.time, axis=0)
@@ -97,10 +92,10 @@ class Lab:
 
     def __init__(self, wait: float, stamped: bool = True) -> None:
         scenario = load_scenario(LAB, ["controller.spacing=0.06", f"station.hardware.wait={wait}"])
-        mesh = garments(scenario, LAB)[0].belief
-        at = station_parameters(scenario, mesh)
+        at = read_setup(scenario, LAB).as_estimated().station
+        mesh = at.mesh
         arms = planned_arms(at, described_person(at))
-        self.p, self.lcm = hardware_parameters(scenario, mesh), DrakeLcm("memq://")
+        self.p, self.lcm = hardware_parameters(scenario.station, at), DrakeLcm("memq://")
         self.joints, self.stamped, self.utime = arms.start, stamped, 0
         hung = np.stack(
             [a.tool_position(q) for a, q in zip(arms.pair.arms, arms.start, strict=True)]
@@ -184,9 +179,9 @@ def test_each_bound_is_a_key_with_a_range_around_its_preset(key: str) -> None:
 def test_each_bound_reaches_its_check() -> None:
     keys = [f.name for f in dataclasses.fields(Beliefs)]
     scenario = load_scenario(LAB, ["controller.spacing=0.06"])
-    mesh = garments(scenario, LAB)[0].belief
-    plain = repr(beliefs(scenario, mesh))
+    at = read_setup(scenario, LAB).as_estimated().station
+    plain = repr(beliefs(scenario.station.hardware.beliefs, at))
     for key in keys:
         value = 0.9 * getattr(Beliefs(), key)
         other = load_scenario(LAB, [f"station.hardware.beliefs.{key}={value}"])
-        assert repr(beliefs(other, mesh)) != plain, key
+        assert repr(beliefs(other.station.hardware.beliefs, at)) != plain, key

@@ -31,9 +31,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from drake_dress.__main__ import main
-from drake_dress.diagrams.build import placement
 from drake_dress.diagrams.cameras import looking
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.sections.station import placement
 from drake_dress.models.arm.panda import LIMITS, panda
 from drake_dress.models.perception.charuco import Board
 
@@ -101,7 +101,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray
     """Returns a directory with pictures and poses, and the true X_WC."""
     place = tmp_path_factory.mktemp("calibration")
     scenario = load_scenario(SCENARIO)
-    where = placement(scenario)
+    where = placement(scenario.station.arms, scenario.person)
     assert where is not None
     arm = panda(where.base("left"))
     rng = np.random.default_rng(0)

@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drake_dress.diagrams import build
+from drake_dress.diagrams.assemble import described_person
+from drake_dress.diagrams.person import person_model
 from drake_dress.diagrams.scenario import Scenario, schema
 from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of, model_of
+from drake_dress.diagrams.sections.controller import controller_policy, local_setup, solve_budget
+from drake_dress.diagrams.sections.hardware import hardware_parameters
+from drake_dress.diagrams.sections.safety import safety_limits
+from drake_dress.diagrams.setup import rates, station_parameters
+from drake_dress.diagrams.station import StationParameters
+from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 
@@ -90,20 +97,28 @@ def scenario_of_everything() -> Scenario:
     return scenario
 
 
+def policy_of(scenario: Scenario, station: StationParameters) -> DressingPolicy:
+    """Returns the global controller's policy with the station's garment."""
+    person = person_model(station.measures, station.posture, described_person(station))
+    controller = scenario.controller
+    budget = solve_budget(controller.global_mpc, in_real_time=False)
+    return controller_policy(controller, station.mesh, person, budget)
+
+
 def test_scenario_and_library_have_the_same_defaults() -> None:
     scenario = scenario_of_everything()
     mesh = make_coat(CoatParameters(), 0.06)
-    station = build.station_parameters(scenario, mesh)
-    policy = build.controller_policy(scenario, mesh, build.described_person(station))
-    local = build.local_setup(scenario, policy)
+    station = station_parameters(scenario, mesh)
+    policy = policy_of(scenario, station)
+    local = local_setup(scenario.controller, policy)
     assert local is not None
     parts = [
         station,
         policy.parameters,
         local.controller.parameters,
-        build.safety_limits(scenario),
-        build.hardware_parameters(scenario, mesh),
-        build.rates(scenario),
+        safety_limits(scenario.safety),
+        hardware_parameters(scenario.station, station),
+        rates(scenario),
     ]
     found = {name: (default, own) for name, default, own in differing(parts, set())}
     assert {name: pair for name, pair in found.items() if name not in _MEANT} == {}
@@ -113,8 +128,8 @@ def test_scenario_and_library_have_the_same_defaults() -> None:
 def test_every_setting_of_the_tasks_reaches_the_policy() -> None:
     """Each number of `controller.tasks` and `controller.stages`, moved, is moved in the policy."""
     mesh = make_coat(CoatParameters(), 0.06)
-    person = build.described_person(build.station_parameters(Scenario(), mesh))
-    plain = build.controller_policy(Scenario(), mesh, person).parameters.tasks
+    station = station_parameters(Scenario(), mesh)
+    plain = policy_of(Scenario(), station).parameters.tasks
     for group in ("tasks", "stages"):
         for entry in dataclasses.fields(getattr(Scenario().controller, group)):
             scenario = Scenario()
@@ -123,7 +138,7 @@ def test_every_setting_of_the_tasks_reaches_the_policy() -> None:
             if not isinstance(old, int | float):
                 continue
             setattr(values, entry.name, old + 1)
-            moved = build.controller_policy(scenario, mesh, person).parameters.tasks
+            moved = policy_of(scenario, station).parameters.tasks
             here: Any
             here, there = (plain, moved) if group == "tasks" else (plain.stages, moved.stages)
             assert getattr(there, entry.name) == getattr(here, entry.name) + 1, entry.name

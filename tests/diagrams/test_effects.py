@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.build import effects, plant_station
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import Scenario, load_scenario, resolved_yaml
+from drake_dress.diagrams.sections.effects import effects
+from drake_dress.diagrams.setup import station_parameters
+from drake_dress.diagrams.station import make_simulated_station
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.air import Wind
@@ -27,16 +29,16 @@ def test_every_effect_can_be_switched_on_and_loads_again(tmp_path: Path) -> None
         for p in kind.parameters()
     ]
     scenario = load_scenario(SCENARIO, settings)
-    assert [e.NAME for e in effects(scenario)] == list(EFFECTS)
+    assert [e.NAME for e in effects(scenario.effects)] == list(EFFECTS)
     copy = tmp_path / "all.yaml"
     copy.write_text(resolved_yaml(scenario))
-    assert effects(load_scenario(copy)) == effects(scenario)
+    assert effects(load_scenario(copy).effects) == effects(scenario.effects)
 
 
 def test_what_is_not_given_is_off_and_uncertainties_do_not_matter() -> None:
-    assert effects(load_scenario(SCENARIO)) == ()
+    assert effects(load_scenario(SCENARIO).effects) == ()
     told = load_scenario(SCENARIO, ["effects.air_drag.coefficient_std=0.3"])
-    assert effects(told) == ()
+    assert effects(told.effects) == ()
 
 
 @pytest.mark.parametrize(
@@ -59,7 +61,7 @@ def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path: Path) -> No
     setting = "effects.hem_chain.mass=0.1"
     with registered():
         scenario = load_scenario(SCENARIO, [setting, "effects.wind.x=1"])
-        assert effects(scenario) == (Wind(x=1.0), HemChain(mass=0.1))
+        assert effects(scenario.effects) == (Wind(x=1.0), HemChain(mass=0.1))
         copy = tmp_path / "own.yaml"
         copy.write_text(resolved_yaml(scenario))
         assert load_scenario(copy) == scenario
@@ -72,19 +74,19 @@ def test_an_effect_of_a_users_own_is_a_key_like_the_others(tmp_path: Path) -> No
     with pytest.raises(UserError, match=r"effects\.hem_chain: unknown effect \(load your own with"):
         load_scenario(SCENARIO, [setting])
     with pytest.raises(UserError, match=r"effects\.hem_chain: unknown effect"):
-        effects(scenario)
+        effects(scenario.effects)
 
 
 def test_effects_set_in_python_are_held_against_the_list() -> None:
     scenario = Scenario()
     scenario.effects["wind"] = {"x": 1.0, "x_std": 0.1}
-    assert effects(scenario) == (Wind(x=1.0),)
+    assert effects(scenario.effects) == (Wind(x=1.0),)
     scenario.effects["wind"] = {"speed": 1.0}
     with pytest.raises(UserError, match=r"effects\.wind\.speed: unknown key, expected x, y, z"):
-        effects(scenario)
+        effects(scenario.effects)
     scenario.effects["wind"] = {"x": 100.0}
     with pytest.raises(ValueError, match=r"wind\.x is 100\.0 m/s, expected -5 to 5"):
-        effects(scenario)
+        effects(scenario.effects)
 
 
 def pulled(
@@ -93,7 +95,7 @@ def pulled(
     """Returns gripper forces (2,3), N, and the garment (n,3) after a while of hanging."""
     scenario = load_scenario(SCENARIO, [*QUICK, *settings])
     mesh = build_garment(scenario.garment, scenario.plant.spacing, SCENARIO.parent)
-    station = plant_station(scenario, mesh, None)
+    station = make_simulated_station(station_parameters(scenario, mesh))
     simulator = Simulator(station.diagram)
     context = simulator.get_mutable_context()
     for i, side in enumerate(("left", "right")):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from drake_dress.diagrams.build import station_parameters
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario, resolved_yaml
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.schema import Plant
+from drake_dress.diagrams.setup import station_parameters
 from drake_dress.errors import UserError
 
 

@@ -16,17 +16,8 @@ from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, PortDataType
 
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import (
-    controller_policy,
-    described_person,
-    hardware_parameters,
-    planned_arms,
-    plant_station,
-    rates,
-    station_parameters,
-)
-from drake_dress.diagrams.dressing import ControlSetup, make_dressing
+from drake_dress.diagrams.assemble import described_person, planned_arms, simulated_station
+from drake_dress.diagrams.dressing import make_dressing
 from drake_dress.diagrams.hardware_station import (
     HardwareStation,
     Heard,
@@ -37,8 +28,11 @@ from drake_dress.diagrams.hardware_station import (
     make_hardware_station,
 )
 from drake_dress.diagrams.lab_diagram import Lab, make_lab
+from drake_dress.diagrams.planning import ControlSetup
 from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
 from drake_dress.diagrams.scenario.schema import LabFault
+from drake_dress.diagrams.sections.hardware import hardware_parameters
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.models.arm.command_guard import Stop
 from drake_dress.models.arm.panda import LIMITS
 from drake_dress.models.sides import SIDES
@@ -67,19 +61,17 @@ class Pair:
     def __init__(self, *faults: LabFault, settings: tuple[str, ...] = ()) -> None:
         self.scenario = scenario = load(*settings)
         scenario.lab.faults = list(faults)
-        meshes, limits = garments(scenario, SOURCE)
+        setup = read_setup(scenario, SOURCE)
         lcm = DrakeLcm("memq://")
-        self.simulated = plant_station(scenario, meshes.plant, None, meshes.belief)
-        self.lab: Lab = make_lab(
-            scenario, self.simulated, lcm, meshes.plant, meshes.belief, writer=None
-        )
-        at = station_parameters(scenario, meshes.belief)
+        self.simulated = simulated_station(setup)
+        self.lab: Lab = make_lab(setup, self.simulated, lcm, writer=None)
+        at = setup.as_estimated().station
         person = described_person(at)
-        p = replace(hardware_parameters(scenario, meshes.belief), wall=False)
+        p = replace(hardware_parameters(scenario.station, at), wall=False)
         assert self.simulated.robots is not None
         joints = self.simulated.robots.start
         robots = at_start(p, planned_arms(at, person), joints)
-        policy = controller_policy(scenario, meshes.belief, person)
+        policy = setup.policy(person)
         diagram = self.simulated.diagram
         seen = {
             name: diagram.GetOutputPort(f"estimate.{name}")
@@ -89,8 +81,8 @@ class Pair:
         }
         heard = Heard(joints, seen["garment_position"], seen["joint_position"])
         self.station: HardwareStation = make_hardware_station(p, lcm, person, robots, heard)
-        control = ControlSetup(policy, rates(scenario), limits)
-        self.dressing = make_dressing(self.station, meshes.belief, control)
+        control = ControlSetup(policy, setup.rates, setup.limits)
+        self.dressing = make_dressing(self.station, setup.garments.belief, control)
         builder = DiagramBuilder()
         builder.AddNamedSystem("lab", self.lab.diagram)
         builder.AddNamedSystem("run", self.dressing.diagram)
@@ -309,10 +301,9 @@ def test_an_arm_whose_commands_went_astray_meanwhile_follows_again() -> None:
 
 def test_a_run_does_not_start_from_elsewhere() -> None:
     scenario = load()
-    meshes, _ = garments(scenario, SOURCE)
-    at = station_parameters(scenario, meshes.belief)
+    at = read_setup(scenario, SOURCE).as_estimated().station
     planned = planned_arms(at, described_person(at))
-    p = hardware_parameters(scenario, meshes.belief)
+    p = hardware_parameters(scenario.station, at)
     joints = planned.start.copy()
     joints[1, 3] += 0.15
     with pytest.raises(NotAtStartError, match=r"right arm is .* rad from where the run begins"):
@@ -323,7 +314,7 @@ def test_a_run_does_not_start_from_elsewhere() -> None:
 
 def test_silence_is_told_with_its_channels() -> None:
     scenario = load("station.hardware.wait=0.2")
-    p = hardware_parameters(scenario, garments(scenario, SOURCE)[0].belief)
+    p = hardware_parameters(scenario.station, read_setup(scenario, SOURCE).as_estimated().station)
     lcm = DrakeLcm("memq://")
 
     def speak() -> bool:

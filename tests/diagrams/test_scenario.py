@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.diagrams.behaviour import Behaviour
-from drake_dress.diagrams.build import behaviour, predictor, safety_limits
 from drake_dress.diagrams.scenario import (
     Scenario,
     apply_variation,
@@ -23,6 +22,9 @@ from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.scenario.ranges import range_of
 from drake_dress.diagrams.scenario.schema import SCHEMAS, Arm, Coat, Variation
 from drake_dress.diagrams.scenario.typed import check_ranges
+from drake_dress.diagrams.sections.controller import predictor
+from drake_dress.diagrams.sections.person import behaviour
+from drake_dress.diagrams.sections.safety import safety_limits
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.following import FollowingParameters
@@ -173,18 +175,18 @@ def test_old_name_of_the_force_limit_still_sets_it(tmp_path: Path) -> None:
     old = "controller.global_mpc.force_limit=12.5"
     scenario = load_scenario(write(tmp_path, "seed: 0"), [old])
     assert scenario.safety.force_limit == 12.5
-    assert safety_limits(scenario).hard_force == 12.5
-    assert safety_limits(scenario).soft_force == 6.25
+    assert safety_limits(scenario.safety).hard_force == 12.5
+    assert safety_limits(scenario.safety).soft_force == 6.25
     again = load_scenario(write(tmp_path, resolved_yaml(scenario)))
     assert again == scenario
 
 
 def test_safety_group_reaches_the_limits(tmp_path: Path) -> None:
-    limits = safety_limits(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)))
+    limits = safety_limits(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)).safety)
     assert (limits.soft_force, limits.hard_force, limits.largest_distance) == (5.0, 15.0, 0.7)
     assert limits.workspace is not None
     assert limits.workspace.tolist() == [[-2.0, -1.0, 0.5], [1.0, 1.0, 2.0]]
-    defaults = safety_limits(load_scenario(write(tmp_path, "seed: 0")))
+    defaults = safety_limits(load_scenario(write(tmp_path, "seed: 0")).safety)
     assert (defaults.soft_force, defaults.hard_force, defaults.workspace) == (8.5, 17.0, None)
 
 
@@ -270,7 +272,8 @@ def test_scale_of_a_mesh_file_is_drawn_with_the_coat_s(tmp_path: Path) -> None:
 
 
 def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None:
-    made = behaviour(load_scenario(write(tmp_path, ONE_OF_EVERYTHING)))
+    scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
+    made = behaviour(scenario.person.behaviour, scenario.seed)
     assert made.kind == "active"
     assert made.turns
     assert made.seed == 4
@@ -287,10 +290,10 @@ def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None
 
 def test_who_is_said_nothing_of_is_a_dummy_that_is_believed_to_stay(tmp_path: Path) -> None:
     scenario = load_scenario(write(tmp_path, "seed: 0"))
-    assert behaviour(scenario) == Behaviour()
-    assert isinstance(predictor(scenario), StillPredictor)
+    assert behaviour(scenario.person.behaviour, scenario.seed) == Behaviour()
+    assert isinstance(predictor(scenario.controller), StillPredictor)
     other = load_scenario(write(tmp_path, "controller: {predictor: constant_velocity}"))
-    assert isinstance(predictor(other), ConstantVelocityPredictor)
+    assert isinstance(predictor(other.controller), ConstantVelocityPredictor)
 
 
 def test_motions_can_be_given_on_the_command_line(tmp_path: Path) -> None:

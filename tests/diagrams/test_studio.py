@@ -9,9 +9,8 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.sensors import LcmImageArrayToImages
 
-from drake_dress.diagrams.assemble import garments
-from drake_dress.diagrams.build import station_parameters
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.diagrams.station import make_simulated_station
 from drake_dress.diagrams.studio import Studio
 from drake_dress.models.sides import SIDES
@@ -28,8 +27,7 @@ SETTINGS = [
 
 def test_pictures_are_the_station_s() -> None:
     scenario = load_scenario(SOURCE, SETTINGS)
-    meshes, _ = garments(scenario, SOURCE)
-    p = station_parameters(scenario, meshes.plant)
+    p = read_setup(scenario, SOURCE).station
     station = make_simulated_station(p)
     simulator = Simulator(station.diagram)
     context = simulator.get_mutable_context()

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drake_dress.diagrams.build import effects
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.sections.effects import effects
 from drake_dress.discrepancy.candidates import candidates
 from drake_dress.discrepancy.experiment import Experiment
 from drake_dress.discrepancy.explanation import Explanation, explain
@@ -54,7 +54,7 @@ def test_what_is_written_can_be_read_and_run_again(
     path = tmp_path / "extended.yaml"
     path.write_text(text)
     again = load_scenario(path)
-    assert effects(again) == found.effects
+    assert effects(again.effects) == found.effects
     assert again.effects["surface_density"]["added_std"] > 0.0
     told = found.comparison.told["refined"]
     w = found.comparison.whitening

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from drake_dress.diagrams.build import effects
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.sections.effects import effects
 from drake_dress.discrepancy import report
 from drake_dress.discrepancy.explained import Explained, explained
 from drake_dress.errors import UserError
@@ -61,7 +61,7 @@ def test_three_files_are_written_that_say_the_same(found: Explained, tmp_path: P
     assert {file.name for file in out.iterdir()} == set(EXPLAIN_FILES)
     assert json.loads((out / "explanation.json").read_text()) == found.content
     again = load_scenario(out / "extended.yaml")
-    assert effects(again) == found.effects
+    assert effects(again.effects) == found.effects
     assert "a chain in the hem" in (out / "report.html").read_text()
 
 

@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.assemble import garments, parts, wired
+from drake_dress.diagrams.assemble import parts, wired
 from drake_dress.diagrams.scenario import apply_variation, load_scenario
+from drake_dress.diagrams.setup import read_setup
 from drake_dress.gym import ControllerPolicy
 from drake_dress.models.sides import SIDES
 from drake_dress.shipped import shipped_scenario
@@ -16,8 +17,7 @@ SOURCE = shipped_scenario("dummy_standing")
 def _requests_of_a_run(overrides: list[str], times: list[float]) -> np.ndarray:
     """Returns (T,2,3) what the controllers of a run request, m/s."""
     scenario = apply_variation(load_scenario(SOURCE, overrides))
-    meshes, limits = garments(scenario, SOURCE)
-    dressing = wired(parts(scenario, meshes, limits))
+    dressing = wired(parts(read_setup(scenario, SOURCE)))
     simulator = Simulator(dressing.diagram)
     name = "plan_follower" if dressing.local is None else "local_controller"
     asking = dressing.diagram.GetSubsystemByName(name)

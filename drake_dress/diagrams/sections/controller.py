@@ -1,0 +1,100 @@
+"""The section `controller`: the global policy, the local controller, the prediction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields
+
+from drake_dress.diagrams.planning import LocalSetup
+from drake_dress.diagrams.scenario import schema
+from drake_dress.diagrams.scenario.mirror import model_of
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.budget import Budget
+from drake_dress.models.control.constrained_ddp import solve
+from drake_dress.models.control.costs import GarmentCost
+from drake_dress.models.control.local_control import LocalController
+from drake_dress.models.control.local_model import LocalParameters
+from drake_dress.models.control.own_costs import registered_costs
+from drake_dress.models.control.person_model import PersonModel
+from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
+from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.prediction import PREDICTORS, MotionPredictor
+from drake_dress.solvers.cone_programme import cone_programme
+
+
+def controller_policy(
+    c: schema.Controller,
+    mesh: GarmentMesh,
+    person: PersonModel,
+    budget: Budget,
+    costs: Sequence[GarmentCost] = (),
+) -> DressingPolicy:
+    """Returns the policy of the global controller.
+
+    Args:
+        c: the section.
+        mesh: the controller's garment.
+        person: as the controller models it.
+        budget: of a plan.
+        costs: of a user's own, beside the registered ones that the section lists.
+    """
+    g = c.global_mpc
+    parameters = PolicyParameters(
+        time_step=g.time_step,
+        horizon=g.horizon,
+        max_iterations=g.max_iterations,
+        inner_iterations=g.inner_iterations,
+        committed_steps=round(g.delay / g.time_step),
+        max_speed=g.max_speed,
+        plans=c.method != "local",
+        budget=budget,
+        weights=model_of(g.weights),
+        tasks=model_of(
+            c.tasks,
+            progress_rate=g.progress_step / g.time_step,
+            approach_distance=g.approach_distance,
+            stages=model_of(c.stages, waiting_progress=g.waiting_progress),
+        ),
+    )
+    all_costs = (*registered_costs(c.costs), *costs)
+    return DressingPolicy(mesh, Material(**vars(c.material)), person, parameters, all_costs)
+
+
+def solve_budget(g: schema.GlobalMpc, in_real_time: bool) -> Budget:
+    """Returns the budget of a plan: iterations in simulation, seconds in real time."""
+    if in_real_time:
+        return Budget(seconds=g.delay_share * g.delay)
+    return Budget(iterations=g.budget)
+
+
+# Time step of the prediction that the local controller uses, s.
+_JOINTS_STEP = 0.2
+
+
+def local_setup(c: schema.Controller, policy: DressingPolicy) -> LocalSetup | None:
+    """Returns the local controller; None where the grippers follow the global plan directly."""
+    if c.method == "global":
+        return None
+    values = c.local
+    parameters = LocalParameters(
+        **{
+            f.name: getattr(values, f.name)
+            for f in fields(LocalParameters)
+            if f.name in vars(values)
+        }
+    )
+    solvers = {"constrained_ddp": solve, "cone": cone_programme}
+    return LocalSetup(
+        LocalController(policy.planner, parameters, solvers[values.solver]),
+        values.period,
+        values.delay,
+        values.feedback,
+        _JOINTS_STEP,
+        math.ceil(values.horizon * values.time_step / _JOINTS_STEP),
+    )
+
+
+def predictor(c: schema.Controller) -> MotionPredictor:
+    """Returns the predictor of the person's arms."""
+    return PREDICTORS[c.predictor]()

@@ -1,0 +1,37 @@
+"""The section `effects`: what the plant has beyond the ideal fabric."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from drake_dress.errors import UserError
+from drake_dress.models.effects.effect import Effect
+from drake_dress.models.effects.registry import EFFECTS, HOW_TO_LOAD
+
+
+def effects(section: Mapping[str, Mapping[str, float]]) -> tuple[Effect, ...]:
+    """Returns the effects that are switched on, in the order of the registry.
+
+    Args:
+        section: parameters of each effect, by its name.
+
+    Raises:
+        UserError: an effect or a parameter is unknown.
+    """
+    unknown = next((name for name in section if name not in EFFECTS), None)
+    if unknown is not None:
+        raise UserError("scenario", f"effects.{unknown}", f"unknown effect ({HOW_TO_LOAD})")
+    on = [_effect(n, section[n]) for n in EFFECTS if n in section]
+    return tuple(e for e in on if not e.is_off)
+
+
+def _effect(name: str, values: Mapping[str, float]) -> Effect:
+    """Returns an effect with its parameters, which no file check may have verified yet."""
+    kind = EFFECTS[name]
+    names = [p.name for p in kind.parameters()]
+    for key in values:
+        if key.removesuffix("_std") not in names:
+            raise UserError(
+                "scenario", f"effects.{name}.{key}", f"unknown key, expected {', '.join(names)}"
+            )
+    return kind(**{n: values[n] for n in names if n in values})

@@ -1,0 +1,141 @@
+"""A scenario, read once: each of its sections as the values that the diagram's builders take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.person import Person, person_model
+from drake_dress.diagrams.planning import Rates
+from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.sections.controller import controller_policy, solve_budget
+from drake_dress.diagrams.sections.effects import effects
+from drake_dress.diagrams.sections.person import arms, behaviour, joints, measures, posture
+from drake_dress.diagrams.sections.safety import safety_limits
+from drake_dress.diagrams.sections.station import cameras, placement
+from drake_dress.diagrams.station import StationParameters, start_grippers
+from drake_dress.errors import UserError
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.costs import GarmentCost
+from drake_dress.models.control.policy import DressingPolicy
+from drake_dress.models.control.safety import SafetyLimits
+from drake_dress.models.garment.mesh import GarmentMesh
+
+
+@dataclass(frozen=True)
+class Garments:
+    """The garment of the plant, and the coarser one of the controller."""
+
+    plant: GarmentMesh
+    belief: GarmentMesh
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The values of a scenario with nothing left to draw.
+
+    Attributes:
+        scenario: from which they were read.
+        source: its file, for messages and relative paths.
+        garments: of plant and controller.
+        station: parameters of the simulated station.
+        limits: of the safety governor.
+        rates: periods and delays.
+    """
+
+    scenario: Scenario
+    source: Path
+    garments: Garments
+    station: StationParameters
+    limits: SafetyLimits
+    rates: Rates
+
+    def as_estimated(self) -> Setup:
+        """Returns the setup where the true garment is unknown: the controller's replaces it."""
+        belief = self.garments.belief
+        station = replace(self.station, mesh=belief)
+        return replace(self, garments=Garments(belief, belief), station=station)
+
+    def policy(self, person: Person, costs: Sequence[GarmentCost] = ()) -> DressingPolicy:
+        """Returns the policy of the global controller.
+
+        Args:
+            person: as it was added to a plant.
+            costs: a user's own, beside those that the scenario lists.
+        """
+        controller = self.scenario.controller
+        in_real_time = self.scenario.station.kind == "hardware"
+        return controller_policy(
+            controller,
+            self.garments.belief,
+            person_model(self.station.measures, self.station.posture, person),
+            solve_budget(controller.global_mpc, in_real_time),
+            costs,
+        )
+
+
+def read_setup(scenario: Scenario, source: Path) -> Setup:
+    """Returns the setup of a scenario.
+
+    Args:
+        scenario: with nothing left to draw.
+        source: its file, for messages and relative paths.
+
+    Raises:
+        UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
+    """
+    plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
+    belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
+    station = station_parameters(scenario, plant)
+    limits = safety_limits(scenario.safety)
+    broken = limits.broken_at(start_grippers(station))
+    if broken is not None:
+        raise UserError(str(source), "safety", f"{broken} at the start")
+    return Setup(scenario, source, Garments(plant, belief), station, limits, rates(scenario))
+
+
+def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParameters:
+    """Returns the parameters of the simulated station with the garment `mesh`."""
+    plant, person, station = scenario.plant, scenario.person, scenario.station
+    return StationParameters(
+        mesh=mesh,
+        material=Material(**vars(plant.material)),
+        time_step=plant.time_step,
+        body_time_step=plant.body_time_step,
+        integrator=plant.integrator,
+        implicitness=plant.implicitness,
+        buckling_wavelength=plant.buckling_wavelength,
+        iterations=plant.iterations,
+        tolerance=plant.tolerance,
+        self_collision=plant.self_collision,
+        grasp_stiffness=plant.grasp_stiffness,
+        effects=effects(scenario.effects),
+        measures=measures(person),
+        posture=posture(person),
+        arms=arms(person),
+        joints=joints(person),
+        behaviour=behaviour(person.behaviour, scenario.seed),
+        gripper_max_speed=station.gripper.max_speed,
+        gripper_max_acceleration=station.gripper.max_acceleration,
+        distance_behind=station.start.distance_behind,
+        height_offset=station.start.height_offset,
+        lateral_offset=station.start.lateral_offset,
+        placement=placement(station.arms, person),
+        mode=station.arms.mode,
+        cameras=cameras(station.cameras),
+    )
+
+
+def rates(scenario: Scenario) -> Rates:
+    """Returns periods and delays of controllers, log and plant."""
+    c = scenario.controller
+    return Rates(
+        global_period=c.global_mpc.period,
+        global_delay=c.global_mpc.delay,
+        command_period=1.0 / c.command_rate,
+        log_period=1.0 / scenario.log.rate,
+        arm_period=1.0 / scenario.station.arms.rate,
+        plant_period=scenario.plant.body_time_step,
+    )
