@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test lint format docs docs-links clean
+.PHONY: setup demo test lint format coverage docs docs-links clean
 
 setup: $(VENV)/.installed
 
@@ -17,6 +17,14 @@ test: $(VENV)/.installed-test lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m 'not alone' \
 	    --numprocesses logical --maxprocesses 4 --dist worksteal
 	$(BIN)/python -m pytest -m alone
+
+# Which test file covers a module that has none of its own: tests/covered_by.json.
+coverage: $(VENV)/.installed-test
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[coverage]'
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m 'not alone' \
+	    --numprocesses logical --maxprocesses 4 --dist worksteal \
+	    --cov drake_dress --cov benchmarks --cov-context test --cov-report=
+	$(BIN)/python -m tests.covered_by
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

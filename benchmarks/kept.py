@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import Figure, heading, plain
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_text
 
@@ -29,7 +30,9 @@ def read_results(
         return {}
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        return {name_of(result["case"]): result for result in found}
+        # files of earlier versions hold the results alone
+        runs = found["runs"] if isinstance(found, dict) else found
+        return {name_of(result["case"]): result for result in runs}
     except OSError as error:
         raise UserError(str(path), "", f"cannot be read: {error.strerror}") from None
     except (ValueError, TypeError, KeyError):
@@ -38,10 +41,14 @@ def read_results(
         ) from None
 
 
-def write_results(path: Path, results: Mapping[str, dict[str, Any]]) -> None:
-    """Writes results, a line each, in the order of their cases' names."""
+def write_results(
+    path: Path, results: Mapping[str, dict[str, Any]], figures: Iterable[Figure] = ()
+) -> None:
+    """Writes results, a line each, in the order of their cases' names, below their figures."""
+    seeds = {r["case"]["seed"] for r in results.values() if "seed" in r["case"]}
+    above = json.dumps(plain(heading(figures, sorted(seeds))), indent=1, allow_nan=False)
     lines = ",\n".join(json.dumps(results[name]) for name in sorted(results))
-    write_text(path, f"[\n{lines}\n]\n")
+    write_text(path, f'{above.removesuffix(chr(10) + "}")},\n "runs": [\n{lines}\n]}}\n')
 
 
 def seed_range(text: str) -> range:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
 from benchmarks.cluster import completed_on
+from benchmarks.figures import Figure
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
@@ -74,36 +75,46 @@ def dressed(summary: dict[str, Any]) -> str:
     return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"
 
 
+@dataclass(frozen=True)
+class Study(Generic[C]):
+    """What a study runs and what it makes of the results.
+
+    Attributes:
+        name: of the benchmark.
+        case_type: makes a case of its fields in a file.
+        run: runs a case, with the folder to keep it in and further settings.
+        tables: of results.
+        figures: of results, beside what is asked.
+        tell: says how a case ended, from its summary, in a few words.
+    """
+
+    name: str
+    case_type: Callable[..., C]
+    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
+    tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]]
+    figures: Callable[[Sequence[dict[str, Any]]], Sequence[Figure]]
+    tell: Callable[[dict[str, Any]], str] = dressed
+
+
 def carry_out(
-    options: argparse.Namespace,
-    benchmark: str,
-    case_type: Callable[..., C],
-    cases: Sequence[C],
-    run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]],
-    tables: Callable[[Sequence[dict[str, Any]]], Sequence[Table]],
-    tell: Callable[[dict[str, Any]], str] = dressed,
-    said: str = "",
+    options: argparse.Namespace, study: Study[C], cases: Sequence[C], said: str = ""
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Runs what is missing and prints the tables.
 
     Args:
         options: those of `add_study_options`.
-        benchmark: its name.
-        case_type: makes a case of its fields in a file.
+        study: what is run.
         cases: of the study.
-        run: a case, with the folder to keep it in and further settings.
-        tables: of results.
-        tell: how a case ended, from its summary, in a few words.
         said: above the tables, such as which seeds they are of.
 
     Returns:
         The results, and the exit status if a signal ended the study.
     """
     if options.into:
-        around(options.into, benchmark)
+        around(options.into, study.name)
     kept = {}
     if options.json is not None:
-        kept = read_results(options.json, lambda case: case_type(**case).name, benchmark)
+        kept = read_results(options.json, lambda case: study.case_type(**case).name, study.name)
     missing = [case for case in cases if case.name not in kept]
     if said:
         print(said)
@@ -112,13 +123,15 @@ def carry_out(
     if options.keep_failures and options.keep is None:
         raise UserError("bench", "--keep-failures", "expected --keep DIR with it")
     if not options.kept:
-        each = _Run(run, options.set, options.keep is not None, options.keep_failures)
-        stopped = _run_all(each, missing, kept, options, tell)
+        each = _Run(study.run, options.set, options.keep is not None, options.keep_failures)
+        stopped = _run_all(each, missing, kept, options, study.tell)
     results = [kept[case.name] for case in cases if case.name in kept]
-    shown = "\n\n".join(filter(None, (said, *(t.text() for t in tables(results) if t.rows))))
+    if options.json is not None:
+        _keep(options.json, kept, study.figures([r for r in results if "summary" in r]))
+    shown = "\n\n".join(filter(None, (said, *(t.text() for t in study.tables(results) if t.rows))))
     print(f"\n{shown}", flush=True)
     if options.into:
-        write_between(options.into, benchmark, shown)
+        write_between(options.into, study.name, shown)
     return results, stopped
 
 
@@ -215,8 +228,12 @@ def _run_all(
         for number, (case, result) in enumerate(_completed(run, new, options, stop), 1):
             kept[case.name] = result
             if path is not None:
-                # what failed to run is run again
-                write_results(path, {name: r for name, r in kept.items() if "summary" in r})
+                _keep(path, kept)
             ended = result.get("problem") or tell(result["summary"])
             print(f"{number}/{len(new)} {case.name}: {ended}", flush=True)
     return stop.status if stop.is_set() else None
+
+
+def _keep(path: Path, kept: Mapping[str, dict[str, Any]], figures: Iterable[Figure] = ()) -> None:
+    # what failed to run is run again
+    write_results(path, {name: r for name, r in kept.items() if "summary" in r}, figures)

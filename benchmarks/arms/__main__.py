@@ -14,8 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, at_least, at_most, every
 from benchmarks.parser import OneLineParser, exit_with
-from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, run_case
+from benchmarks.study import (
+    Study,
+    add_choices,
+    add_study_options,
+    carry_out,
+    exit_status,
+    run_case,
+)
 
 _NAME = "arms"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -55,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Case(*which)
         for which in itertools.product(options.scenarios, options.methods, options.grippers)
     ]
-    return exit_status(*carry_out(options, _NAME, Case, chosen, run, tables))
+    return exit_status(*carry_out(options, Study(_NAME, Case, run, tables, figures), chosen))
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -90,9 +98,9 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     arms = [
         [f"{c.scenario}, {c.method}", *_arms(done[c.name])] for c in cases if c.grippers == "panda"
     ]
-    figures = ("on in, s", "force, N", "strain, %", "penetration, mm")
+    columns = ("on in, s", "force, N", "strain, %", "penetration, mm")
     return [
-        Table("Dressings", ["", *figures, *(f"arms: {f}" for f in figures)], ended),
+        Table("Dressings", ["", *columns, *(f"arms: {c}" for c in columns)], ended),
         Table(
             "Arms",
             [
@@ -113,6 +121,23 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
             ["", "reason"],
             [[c.name, done[c.name]["reason"]] for c in cases if not done[c.name]["success"]],
         ),
+    ]
+
+
+def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    """Returns the figures of dressings on arms beside what is asked."""
+    mine = [r["summary"] for r in results if r["case"]["grippers"] == "panda"]
+    if not mine:
+        return []
+    limits = {"max_joint_speed_share": "speed", "max_joint_torque_share": "torque"}
+    return [
+        every("dressed on arms", sum(bool(s["success"]) for s in mine), len(mine)),
+        *(
+            at_most(f"joint {what}, largest share of its limit", max(s[k] for s in mine), "", 1.0)
+            for k, what in limits.items()
+        ),
+        at_least("between the arms, least", min(s["min_arms_apart_m"] for s in mine), "m", 0.0),
+        at_least("arm to person, least", min(s["min_arm_to_person_m"] for s in mine), "m", 0.0),
     ]
 
 

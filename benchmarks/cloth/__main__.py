@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-import json
-import math
-import os
-import platform
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.cloth.comparison import figures_beside_peers
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
+from benchmarks.figures import machine, write_figures
 from benchmarks.parser import OneLineParser, at_least_one, output_file, output_folder
-from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
 # In the order of the paper, then what it does not have.
@@ -59,9 +56,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wall = time.perf_counter() - begin
     print(f"{wall:.0f} s in all" + (", interrupted" if interrupted else ""))
     if options.json:
-        document = {"about": about, "quick": options.quick, "wall_s": wall, "scenes": results}
-        text = json.dumps(_plain(document), indent=1, allow_nan=False) + "\n"
-        write_text(options.json, text)
+        write_figures(
+            options.json,
+            figures_beside_peers(results),
+            [],
+            about=about,
+            quick=options.quick,
+            wall_s=wall,
+            scenes=results,
+        )
         print(f"wrote {options.json}")
     if options.png:
         for name in names:
@@ -144,8 +147,7 @@ def _limit(options: argparse.Namespace) -> float:
 
 def _about() -> dict[str, Any]:
     """Returns versions, processor and threads."""
-    about: dict[str, Any] = {"python": platform.python_version(), "processor": _processor()}
-    about["cores"] = os.cpu_count()
+    about = machine()
     about["threads"] = "one for every engine; peers on the CPU"
     for package in _PACKAGES:
         about[package] = _version(package)
@@ -157,26 +159,6 @@ def _version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return "not installed"
-
-
-def _processor() -> str:
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
-
-
-def _plain(value: Any) -> Any:
-    """Returns `value` as JSON has it: NaN and infinity become null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 if __name__ == "__main__":

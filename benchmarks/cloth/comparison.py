@@ -7,7 +7,7 @@ gives as good?
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,6 +27,7 @@ from benchmarks.cloth.peers import mujoco_flex, newton_style3d, newton_vbd
 from benchmarks.cloth.reference import STIFF_FROM, Reference, fine_reference
 from benchmarks.cloth.scene import Scene
 from benchmarks.cloth.table import Table, milliseconds
+from benchmarks.figures import Figure, at_most
 from drake_dress.drawing import load_matplotlib
 
 Result = dict[str, Any]
@@ -35,6 +36,11 @@ Result = dict[str, Any]
 _MORE_ITERATIONS = (5, 20)
 # Peers are run at one time step only, and are given so much more time for it.
 _PEER_PATIENCE = 3.0
+# Names of engines begin so: MuJoCo's flex, and the schemes of this package.
+_MUJOCO = "MuJoCo"
+_OWN = ("explicit", "implicit", "projective")
+# Share of MuJoCo's time that a step of a scheme as accurate may take.
+_ASKED_BESIDE_MUJOCO = 0.1
 
 
 def own_recipes() -> list[Recipe]:
@@ -289,6 +295,38 @@ def peers_table(result: Result) -> Table:
         f"after {result['height_at_s']:g} s{height}{_reference(result)}"
     )
     return Table(title, header, rows)
+
+
+def figures_beside_peers(scenes: Result) -> list[Figure]:
+    """Returns what a step of each own scheme takes beside MuJoCo's, in every scene with peers.
+
+    Where cloth touches, the median from the first contact to the largest is compared.
+
+    Args:
+        scenes: results of scenes by name.
+    """
+    found = []
+    for compared in _beside_peers(scenes):
+        touching = any("contact_most" in run for run in compared["runs"])
+        key = "step_in_contact_s" if touching else "step_median_s"
+        theirs = [run[key] for run in compared["runs"] if run["engine"].startswith(_MUJOCO)]
+        if not theirs or not theirs[0]:
+            continue
+        for run in compared["runs"]:
+            if run["engine"].startswith(_OWN) and run[key]:
+                name = f"{compared['scene']}: {run['engine']}, a step beside MuJoCo's"
+                found.append(at_most(name, run[key] / theirs[0], "", _ASKED_BESIDE_MUJOCO))
+    return found
+
+
+def _beside_peers(results: Any) -> Iterator[Result]:
+    """Yields the results of `against_peers`, wherever they are."""
+    if isinstance(results, dict):
+        if "height_at_s" in results:
+            yield results
+        else:
+            for inner in results.values():
+                yield from _beside_peers(inner)
 
 
 def _contact_cells(run: Result) -> list[Any]:

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
-from benchmarks.parser import bench_parser, exit_with
+from benchmarks.figures import Figure, write_figures
+from benchmarks.parser import bench_parser, exit_with, output_file
 from benchmarks.scenario_run import run_scenario
 from drake_dress.errors import UserError
 from drake_dress.plan_delay import SHARE, keep_plan_delay
@@ -46,6 +47,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     header = ["solves", *(f"{100 * q:g} % within, ms" for q in at)]
     print(Table("Solves of the global controller", header, [row]).text())
     print(f"\nkept: {1e3 * seconds:.0f} ms in {path}")
+    if options.json is not None:
+        figures = [
+            Figure(f"global solve, {100 * q:g} % within", ms, "ms")
+            for q, ms in zip(at, row[1:], strict=True)
+        ]
+        write_figures(options.json, figures, [])
     return 0
 
 
@@ -53,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = bench_parser("delay", __doc__)
     parser.add_argument("--scenario", type=Path, default=_SCENARIOS / "dummy_standing.yaml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="figures")
     return parser
 
 

@@ -13,10 +13,10 @@ from benchmarks.dressing.cases import COATS, METHODS, PERSONS, VARIATIONS, Case,
 from benchmarks.dressing.drawn import drawn
 from benchmarks.dressing.page import study_page
 from benchmarks.dressing.parquet import write_table
-from benchmarks.dressing.tables import figure, tables
+from benchmarks.dressing.tables import figure, figures, tables
 from benchmarks.parser import OneLineParser, exit_with, output_file
 from benchmarks.seeds import add_seed_options, chosen_seeds
-from benchmarks.study import add_choices, add_study_options, carry_out, exit_status
+from benchmarks.study import Study, add_choices, add_study_options, carry_out, exit_status
 from drake_dress.file_output import write_text
 
 _NAME = "dressing"
@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     seeds, said = chosen_seeds(options)
     chosen = cases(options.methods, options.persons, options.coats, seeds, options.variation)
-    results, stopped = carry_out(options, _NAME, Case, chosen, run, tables, said=said)
+    results, stopped = carry_out(options, Study(_NAME, Case, run, tables, figures), chosen, said)
     done = [r for r in results if "summary" in r]
     if options.table:
         write_table(options.table, done, drawn)

@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.dressing.cases import METHODS, SERIES_STEP
+from benchmarks.figures import Figure, at_most
 from benchmarks.statistics import wilson
 from drake_dress.drawing import as_svg, plain_settings
 from drake_dress.models.arrays import FloatArray
@@ -70,6 +71,28 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         Table("Persons and coats", ["", *_HEADER], by_group),
         Table("Why not", ["method", "reason", "runs"], reasons),
     ]
+
+
+def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    """Returns the figures of each method beside what is asked."""
+    found = []
+    for method in METHODS:
+        mine = [r["summary"] for r in _of(results, method=method)]
+        if not mine:
+            continue
+        count = len(mine)
+        dressed = sum(bool(s["success"]) for s in mine)
+        low, high = wilson(dressed, count)
+        short = 100.0 * sum(map(_short_of_the_shoulder, mine)) / count
+        crossed = sum((s.get("layers_crossed_at_end") or 0) > 0 for s in mine)
+        found += [
+            Figure(f"{method}: runs dressed", dressed, f"of {count}"),
+            Figure(f"{method}: dressed, lower end of the 90 % interval", 100.0 * low, "%"),
+            Figure(f"{method}: dressed, upper end of the 90 % interval", 100.0 * high, "%"),
+            at_most(f"{method}: both arms inside, a sleeve below s = {MIN_S:g}", short, "%", 1.0),
+            at_most(f"{method}: runs with layers crossed at the end", crossed, f"of {count}", 0),
+        ]
+    return found
 
 
 @plain_settings()

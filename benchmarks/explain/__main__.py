@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.explain.cases import COARSE, Case, make, study
-from benchmarks.explain.tables import reliability_plot, right, tables
+from benchmarks.explain.tables import figures, reliability_plot, right, tables
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import (
     OneLineParser,
@@ -65,6 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 write_results(options.json, kept)
             print(f"{number}/{len(new)} {_line(result)}", flush=True)
     results = [kept[case.name] for case in chosen if case.name in kept]
+    if options.json is not None:
+        write_results(options.json, kept, figures(results))
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
     print(f"\n{shown}", flush=True)
     if options.into:

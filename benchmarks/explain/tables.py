@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, at_least
 from benchmarks.statistics import wilson
 from drake_dress.discrepancy.explanation import DISCRETISATION
 from drake_dress.drawing import as_svg, plain_settings
@@ -97,6 +98,17 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
             ],
         ),
     ]
+
+
+def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    """Returns the share of each group that is right beside what is asked; at the study's centre."""
+    found = []
+    central = [r for r in results if _setting(r) == _setting(results[0])]
+    for group, asked in ASKED.items():
+        hits = [right(r) for r in central if r["case"]["group"] == group]
+        if hits:
+            found.append(at_least(f"{group}: right", 100.0 * float(np.mean(hits)), "%", asked))
+    return found
 
 
 def _shared(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

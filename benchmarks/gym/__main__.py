@@ -11,7 +11,6 @@ Processor time per step is that of all cores together; it depends less on what e
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import time as clock
 from collections.abc import Sequence
@@ -22,10 +21,9 @@ import numpy as np
 import psutil
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, every, write_figures
 from benchmarks.parser import at_least_one, bench_parser, exit_with, output_file, some_of
 from benchmarks.section import add_into_option, around, write_between
-from drake_dress import __version__
-from drake_dress.file_output import write_text
 from drake_dress.gym import ENV_ID, ControllerPolicy, make_vec
 
 _NAME = "gym"
@@ -46,14 +44,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.into is not None:
         around(options.into, _NAME)
     tables: list[Table] = []
-    figures: list[dict[str, Any]] = []
+    figures: list[Figure] = []
     if "speed" in options.only:
         rows = [_speed(kind, n, options.steps) for kind in _KINDS for n in options.processes]
         header = ["plant, observations", "processes", "reset, s", "steps/s", "CPU ms per step"]
         tables.append(Table(f"Steps at 50 Hz, {os.cpu_count()} cores", header, rows))
         for kind, count, _, rate, _ in rows:
             name = f"environment steps per second, {kind}, {count} processes"
-            figures.append({"name": name, "value": rate, "unit": "1/s", "asked": None, "met": None})
+            figures.append(Figure(name, rate, "1/s"))
     rows = []
     if "dressing" in options.only:
         for seed in options.seeds:
@@ -63,21 +61,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         title = f"{options.scenario}, dressed by its own controllers through the environment"
         tables.append(Table(title, header, rows))
         dressed = sum(row[1] == "dressed" for row in rows)
-        figures.append(
-            {
-                "name": "episodes in which the scenario's controllers dress the person",
-                "value": dressed,
-                "unit": f"of {len(rows)}",
-                "asked": len(rows),
-                "met": dressed == len(rows),
-            }
-        )
+        name = "episodes in which the scenario's controllers dress the person"
+        figures.append(every(name, dressed, len(rows)))
     shown = "\n\n".join(table.text() for table in tables)
     print(f"\n{shown}")
     if options.into is not None:
         write_between(options.into, _NAME, shown)
     if options.json is not None:
-        write_text(options.json, _as_json(options, tables, figures))
+        rows_of = {t.title: [dict(zip(t.header, r, strict=True)) for r in t.rows] for t in tables}
+        seeds = options.seeds if "dressing" in options.only else []
+        write_figures(options.json, figures, seeds, tables=rows_of)
     return int(any(row[1] != "dressed" for row in rows))
 
 
@@ -130,19 +123,6 @@ def _dressing(scenario: str, seed: int, overrides: Sequence[str]) -> list[Any]:
     policy.close()
     env.close()
     return [seed, info["ended_by"], info["time"], *spent, sum(total.values()), *total.values()]
-
-
-def _as_json(
-    options: argparse.Namespace, tables: Sequence[Table], figures: Sequence[dict[str, Any]]
-) -> str:
-    content = {
-        "version": __version__,
-        "machine": {"cores": os.cpu_count()},
-        "seeds": options.seeds if "dressing" in options.only else [],
-        "tables": {t.title: [dict(zip(t.header, r, strict=True)) for r in t.rows] for t in tables},
-        "figures": figures,
-    }
-    return json.dumps(content, indent=1) + "\n"
 
 
 def _numbers(text: str) -> list[int]:

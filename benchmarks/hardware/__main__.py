@@ -19,11 +19,18 @@ from typing import Any
 
 from benchmarks.hardware.faults import BELIEFS, FAULTS, REACTIONS
 from benchmarks.hardware.parts import PARTS, Case, Conditions, run
-from benchmarks.hardware.tables import tables, tell
+from benchmarks.hardware.tables import figures, tables, tell
 from benchmarks.hardware.two_processes import available
 from benchmarks.kept import seed_range
 from benchmarks.parser import at_least_one, bench_parser, exit_with, number_between, some_of
-from benchmarks.study import add_choices, add_study_options, carry_out, exit_status, place_of
+from benchmarks.study import (
+    Study,
+    add_choices,
+    add_study_options,
+    carry_out,
+    exit_status,
+    place_of,
+)
 from drake_dress.errors import UserError
 from drake_dress.shipped import shipped_scenario
 
@@ -53,7 +60,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run(case, conditions, out, overrides)
 
     chosen = _cases(options.only, options.kinds, options.seeds, options.repeats)
-    results, stopped = carry_out(options, _NAME, Case, chosen, measured, tables, tell)
+    results, stopped = carry_out(
+        options, Study(_NAME, Case, measured, tables, figures, tell), chosen
+    )
     status = exit_status(results, stopped)
     return status or int(any(r["summary"].get("wrong") for r in results))
 

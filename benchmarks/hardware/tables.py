@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, every
 from benchmarks.hardware.faults import BELIEFS, FAULTS
 from benchmarks.hardware.parts import Case
 
@@ -65,25 +66,44 @@ def tell(summary: dict[str, Any]) -> str:
     return "measured"
 
 
-def _commands(done: Sequence[dict[str, Any]]) -> list[list[Any]]:
-    """Returns what is asked, and of the measurements the middle, the ends, and how many meet it."""
+def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    """Returns medians of commands, and how many faults were answered as stated."""
+    done = [(Case(**r["case"]), r["summary"]) for r in results]
+    found = []
+    for what, unit, values, least, most in _asked([s for c, s in done if c.part == "commands"]):
+        middle = float(np.median(values))
+        found.append(Figure(what, middle, unit, most, least <= middle <= most))
+    faults = [s for c, s in done if c.part == "faults"]
+    if faults:
+        right = sum(not s["wrong"] for s in faults)
+        found.append(every("faults answered as stated", right, len(faults)))
+    return found
+
+
+def _asked(
+    done: Sequence[dict[str, Any]],
+) -> list[tuple[str, str, list[float], float, float]]:
+    """Returns of each figure of commands: name, unit, values, least and most that are asked."""
     if not done:
         return []
     latency = [s["command_latency_ms"] for s in done]
-    rate, start = ([s[key] for s in done] for key in ("command_rate_hz", "start_up_s"))
-    middle, late = ([ms[key] for ms in latency] for key in ("median", "p99"))
+    return [
+        ("rate", "Hz", [s["command_rate_hz"] for s in done], 196.0, 204.0),
+        ("status to command, median", "ms", [ms["median"] for ms in latency], 0.0, 10.0),
+        ("status to command, 99 %", "ms", [ms["p99"] for ms in latency], 0.0, 25.0),
+        ("start of the process to first command", "s", [s["start_up_s"] for s in done], 0.0, 10.0),
+    ]
 
-    def row(name: str, asked: str, values: list[float], least: float, most: float) -> list[Any]:
+
+def _commands(done: Sequence[dict[str, Any]]) -> list[list[Any]]:
+    """Returns what is asked, and of the measurements the middle, the ends, and how many meet it."""
+    rows = []
+    for what, unit, values, least, most in _asked(done):
+        asked = f"≤ {most:g}" if least == 0.0 else "200 ± 2 %"
         met = sum(least <= v <= most for v in values)
         shown = (f"{v:.1f}" for v in (np.median(values), min(values), max(values)))
-        return [name, asked, *shown, f"{met} of {len(values)}"]
-
-    return [
-        row("rate, Hz", "200 ± 2 %", rate, 196.0, 204.0),
-        row("status to command, median, ms", "≤ 10", middle, 0.0, 10.0),
-        row("status to command, 99 %, ms", "≤ 25", late, 0.0, 25.0),
-        row("start of the process to first command, s", "≤ 10", start, 0.0, 10.0),
-    ]
+        rows.append([f"{what}, {unit}", asked, *shown, f"{met} of {len(values)}"])
+    return rows
 
 
 def _dressing(summary: dict[str, Any]) -> list[list[Any]]:

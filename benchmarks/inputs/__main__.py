@@ -12,7 +12,6 @@ a silence above the limit, or a result that is not the input's.
 from __future__ import annotations
 
 import argparse
-import json
 import secrets
 import tempfile
 from collections import Counter
@@ -22,6 +21,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import every, write_figures
 from benchmarks.inputs.measurements import prepare
 from benchmarks.inputs.trials import Outcome, Result
 from benchmarks.inputs.worker import KINDS, Worker
@@ -35,8 +35,6 @@ from benchmarks.parser import (
 )
 from benchmarks.section import add_into_option, around, write_between
 from benchmarks.side_by_side import completed
-from drake_dress import __version__
-from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
 _NAME = "inputs"
@@ -70,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"\n{r.index} {r.kind} {r.mutation} ({r.expect}): {r.problem}\n  {r.told.strip()}")
     print(f"\n{shown}\n\n{len(results) - len(failures)} of {len(results)} as they have to be")
     if options.json is not None:
-        write_text(options.json, _as_json(results, seed))
+        _write_json(options.json, results, seed)
     if options.into is not None:
         write_between(options.into, _NAME, shown)
     return int(bool(failures)) if stopped is None else stopped
@@ -126,27 +124,19 @@ def table(results: Sequence[Result], seed: int) -> Table:
     return Table(f"Drawn inputs, seed {seed}", [*header, "longest, s", "as they have to be"], rows)
 
 
-def _as_json(results: Sequence[Result], seed: int) -> str:
-    """Returns counts and failures: what was as it has to be is drawn again by its seed."""
+def _write_json(path: Path, results: Sequence[Result], seed: int) -> None:
+    """Writes counts and failures: what was as it has to be is drawn again by its seed."""
     failures = [asdict(r) for r in results if r.problem is not None]
     shown = table(results, seed)
-    content = {
-        "version": __version__,
-        "seeds": [seed],
-        "cases": len(results),
-        "table": [dict(zip(shown.header, row, strict=True)) for row in shown.rows],
-        "failures": failures,
-        "figures": [
-            {
-                "name": "drawn inputs that end as they have to",
-                "value": len(results) - len(failures),
-                "unit": f"of {len(results)}",
-                "asked": len(results),
-                "met": not failures,
-            }
-        ],
-    }
-    return json.dumps(content, indent=1, default=str) + "\n"
+    right = len(results) - len(failures)
+    write_figures(
+        path,
+        [every("drawn inputs that end as they have to", right, len(results))],
+        [seed],
+        cases=len(results),
+        table=[dict(zip(shown.header, row, strict=True)) for row in shown.rows],
+        failures=failures,
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

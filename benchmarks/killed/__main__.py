@@ -25,12 +25,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, every
 from benchmarks.kept import read_results
 from benchmarks.killed.ended_run import Ended, Plan
 from benchmarks.killed.verdict import fingerprints, problems
 from benchmarks.parser import at_least_one, bench_parser, exit_with, seed_number
 from benchmarks.scenario_run import run_scenario
-from benchmarks.study import add_study_options, carry_out, exit_status, place_of
+from benchmarks.study import Study, add_study_options, carry_out, exit_status, place_of
 from drake_dress.errors import UserError
 
 _NAME = "killed"
@@ -90,7 +91,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if not options.kept:
             _whole(Path(folder), tuple(options.set))
-        results, stopped = carry_out(options, _NAME, Case, cases, ended, _tables, _tell)
+        results, stopped = carry_out(
+            options, Study(_NAME, Case, ended, _tables, _figures, _tell), cases
+        )
     wrong = any(r["summary"]["wrong"] for r in results if "summary" in r)
     return exit_status(results, stopped) or int(wrong)
 
@@ -194,6 +197,11 @@ def _tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         "as they have to be",
     ]
     return [Table("Runs that are ended at random moments", header, rows)]
+
+
+def _figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    right = sum(not r["summary"]["wrong"] for r in results)
+    return [every("ended runs whose files are as they have to be", right, len(results))]
 
 
 def _parser() -> argparse.ArgumentParser:

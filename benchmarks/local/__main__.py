@@ -17,10 +17,10 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, at_most, write_figures
 from benchmarks.local.problems import random_problem
 from benchmarks.local.recorded import read_problems
 from benchmarks.parser import OneLineParser, at_least_one, output_file, seed_number
-from drake_dress.discrepancy.results import write_json
 from drake_dress.models.control.constrained_ddp import feedback_gains, solve_constrained_ddp
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.solution import Solution
@@ -79,7 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     trials = list(_trials(problems, rng))
     print(f"seed {options.seed}\n\n{table(trials).text()}")
     if options.json is not None:
-        write_json(options.json, {"seed": options.seed, "trials": [asdict(t) for t in trials]})
+        write_figures(
+            options.json, figures(trials), [options.seed], trials=[asdict(t) for t in trials]
+        )
     return 0
 
 
@@ -143,6 +145,19 @@ def _above(problem: LocalProblem, found: Solution, exact: Solution) -> float:
     """Returns by how much a solution costs more than the exact one, relative."""
     costs = [s.cost + problem.price * problem.spilled(s.v) for s in (found, exact)]
     return (costs[0] - costs[1]) / max(abs(costs[1]), 1e-12)
+
+
+def figures(trials: Sequence[Trial]) -> list[Figure]:
+    """Returns failures and times of each kind of problem."""
+    found = []
+    for kind in dict.fromkeys(t.kind for t in trials):
+        mine = [t for t in trials if t.kind == kind]
+        failed = sum(t.failed for t in mine)
+        found.append(at_most(f"{kind}: failed problems", failed, f"of {len(mine)}", 0))
+        for what, name in (("cold", "cold"), ("warm", "warm"), ("cone", "Clarabel's own")):
+            median = 1e3 * float(np.median([getattr(t, what) for t in mine]))
+            found.append(Figure(f"{kind}: {name} solve, median", median, "ms"))
+    return found
 
 
 def table(trials: Sequence[Trial]) -> Table:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure
 from benchmarks.kept import read_results, write_results
 from benchmarks.mutation.modules import MODULES
 from benchmarks.mutation.mutants import Mutant, all_mutants, change, draw, mutated
@@ -69,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     results[mutant.name] = _result(mutant, copy)
                     write_results(options.json, results)
     told = {m: r for m, r in results.items() if r["case"]["module"] in options.modules}
+    write_results(options.json, results, _figures(told))
     _print_results(told)
     print(f"\n{_table(told, seed).text()}")
     if options.into is not None:
@@ -106,6 +108,11 @@ def _table(results: Mapping[str, dict[str, Any]], seed: int) -> Table:
         rows.append(["all", *whole, 100.0 * (whole[1] + whole[2]) / whole[0]])
     header = ["module", "mutants", CAUGHT, TIMED_OUT, SURVIVED, "noticed, %"]
     return Table(f"Mutants that tests notice, seed {seed}", header, rows)
+
+
+def _figures(results: Mapping[str, dict[str, Any]]) -> list[Figure]:
+    noticed = sum(r["said"] != SURVIVED for r in results.values())
+    return [Figure("mutants that tests notice", noticed, f"of {len(results)}")]
 
 
 def _print_results(results: Mapping[str, dict[str, Any]]) -> None:

@@ -10,7 +10,6 @@ What was run stays in the folder of `--work`; the reference alone takes a quarte
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import Figure, write_figures
 from benchmarks.parser import at_least_one, bench_parser, exit_with, output_file, output_folder
 from benchmarks.plant.accuracy import (
     REFERENCE,
@@ -35,7 +35,6 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.errors import UserError
-from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.garment.mesh import GarmentMesh
@@ -89,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     shown = _table(results).text()
     print(f"\n{shown}")
     if options.json is not None:
-        write_text(options.json, json.dumps(results, indent=1) + "\n")
+        write_figures(options.json, _figures(results), [], runs=results)
     if options.into is not None:
         write_between(options.into, _NAME, shown)
     return 0
@@ -150,6 +149,20 @@ def _row(results: Sequence[dict[str, Any]], name: str) -> list[Any]:
         median("mean_step_ms"),
         median("mean_step_ms") / case["time_step"],
     ]
+
+
+def _figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
+    """Returns how far each setting is off and what it costs."""
+    found = []
+    for name in dict.fromkeys(r["case"]["name"] for r in results):
+        row = _row(results, name)
+        found += [
+            Figure(f"{name}: nodes off, median", row[3], "mm"),
+            Figure(f"{name}: force on grippers off, median", row[6], "N"),
+            Figure(f"{name}: force on the person off, median", row[8], "N"),
+            Figure(f"{name}: a step", row[11], "ms"),
+        ]
+    return found
 
 
 def _line(row: Sequence[Any]) -> str:

@@ -18,12 +18,14 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 
 from benchmarks.cloth.table import Table
+from benchmarks.figures import at_most, write_figures
 from benchmarks.logged import numbers_that_differ
-from benchmarks.parser import bench_parser, exit_with, output_folder, seed_number
+from benchmarks.parser import bench_parser, exit_with, output_file, output_folder, seed_number
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
@@ -63,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if reference is not None:
         with RunLog.open(reference):
             pass
-    rows: list[list[str | int]] = []
+    rows: list[list[Any]] = []
     with caught_interrupt() as stop:
         for number, case in enumerate(CASES):
             out = options.out / str(number)
@@ -88,6 +90,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"\n{shown}")
     if options.into is not None:
         write_between(options.into, _NAME, shown)
+    if options.json is not None:
+        figures = [
+            at_most(f"{row[0]}: datasets that differ", row[3], f"of {row[2]}", 0) for row in rows
+        ]
+        write_figures(options.json, figures, [] if options.seed is None else [options.seed])
     return int(any(row[3] for row in rows))
 
 
@@ -124,6 +131,7 @@ def _parser() -> argparse.ArgumentParser:
         help="another version's log, compared with instead",
     )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="figures")
     add_into_option(parser, _NAME)
     return parser
 

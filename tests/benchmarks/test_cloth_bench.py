@@ -34,6 +34,7 @@ from benchmarks.cloth.measure import Session, race, ratio
 from benchmarks.cloth.peers import flat, mujoco_flex, newton_style3d, newton_vbd
 from benchmarks.cloth.scene import SOFT, STIFF, Scene
 from benchmarks.cloth.table import shown
+from benchmarks.figures import plain
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 from tests.present import present
@@ -83,7 +84,7 @@ def few_engines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _assert_json(result: dict[str, Any]) -> None:
     """Checks that a result is written without loss but of NaN, and that its tables can be shown."""
-    again = json.loads(json.dumps(command._plain(result), allow_nan=False))
+    again = json.loads(json.dumps(plain(result), allow_nan=False))
     assert set(again) == set(result)
 
 

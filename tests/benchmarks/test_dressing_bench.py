@@ -186,7 +186,7 @@ def test_runs_in_a_file_are_not_run_again(
     assert bench.main([*words, "--seeds", "0-1"]) == 0
     assert bench.main([*words, "--seeds", "0-2"]) == 0
     assert [c.seed for c in asked] == [0, 1, 2]
-    assert len(json.loads(file.read_text())) == 3
+    assert len(json.loads(file.read_text())["runs"]) == 3
     assert "| full |" in capsys.readouterr().out
 
 
