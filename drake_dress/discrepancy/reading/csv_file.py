@@ -58,7 +58,7 @@ def read_csv(path: Path) -> list[RawRecording]:
             columns = [f"{name}/{written}/{axis}" for written in points.values() for axis in "xyz"]
             arrays[name] = take(columns).reshape(len(rows), len(points), 3)
             labels[name] = tuple(points)
-    # joints that are numbered have the order of the layout
+    # a joint's number is its index in the layout
     joints = labels.get(JOINTS)
     if joints and all(label.isdigit() for label in joints):
         order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints, "joint")

@@ -176,7 +176,7 @@ def _read(source: str, key: str, data: h5py.Dataset) -> np.ndarray:
 
 
 def _identity(group: h5py.Group) -> tuple[int, int]:
-    """Returns an identity of a group that does not depend on its name; groups may be nested."""
+    """Returns an identity of a group, whatever its name; links between groups may form cycles."""
     info = h5py.h5o.get_info(group.id)
     return info.fileno, info.addr
 

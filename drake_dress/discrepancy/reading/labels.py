@@ -9,7 +9,7 @@ from drake_dress.errors import UserError
 
 
 def label_of(text: str) -> str:
-    """Returns the canonical form of a label: whole numbers without zeros, other text unchanged.
+    """Returns the canonical form of a label: whole numbers as integers, other text unchanged.
 
     `07`, `7` and `7.0` are one label; `7.5` and `LSHO` are different ones.
     """
