@@ -194,7 +194,7 @@ def _cause(named: Named, model: Model) -> Cause:
 
 
 def _scores(found: Found) -> list[Score]:
-    """Returns the score of every effect in the first round, best first."""
+    """Returns the scores of all effects in the first round, best first."""
     scores = []
     for s in best_of_each(found.screened):
         effect, gain = found.fitted.get(s.candidate.name, (s.start, None))

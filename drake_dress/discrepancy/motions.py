@@ -51,7 +51,7 @@ def ease(t: FloatArray, start: float, end: float) -> FloatArray:
 
 
 def sway(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Oscillates in both horizontal directions, away from the person."""
+    """Returns a path that oscillates in both horizontal directions, away from the person."""
     size = rng.uniform(0.025, 0.04, 2)
     rate = np.array([rng.uniform(0.75, 0.95), rng.uniform(0.5, 0.7)])
 
@@ -66,7 +66,7 @@ def sway(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Heaves fast and twists about the vertical, away from the person."""
+    """Returns a path that heaves fast and twists about the vertical, away from the person."""
     height, rate = rng.uniform(0.05, 0.08), rng.uniform(1.0, 1.3)
     angle, turns = rng.uniform(0.15, 0.25), rng.uniform(0.5, 0.7)
 
@@ -84,7 +84,7 @@ def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Presses the garment against a limb and draws it up and down over it."""
+    """Returns a path that presses the garment against a limb and draws it up and down over it."""
     press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.055, 0.065)
 
     def path(t: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Presses the garment against a limb and draws it along the limb, back and forth."""
+    """Returns a path that presses the garment against a limb and draws it along, back and forth."""
     press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.09, 0.11) * rng.choice([-1.0, 1.0])
 
     def path(t: FloatArray) -> FloatArray:
@@ -108,7 +108,7 @@ def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Pulls the garment taut between the grippers, twice."""
+    """Returns a path that pulls the garment taut between the grippers, twice."""
     first, second = rng.uniform(0.015, 0.02), rng.uniform(0.032, 0.042)
 
     def path(t: FloatArray) -> FloatArray:
@@ -121,7 +121,7 @@ def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Lets the garment down fast and catches it, twice, away from the person."""
+    """Returns a path that lowers the garment fast and catches it, twice, away from the person."""
     first, second = rng.uniform(0.12, 0.16), rng.uniform(0.2, 0.25)
 
     def path(t: FloatArray) -> FloatArray:
@@ -134,7 +134,7 @@ def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def dress(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Draws a sleeve over a raised arm from its cuff, pulls it taut and rubs it along the arm."""
+    """Returns a path that draws a sleeve over a raised arm from its cuff, taut, and rubs it."""
     depth, rub = rng.uniform(0.18, 0.21), rng.uniform(0.045, 0.055)
     aside, taut = rng.uniform(-0.008, 0.008, 3), rng.uniform(0.03, 0.04)
     above = np.array([0.0, 0.0, 1.0]) - stage.up[2] * stage.up

@@ -3,8 +3,8 @@
 A replay of the inputs alone is chaotic: where cloth folds, two runs from nearly the same state are
 soon centimetres apart. So about every second the simulation is restarted from the state of the
 replay that is coupled to the markers, and runs freely. It is compared with the data up to the
-predictability horizon: the time in which an error of the size of the markers' noise grows to a few
-times its size.
+predictability horizon: the time in which an error of the size of the markers' noise grows a few
+times larger.
 """
 
 from __future__ import annotations

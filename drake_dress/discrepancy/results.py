@@ -26,7 +26,7 @@ def as_json(
     suggestion: str | None,
     notes: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Returns the content of explanation.json; `notes` say which data were not used or changed."""
+    """Returns the content of explanation.json; `notes` say which data were dropped or changed."""
     x = explanation
     causes = []
     for c in x.causes:

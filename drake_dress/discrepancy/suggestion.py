@@ -39,9 +39,10 @@ def suggest(
 ) -> str | None:
     """Returns a sentence on which motion to record; None if no question is open.
 
-    Every motion is simulated with each of two rivals: the ambiguous causes, or a doubted cause and
-    the next best candidate. The motion in which markers and forces differ most, in units of their
-    noise, distinguishes them best.
+    For unexplained data, it suggests to record each motion on its own. Otherwise every motion is
+    simulated with each of two rivals: the ambiguous causes, or a doubted cause and the next best
+    candidate. The motion in which markers and forces differ most, in units of typical noise (1 mm,
+    0.05 N), distinguishes them best.
 
     Args:
         explanation: result of the search.

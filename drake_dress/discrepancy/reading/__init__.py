@@ -80,7 +80,7 @@ def read_recordings(
 
 
 def _reader(path: Path) -> Callable[[Path], list[RawRecording]]:
-    """Returns the reader for a file; raises UserError if the file is missing, empty or unknown."""
+    """Returns a file's reader; raises UserError if it is missing, empty or of unknown kind."""
     source = str(path)
     try:
         if path.is_dir():

@@ -33,7 +33,8 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
 
-# Fewest and most markers: each costs time in every step of every simulation.
+# Fewest and most markers: fewer carry too little information, and each one costs time in every step
+# of every simulation.
 _LEAST_MARKERS, _MOST_MARKERS = 4, 1000
 # No measured value exceeds this in any unit; time since an epoch in nanoseconds is 2e18.
 _WILDEST = 1e20

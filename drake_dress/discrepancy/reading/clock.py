@@ -20,7 +20,7 @@ _UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 
 
 def checked_time(source: str, key: str, time: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Returns the time stamps (T,), s, and notes; a clock that counts from an epoch starts at 0.
+    """Returns time stamps (T,), s, shifted to start at 0 if they count from an epoch, and notes.
 
     Raises:
         UserError: too few samples, too short or too long, not increasing, sampled too slowly or too

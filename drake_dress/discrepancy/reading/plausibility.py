@@ -23,7 +23,7 @@ from drake_dress.report.log_schema import JOINT_NAMES
 
 # All positions are within this distance of the world's origin, m.
 _FARTHEST = 20.0
-# Largest distance of the rest places from the scenario's garment, m: median, and any.
+# Largest distance of the rest places from the scenario's garment, m: their median, and any.
 _OFF_GARMENT, _ANY_OFF_GARMENT = 0.1, 0.3
 # Bounds on the size of the cloud of markers, relative to that of their rest places.
 _SMALLEST, _LARGEST = 0.4, 2.8
