@@ -64,7 +64,7 @@ class Session:
     Attributes:
         motions: motions of the garment, keys of `MOTIONS`; one recording each.
         duration: duration of each recording, s.
-        sensors: sensors.
+        sensors: sample rate, number of markers, noise and drop-outs.
     """
 
     motions: Sequence[str] = USUAL
@@ -198,8 +198,8 @@ def record(
     Args:
         lab: the true lab.
         motion: key of `MOTIONS`.
-        duration: duration, s.
-        sensors: sensors; noise and drop-outs are not added.
+        duration: length of the recording, s.
+        sensors: sample rate and number of markers; noise and drop-outs are not added.
         rng: random number generator for the motion and the places of the markers.
     """
     time = np.arange(round(duration * sensors.rate) + 1) / sensors.rate
