@@ -1,4 +1,4 @@
-"""What a simulation gets wrong about measured data, in Python: recordings in, explanation out.
+"""Explains in Python what a simulation gets wrong about measured data.
 
     from drake_dress import explain
 
@@ -15,10 +15,10 @@
         print(cause.name, cause.effect, cause.std, cause.confidence)
     found.write("out/found")                # report.html, explanation.json, extended.yaml
 
-`register_effect` adds an effect of your own: a candidate for `explain`, something that `simulate`
-can hide, and a key below `effects:` in scenarios. Work is spread over processes that are spawned,
-so a script needs `if __name__ == "__main__":` before it calls `explain` or `simulate`; a notebook
-does not. What stands in `__all__` is public.
+`register_effect` adds an effect of your own. It becomes a candidate of `explain`, an effect that
+`simulate` can hide, and a key below `effects:` in scenarios. Work runs in spawned processes, so a
+script needs `if __name__ == "__main__":` before it calls `explain` or `simulate`; a notebook does
+not. The names in `__all__` are public.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ __all__ = [
     "unregister_effect",
 ]
 
-# A recording as it may be given; a file may hold several.
+# Types in which a recording may be given; a file may hold several.
 Given: TypeAlias = Measurement | Recording | str | Path
 
 
@@ -117,16 +117,16 @@ def explain(
     It takes minutes, on all cores; `docs/explain.md` has measured times.
 
     Args:
-        recordings: one or more; files are read as `drake-dress explain` reads them.
-        scenario: the model that is held against the data: a YAML file, the name of a scenario that
+        recordings: one or more recordings; files are read as by `drake-dress explain`.
+        scenario: model that is compared with the data: a YAML file, the name of a scenario that
             ships, or a `Scenario`, whose mesh file is then relative to the working directory.
-        overrides: KEY=VALUE changes of it, as `--set` takes them.
-        effects: names or classes of the effects that may be a cause; all that are known by default.
-        workers: processes; by default as many as there are cores.
-        stage: told what is being done, such as `print`.
+        overrides: KEY=VALUE changes of the scenario, as for `--set`; only with a file or a name.
+        effects: names or classes of the effects that may be a cause; by default all known ones.
+        workers: number of processes; by default the number of cores.
+        stage: called with a description of each stage; for example `print`.
 
     Raises:
-        UserError: something given cannot be used; says what and why. It is a ValueError.
+        UserError: an argument cannot be used; the message says which and why. It is a ValueError.
     """
     loaded, base = _loaded(scenario, overrides)
     among = None if effects is None else _names(effects)
@@ -138,17 +138,18 @@ def check_recordings(
     scenario: Scenario | str | Path,
     overrides: Sequence[str] = (),
 ) -> list[Recording]:
-    """Returns recordings as `explain` takes them, those of files first.
+    """Returns recordings checked as by `explain`, those of files first.
 
-    It takes seconds. `notes` of each say what was not taken as it stands, such as lost markers.
+    It takes seconds. The `notes` of each say which data were not used or were changed, such as lost
+    markers.
 
     Args:
         recordings: as in `explain`.
-        scenario: whose garment they are held against, as in `explain`.
-        overrides: likewise.
+        scenario: as in `explain`; recordings are checked against its garment.
+        overrides: as in `explain`.
 
     Raises:
-        UserError: something given cannot be used; says what and why.
+        UserError: an argument cannot be used; the message says which and why.
     """
     loaded, base = _loaded(scenario, overrides)
     return _checked(recordings, loaded, base)
@@ -164,23 +165,23 @@ def simulate(
     workers: int | None = None,
     stage: Callable[[str], None] = lambda _: None,
 ) -> Dataset:
-    """Returns recordings of a garment on which effects act that the scenario does not know.
+    """Returns simulated recordings of a garment on which effects act that the scenario lacks.
 
-    The truth is simulated otherwise: by another scheme, on a finer mesh, with a smaller step.
+    The true data are simulated with another scheme, a finer mesh and a smaller step.
 
     Args:
         scenario: as in `explain`.
-        hide: effects, or names joined by "+" of effects whose parameters are drawn, `random` or
+        hide: effects; or names, joined by "+", of effects with random parameters, `random` or
             `nothing`.
         overrides: KEY=VALUE changes of the scenario.
-        seed: of all that is drawn, 0 or more.
-        size: of what is drawn, times what matters.
-        session: motions, their duration, and what measures; the usual ones by default.
-        workers: processes; by default as many as there are cores.
-        stage: told what is being done.
+        seed: seed of all random draws, 0 or more.
+        size: factor on the strength of effects with random parameters.
+        session: motions, their duration, and sensors; the usual ones by default.
+        workers: number of processes; by default the number of cores.
+        stage: called with a description of each stage.
 
     Raises:
-        UserError: something given cannot be used; says what and why.
+        UserError: an argument cannot be used; the message says which and why.
     """
     if seed < 0:
         raise UserError("seed", "", f"is {seed}, expected 0 or more")
@@ -192,7 +193,7 @@ def simulate(
 
 
 def _loaded(scenario: Scenario | str | Path, overrides: Sequence[str]) -> tuple[Scenario, Path]:
-    """Returns a scenario, and the folder that names of mesh files in it are relative to."""
+    """Returns a scenario, and the folder that its mesh files are relative to."""
     if not isinstance(scenario, Scenario):
         file = scenario_file(str(scenario))
         return load_scenario(file, overrides), file.parent
@@ -225,7 +226,7 @@ def _checked(
 
 
 def _names(effects: Collection[str | type[Effect]]) -> set[str]:
-    """Returns the names of effects, each of which is known."""
+    """Returns the names of effects; raises UserError if one is unknown, or there are none."""
     if isinstance(effects, str):
         raise UserError("effects", effects, "is one name, expected a list of names")
     names = {e if isinstance(e, str) else e.NAME for e in effects}

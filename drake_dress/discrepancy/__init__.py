@@ -1,1 +1,1 @@
-"""Measured data against simulation: compare, name what is wrong, extend the model, report."""
+"""Compares measured data with simulation, names causes, extends the model and reports."""

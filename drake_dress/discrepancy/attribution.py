@@ -1,10 +1,10 @@
-"""Screens which effects may be what a simulation lacks.
+"""Screens which effects a simulation may lack.
 
-Every other block of time trains, the others judge, and the other way round. A candidate's gain is
-the share of the squared whitened residual that it takes away where it was judged. Coarse cloth may
-fold another way than what was measured as soon as an effect acts on it, in some recordings: what a
-candidate makes worse as a whole is not held against it here, and its coefficients are also sought
-such that all recordings and signals count alike.
+Screening trains on every other block of time and judges on the rest, and the other way round. A
+candidate's gain is the share of the squared whitened residual that it removes where it is judged.
+In some recordings coarse cloth folds differently from the measured cloth as soon as an effect acts
+on it. So recordings that a candidate makes worse do not count against it here, and its coefficients
+are also computed with equal weights of all recordings and signals.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from drake_dress.discrepancy.whitening import Whitening, whiten
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.effects.effect import Effect
 
-# Fits that are tried after screening, and the least share of the best one's gain they must promise.
+# Most candidates that are fitted after screening, and their least gain relative to the best one's.
 _SHORTLIST, _PROMISING = 4, 0.3
 
 
 @dataclass(frozen=True)
 class Screened:
-    """What linear screening says of one candidate.
+    """Result of linear screening for one candidate.
 
     Attributes:
-        candidate: which.
+        candidate: the candidate.
         start: the effect with the coefficients found.
-        gain: share of the held-out loss taken away, in the recordings that it betters.
+        gain: share of the held-out loss that it removes, in the recordings that it improves.
     """
 
     candidate: Candidate
@@ -42,13 +42,13 @@ class Screened:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Simulations of all levels without further effects.
+    """Simulations at all levels without further effects.
 
     Attributes:
-        whitening: of the data.
-        told: what each level says of each recording.
-        vector: (N,) of it, whitened.
-        extrapolation: of the refined one.
+        whitening: whitening of the data.
+        told: predictions of each level for each recording.
+        vector: (N,) these predictions by level, whitened.
+        extrapolation: extrapolation of the refined simulation to zero time step.
     """
 
     whitening: Whitening
@@ -109,7 +109,7 @@ def probe(
     comparison: Comparison,
     progress: Callable[[], None] | None = None,
 ) -> list[tuple[Candidate, FloatArray]]:
-    """Returns the columns (N,k) of every candidate, each at the level that tells it."""
+    """Returns the columns (N,k) of every candidate, from the coarsest level that resolves it."""
     lab = experiment.labs["screening"]
     found = candidates(lab.garment.rest_position, lab.effects, experiment.among)
     jobs: list[tuple[Level, Sequence[Effect]]] = [
@@ -124,7 +124,7 @@ def probe(
 
 
 def compare(experiment: Experiment, progress: Callable[[], None] | None = None) -> Comparison:
-    """Returns the data against the simulation at all levels."""
+    """Returns the comparison of the data with simulations at all levels."""
     order: list[Level] = ["refined", "doubled", "scenario", "screening"]
     told = dict(
         zip(order, experiment.tell([(level, ()) for level in order], progress), strict=True)
@@ -138,13 +138,13 @@ def compare_with(
     scenario: Sequence[Told],
     refined: Sequence[Told],
 ) -> Comparison:
-    """Returns the same simulations against data that are whitened by the numerics of others.
+    """Returns a comparison of the same simulations, whitened by the numerical error of others.
 
     Args:
-        experiment: with its recordings.
-        comparison: of all levels.
-        scenario: what the scenario's simulation says with some effects.
-        refined: what the refined one says with the same.
+        experiment: the recordings.
+        comparison: simulations at all levels.
+        scenario: predictions of the scenario's simulation with some effects.
+        refined: predictions of the refined simulation with the same effects.
     """
     return _compared(experiment, comparison.told, scenario, refined)
 
@@ -170,7 +170,7 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def shortlist(screened: Sequence[Screened]) -> list[Screened]:
-    """Returns those worth a fit."""
+    """Returns the candidates that are worth a fit, at most one for each effect."""
     ranked = best_of_each(screened)
     if not ranked or ranked[0].gain <= 0.0:
         return []

@@ -1,4 +1,4 @@
-"""Which effects may explain a residual, and how each is probed from where it is off."""
+"""The effects that may explain a residual, and how each is probed around its off state."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from drake_dress.models.effects.registry import EFFECTS
 
 @dataclass(frozen=True)
 class Probe:
-    """An effect at a size that matters, whose change of the prediction is one column.
+    """An effect at a typical size, whose change of the prediction is one column.
 
     Attributes:
-        effect: so that its column is its linear share at coefficient 1.
-        parameter: that is scaled by the coefficient.
-        low: bound on the coefficient; the other one is open.
+        effect: the effect at coefficient 1, which gives the column.
+        parameter: parameter that the coefficient scales.
+        low: lower bound on the coefficient; there is no upper one.
     """
 
     effect: Effect
@@ -30,30 +30,30 @@ class Probe:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way in which an effect may be there.
+    """One form that an effect may take.
 
     Attributes:
-        name: of the effect.
-        probes: a column each; the effect is their combination.
+        name: name of the effect.
+        probes: probes with a column each; the effect is their combination.
     """
 
     name: str
     probes: tuple[Probe, ...]
 
     def effect(self, coefficients: FloatArray) -> Effect:
-        """Returns the effect with its columns' coefficients, within its bounds."""
+        """Returns the effect for coefficients of its columns, clipped to its bounds."""
         first = self.probes[0].effect
         values = {p.name: getattr(first, p.name) for p in first.parameters() if p.shapes}
         for probe, a in zip(self.probes, coefficients, strict=True):
             value = getattr(probe.effect, probe.parameter)
-            # the pressure of wind grows with its square
+            # the pressure of wind grows with the square of its speed
             a = np.sign(a) * np.sqrt(abs(a)) if self.name == Wind.NAME else a
             values[probe.parameter] = float(a * value)
         return bounded(type(first), values)
 
 
 def bounded(kind: type[Effect], values: dict[str, float]) -> Effect:
-    """Returns an effect with values cut to its bounds."""
+    """Returns an effect with values clipped to its bounds."""
     limits = {p.name: p for p in kind.parameters()}
     return kind(**{n: float(np.clip(v, limits[n].low, limits[n].high)) for n, v in values.items()})
 
@@ -66,9 +66,9 @@ def candidates(
     """Returns all candidates.
 
     Args:
-        rest_position: (n,3) of the garment, m, where effects with a place are tried.
-        on: effects that the scenario has already; these are not tried again.
-        among: names of the effects to try; all that are known by default.
+        rest_position: (n,3) rest shape of the garment, on which local effects are placed, m.
+        on: effects that the scenario already has; they are not tried.
+        among: names of the effects to try; by default all known ones.
     """
     taken = {e.NAME for e in on}
     found: list[Candidate] = []
@@ -80,10 +80,10 @@ def candidates(
 
 
 def _ways(start: Effect) -> list[Candidate]:
-    """Returns the ways in which an effect that is shaped like `start` may be there."""
+    """Returns the candidates for an effect that is shaped like `start`."""
     name, sizes = start.NAME, start.sizes()
     if start.NEEDS_CONTACT and len(sizes) == 1 and sizes[0].low < sizes[0].off:
-        # what sticks or slides does not answer to both signs alike
+        # stick and slip respond differently to the two signs
         (p,) = sizes
         size = getattr(start, p.name)
         both = (replace(start, **{p.name: sign * size}) for sign in (1.0, -1.0))
@@ -96,7 +96,7 @@ def _ways(start: Effect) -> list[Candidate]:
 
 
 def shifted(effect: Effect, parameter: str, by: float) -> Effect:
-    """Returns the effect with one parameter changed, to the other side where a bound is near."""
+    """Returns the effect with one parameter shifted, in the other direction if a bound is near."""
     p = next(q for q in effect.parameters() if q.name == parameter)
     value = getattr(effect, parameter)
     moved = value + by if p.low <= value + by <= p.high else value - by

@@ -1,4 +1,4 @@
-"""What `drake-dress explain` and `drake-dress dataset measured` do."""
+"""Implements `drake-dress explain` and `drake-dress dataset measured`."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def explain_files(
 
     Args:
         files: measured logs.
-        scenario_file: YAML of the model that is held against them.
-        overrides: KEY=VALUE changes of it.
-        out: directory to write to; made when all input has proved usable.
-        workers: processes; by default as many as there are cores.
+        scenario_file: YAML of the model that is compared with them.
+        overrides: KEY=VALUE changes of the scenario.
+        out: directory to write to; it is made once all input has proved usable.
+        workers: number of processes; by default the number of cores.
 
     Raises:
         UserError: a file cannot be used.
@@ -58,7 +58,7 @@ def explain_files(
         print(f"note: {note}")
     with _progress() as (stage, tick):
         found = explained(scenario, base, recordings, None, workers, stage, tick)
-    # whatever comes of the files, the answer is there
+    # print the answer first, in case the files cannot be written
     print(found, flush=True)
     found.write(out, "--out")
     print(f"report, explanation and extended scenario: {out}")
@@ -75,20 +75,20 @@ def write_dataset(
     sensors: Sensors | None = None,
     motions: Sequence[str] = USUAL,
 ) -> None:
-    """Writes measured.h5, and apart answer.json.
+    """Writes measured.h5, and the hidden effects to answer.json.
 
     Args:
-        hide: effects joined by "+", `nothing` or `random`.
-        seed: of all that is drawn.
-        out: directory.
-        scenario_file: the model that knows nothing of what is hidden.
-        overrides: KEY=VALUE changes of it.
-        size: of the effect, times what matters.
-        sensors: noise, markers, rate.
-        motions: what is done with the garment.
+        hide: names of effects joined by "+", `nothing` or `random`.
+        seed: seed of all random draws.
+        out: directory to write to.
+        scenario_file: YAML of the model without the hidden effects.
+        overrides: KEY=VALUE changes of the scenario.
+        size: factor on the strength of the hidden effects.
+        sensors: noise, number of markers and rate.
+        motions: motions of the garment.
 
     Raises:
-        UserError: an effect has no such name, or the scenario cannot be used.
+        UserError: an effect is unknown, or the scenario cannot be used.
     """
     if seed < 0:
         raise UserError("--seed", "", f"is {seed}, expected 0 or more")
@@ -109,7 +109,7 @@ def write_dataset(
 def _answer(hidden: Sequence[Effect]) -> dict[str, Any]:
     """Returns the content of answer.json: the hidden effects and their parameters.
 
-    Parameters are grouped by effect where there are several.
+    Parameters are grouped by effect if there are several effects.
     """
     names = [e.NAME for e in hidden]
     answer = {
@@ -123,7 +123,7 @@ def _answer(hidden: Sequence[Effect]) -> dict[str, Any]:
 
 @contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[], None]]]:
-    """Yields what says the stage and what counts replays: a bar, or lines where no one watches."""
+    """Yields callbacks for stages and replays: a progress bar, or lines if not on a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda text: print(text, file=sys.stderr, flush=True), lambda: None

@@ -1,12 +1,12 @@
-"""Recordings and the simulations that are held against them, at several levels of numerics.
+"""Recordings and the simulations that are compared with them, at several levels of numerics.
 
     screening  coarser than the scenario, for derivatives by many parameters
-    scenario   as the scenario says
-    doubled    as refined, with twice the step
-    refined    finer in mesh and step: what the scenario's model would say without its numerics
+    scenario   the scenario's own settings
+    doubled    like refined, with twice the time step
+    refined    finer mesh and time step: approximates the scenario's model without numerical error
 
-What one level says about a change of parameters is added to what the refined one says at a point
-nearby (multi-fidelity): p ↦ refined(p₀) + level(p) − level(p₀).
+Fits are multi-fidelity: the change of a coarser level with the parameters is added to the refined
+prediction at a point nearby: p ↦ refined(p₀) + level(p) − level(p₀).
 """
 
 from __future__ import annotations
@@ -33,23 +33,25 @@ LEVELS: tuple[Level, ...] = ("screening", "scenario", "doubled", "refined")
 _Key = tuple[Level, int, tuple[Effect, ...]]
 _Replayers = dict[tuple[Level, int], Replayer]
 
-# ω of the observer, 1/s: soft enough to see what is wrong, hard enough not to lose the garment.
+# ω of the observer, 1/s: soft enough to keep discrepancies visible, stiff enough to follow the
+# garment.
 GAIN = 6.0
-# About how long the simulation runs on its own, s; the least that is a window, in samples.
+# Approximate length of a free run, s; fewest samples in a window.
 _WINDOW, _LEAST_SAMPLES = 1.0, 5
-# Simulations of all recordings that are remembered.
+# Simulations that are cached, each of all recordings.
 _REMEMBERED = 48
-# What a simulation says at most, m and N: one that swings up says nothing, and must not overflow.
+# Bounds on a prediction, m and N: an unstable simulation carries no information and must not
+# overflow.
 _FAR, _HARD = 10.0, 1e3
 
 
 @dataclass(frozen=True)
 class Told:
-    """What a simulation says of one recording, at the samples that are compared.
+    """A simulation's prediction of one recording, at the compared samples.
 
     Attributes:
-        marker: (S,m,3) m.
-        force: (S,2,3) N.
+        marker: (S,m,3) positions of the markers, m.
+        force: (S,2,3) force of the garment on the grippers, N.
         contact: (S,) share of the nodes that touch the person.
     """
 
@@ -60,11 +62,11 @@ class Told:
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a recording that the simulation ran through on its own.
+    """A free run of the simulation over a part of a recording.
 
     Attributes:
-        sample: (W,) indices of the recording; time: (W,) s.
-        marker: (W,m,3) m; disturbed: started a little off; None where that was not asked for.
+        sample: (W,) indices of the recording's samples; time: (W,) their time stamps, s.
+        marker: (W,m,3) markers, m; disturbed: the same from a perturbed start, or None.
     """
 
     sample: IndexArray
@@ -75,12 +77,12 @@ class Window:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """What a simulation says of one recording without looking at the markers.
+    """A simulation's prediction of one recording without coupling to the markers.
 
     Attributes:
-        windows: each started where the replay in step with the markers is then.
-        length: of a window at most, s.
-        whole: (T,m,3) from the start of the recording to its end, m.
+        windows: free runs, each started from the state of the coupled replay at that time.
+        length: longest duration of a window, s.
+        whole: (T,m,3) markers of a free run over the whole recording, m.
     """
 
     windows: tuple[Window, ...]
@@ -89,16 +91,16 @@ class FreeRun:
 
 
 def level_of(*effects: Effect) -> Level:
-    """Returns the coarsest level that tells what effects change.
+    """Returns the coarsest level that resolves the effects.
 
-    Coarse cloth bridges what is round: of what friction changes at the refined level, the screening
-    level told a quarter (correlation 0.28), the scenario's most (0.85).
+    Coarse cloth bridges round bodies. Of the changes by friction at the refined level, the
+    screening level showed a quarter (correlation 0.28), the scenario's level most (0.85).
     """
     return "scenario" if any(e.NEEDS_CONTACT for e in effects) else "screening"
 
 
 def levels(numerics: Numerics) -> dict[Level, Numerics]:
-    """Returns the numerics of each level about those of a scenario."""
+    """Returns the numerical settings of each level, derived from those of a scenario."""
     n = numerics
     refined = replace(
         n,
@@ -123,15 +125,15 @@ def levels(numerics: Numerics) -> dict[Level, Numerics]:
 
 
 class Experiment:
-    """All recordings with all levels; a context manager that owns worker processes.
+    """All recordings and all levels; a context manager that owns worker processes.
 
     Args:
-        scenario: its plant is the simulation held against data.
+        scenario: its plant is the simulation that is compared with data.
         base: directory that a mesh file's name is relative to.
-        recordings: at least one.
-        period: between compared samples, s.
-        workers: processes; by default as many as there are cores.
-        among: names of the effects that may be a cause; all that are known by default.
+        recordings: recordings, at least one.
+        period: time between compared samples, s.
+        workers: number of processes; by default the number of cores.
+        among: names of the effects that may be a cause; by default all known ones.
     """
 
     def __init__(
@@ -152,7 +154,7 @@ class Experiment:
         self.samples = [_samples(r, period) for r in self.recordings]
         self._count = workers or worker_count()
         self._workers: Workers | None = None
-        # how the garment hangs at the start of each recording, (n,3) m
+        # the settled garment at the start of each recording, (n,3) m
         self._starts: dict[tuple[Level, int], FloatArray] = {}
         self._told: dict[_Key, Told] = {}
         self._apart: set[tuple[Level, int]] = set()
@@ -177,7 +179,7 @@ class Experiment:
             self._workers = None
 
     def _settle(self) -> None:
-        """Finds how the garment hangs: at the first level, from where the others start."""
+        """Settles the garment at the first level, from which the others are initialized."""
         first = LEVELS[0]
         count = range(len(self.recordings))
         coarse = self._map(_settled, [((first, i), None) for i in count])
@@ -189,7 +191,7 @@ class Experiment:
         others = [(level, i) for level in near for i in count]
         fine = self._map(_settled, [(key, near[key[0]] @ coarse[key[1]]) for key in others])
         self._starts |= dict(zip(others, fine, strict=True))
-        # on the same mesh
+        # same mesh as the refined level
         self._starts |= {("doubled", i): self._starts["refined", i] for i in count}
 
     def tell(
@@ -197,13 +199,14 @@ class Experiment:
         jobs: Sequence[tuple[Level | Sequence[Level], Sequence[Effect]]],
         progress: Callable[[], None] | None = None,
     ) -> list[list[Told]]:
-        """Returns what simulations say of each recording; what was told once is remembered.
+        """Returns the predictions of simulations for each recording; recent ones are cached.
 
-        Effects of contact are let be in recordings that were told before, without effects and at
-        the same level, to have none.
+        Contact effects are left out for recordings in which an earlier simulation without effects,
+        at the same level, had no contact.
 
         Args:
-            jobs: level, of all recordings or of each, and effects of each simulation.
+            jobs: for each simulation, its level, one for all recordings or one for each, and its
+                effects.
             progress: called after each replay of one recording.
         """
         count = len(self.recordings)
@@ -228,7 +231,7 @@ class Experiment:
         return answer
 
     def _key(self, level: Level, index: int, effects: Sequence[Effect]) -> _Key:
-        """Returns what is simulated: no effects of contact where there was none without them."""
+        """Returns the cache key, without contact effects if the recording is known to have none."""
         apart = (level, index) in self._apart
         return (
             level,
@@ -241,10 +244,11 @@ class Experiment:
         jobs: Sequence[tuple[Level, Sequence[Effect], bool]],
         progress: Callable[[], None] | None = None,
     ) -> list[list[FreeRun]]:
-        """Returns what simulations say of each recording on their own.
+        """Returns free runs of simulations for each recording.
 
         Args:
-            jobs: level, effects, and whether windows are run a second time, started a little off.
+            jobs: for each simulation, its level, its effects, and whether windows are run a second
+                time from a perturbed start.
             progress: called after each recording.
         """
         count = len(self.recordings)
@@ -284,7 +288,7 @@ def _replay(
     try:
         p = replayer.run(effects, gain=GAIN)
     except ValueError:
-        # effects may be tried at values with which coarse steps swing up
+        # coarse steps may be unstable at some values of the effects that are tried
         if not effects:
             raise
         markers = replayer.recording.marker_position.shape[1]
@@ -331,6 +335,6 @@ def _run_free(
 
 
 def _samples(recording: Recording, period: float) -> IndexArray:
-    """Returns the indices of samples at least `period` apart."""
+    """Returns the index of the first sample in each period."""
     slots = np.floor((recording.time - recording.time[0]) / period + 1e-6)
     return np.flatnonzero(np.diff(slots, prepend=-1.0) > 0)

@@ -1,6 +1,6 @@
-"""The whole of `drake-dress explain`: recordings and a scenario in, an explanation with files out.
+"""All of `drake-dress explain`: from recordings and a scenario to an explanation and its files.
 
-The command line and `drake_dress.explain` both come here.
+Both the command line and `drake_dress.explain` use it.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from drake_dress.models.effects.effect import Effect
 class Explained:
     """What the simulation gets wrong about recordings.
 
-    `print(explained)` says it in a sentence.
+    `print(explained)` prints the verdict as a sentence.
 
     Attributes:
         found: verdict, causes and candidates, with all numbers of the search.
-        suggestion: what to record next; None where nothing is open.
-        notes: what of the data was not used, or not taken as it stands.
-        extended_yaml: the scenario with what was found, which `drake-dress run` takes.
-        content: what `explanation.json` holds.
+        suggestion: what to record next; None if no question is open.
+        notes: which data were not used, or were changed.
+        extended_yaml: the scenario extended by the causes found, as YAML for `drake-dress run`.
+        content: content of `explanation.json`.
     """
 
     found: Explanation
@@ -56,7 +56,7 @@ class Explained:
 
     @property
     def causes(self) -> list[Cause]:
-        """The causes in the order found: effect with values, deviations, gain and confidence."""
+        """The causes in the order found: effect, standard deviations, gain and confidence."""
         return self.found.causes
 
     @property
@@ -71,7 +71,7 @@ class Explained:
 
     @property
     def residual(self) -> dict[str, dict[str, float]]:
-        """RMS on held-out data: before, after and noise, each `marker_m` and `force_N`."""
+        """RMS residual on held-out data: before, after and noise, each `marker_m` and `force_N`."""
         residual: dict[str, dict[str, float]] = self.content["residual"]
         return residual
 
@@ -95,11 +95,11 @@ class Explained:
     def write(self, out: str | Path, option: str = "out") -> None:
         """Writes `explanation.json`, `extended.yaml` and `report.html`.
 
-        Where the report cannot be made, that is told on stderr and the others are written.
+        If the report cannot be made, a message goes to stderr and the other files are written.
 
         Args:
-            out: folder, which is made.
-            option: that names it, for messages.
+            out: folder; it is created if needed.
+            option: name of the option or argument that gives the folder, for messages.
 
         Raises:
             UserError: the folder cannot be written to.
@@ -135,12 +135,12 @@ def explained(
     """Returns what a scenario's simulation gets wrong about recordings.
 
     Args:
-        scenario: its plant is the simulation that is held against data.
+        scenario: its plant is the simulation that is compared with data.
         base: directory that a mesh file's name is relative to.
-        recordings: at least one.
-        among: names of the effects that may be a cause; all that are known by default.
-        workers: processes; by default as many as there are cores.
-        stage: told what is being done.
+        recordings: recordings, at least one.
+        among: names of the effects that may be a cause; by default all known ones.
+        workers: number of processes; by default the number of cores.
+        stage: called with a description of each stage.
         progress: called after each replay.
     """
     notes = tuple(all_notes(recordings))

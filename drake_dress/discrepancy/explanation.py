@@ -1,8 +1,9 @@
-"""From recordings to a verdict: what the simulation gets wrong, why, and by how much it is mended.
+"""From recordings to a verdict: what the simulation gets wrong, why, and how much can be corrected.
 
-The story: hold the simulation against the data at three levels of numerics; ask first whether finer
-numerics explain what is wrong; screen all effects, fit the likely ones, keep the one that explains
-most of what was held out; look for another in what is left, until nothing more stands out.
+Simulations with four levels of numerics are compared with the data, to see first whether finer
+numerics remove the residual. Then all effects are screened and the likely ones are fitted. The one
+that explains most of the held-out data is kept. This repeats on the rest of the residual until no
+effect stands out.
 """
 
 from __future__ import annotations
@@ -25,21 +26,22 @@ from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect
 
 DISCRETISATION = "discretisation"
-# A cause below this confidence is told as likely, not as found.
+# A cause below this confidence is reported as likely, not as found.
 BELIEVED = 0.9
-# Numerics are named where they are off by so many times the markers' noise, and refining them takes
-# away at least this share of the squared residual beyond noise.
+# Discretisation is named if its error is this many times the markers' noise, and refinement removes
+# at least this share of the squared residual beyond noise.
 _COARSE, _MENDED = 2.5, 0.5
-# A residual is unexplained where so many times the noise's variance is left, and less than this
-# share of what exceeds noise has been explained: contact leaves some, whatever is right.
+# A residual is unexplained if it keeps this many times the noise's variance, and less than this
+# share of its excess over noise is explained. Contact always leaves some residual.
 LEFT, _EXPLAINED = 1.12, 0.3
+# Above the first multiple of the noise's variance, the second share is required instead.
 _MUCH, _MOST = 1.5, 0.85
-# Nothing is unexplained that the numerics' own size covers: for that verdict the refined simulation
-# may be off by all that refining has changed, where the search for causes takes 0.45 of it. That
-# share is an average; in single recordings what is left is up to the whole.
+# Share of the change by refinement that counts as numerical error in the verdict: data are
+# unexplained only if the whole change does not cover the residual. The search for causes uses 0.45,
+# which is an average; in single recordings the error is up to the whole.
 _WHOLE_NUMERICS = 1.0
-# A cause is believed in proportion to what exceeds noise and is explained, up to this share, unless
-# less than so many times the noise's variance is left.
+# Confidence grows with the explained share of the excess over noise, up to this share. It is not
+# reduced if less than this many times the noise's variance is left.
 _WHOLE, _AT_NOISE = 0.85, 1.06
 _RESAMPLES = 1000
 
@@ -49,11 +51,11 @@ class Cause:
     """One cause with its parameters.
 
     Attributes:
-        name: of the effect.
-        effect: with its values; None for discretisation.
-        std: of its parameters.
-        gain: share of the held-out loss that it takes away.
-        confidence: that it is this one, and that it is not something else that no effect is like.
+        name: name of the effect.
+        effect: the effect with its values; None for discretisation.
+        std: standard deviations of its parameters.
+        gain: share of the held-out loss that it removes.
+        confidence: confidence that it is this effect, and not one that the list lacks, 0 to 1.
     """
 
     name: str
@@ -65,13 +67,13 @@ class Cause:
 
 @dataclass(frozen=True)
 class Score:
-    """How one effect did.
+    """Result of one effect that was tried.
 
     Attributes:
-        name: of the effect.
-        screened: linear gain.
-        fitted: gain after a fit; None where it was not worth one.
-        effect: as fitted or as screened.
+        name: name of the effect.
+        screened: gain in linear screening.
+        fitted: gain after a fit; None if it was not fitted.
+        effect: the effect as fitted or as screened.
     """
 
     name: str
@@ -82,19 +84,19 @@ class Score:
 
 @dataclass
 class Explanation:
-    """What was found.
+    """Result of the search for causes.
 
     Attributes:
         verdict: nothing, named, ambiguous or unexplained.
-        causes: in the order found.
-        scores: of every effect tried, best first, in the first round.
-        loss: mean squared whitened residual on blocks held out: scenario, refined, extended; and
-            refined with the numerics' error at its whole size, `beyond_numerics`.
-        gain: 1 − (after − 1) / (before − 1) of it, and its 90 % interval.
-        before, after: RMS of the residual on blocks held out, m and N; noise likewise.
-        numerics: RMS difference of scenario and refined simulation, m.
-        comparison: all levels without further effects.
-        predicted: (N,) whitened, with all causes, fitted on other blocks.
+        causes: causes in the order found.
+        scores: scores of every effect tried, best first, in the first round.
+        loss: mean squared whitened residual on held-out blocks: scenario, refined, extended; and
+            refined with the full numerical error as noise, `beyond_numerics`.
+        gain: 1 − (after − 1) / (before − 1) of the loss, and its 90 % interval.
+        before, after: RMS of the residual on held-out blocks, m and N; noise likewise.
+        numerics: RMS difference between scenario and refined simulation, m.
+        comparison: simulations at all levels without further effects.
+        predicted: (N,) whitened prediction with all causes, fitted on the other blocks.
     """
 
     verdict: str
@@ -116,7 +118,7 @@ class Explanation:
 
     @property
     def doubted(self) -> Cause | None:
-        """The cause with least confidence, where that is little."""
+        """The cause with the least confidence, if that is below `BELIEVED`; else None."""
         least = min(self.causes, key=lambda c: c.confidence, default=None)
         return None if least is None or least.confidence >= BELIEVED else least
 
@@ -130,9 +132,9 @@ def explain(
     """Returns what the simulation gets wrong about the experiment's recordings.
 
     Args:
-        experiment: open.
-        seed: of the resampling.
-        stage: told what is being done.
+        experiment: an open experiment.
+        seed: seed of the resampling.
+        stage: called with a description of each stage.
         progress: called after each replay.
     """
     rng = np.random.default_rng(seed)
@@ -147,7 +149,7 @@ def explain(
 
 
 def _coarse(comparison: Comparison, numerics: float) -> list[Cause]:
-    """Returns discretisation as a cause where it is one."""
+    """Returns discretisation as a cause; empty if it is none."""
     w = comparison.whitening
     scenario, refined = comparison.vector["scenario"], comparison.vector["refined"]
     markers = ~w.is_force
@@ -161,10 +163,10 @@ def _coarse(comparison: Comparison, numerics: float) -> list[Cause]:
 
 
 def _beyond_numerics(experiment: Experiment, found: Found) -> float:
-    """Returns the mean squared residual without effects, held out, over noise and numerics.
+    """Returns the mean squared held-out residual without effects, relative to noise and numerics.
 
-    The numerics' error is taken at its whole size: what refining the scenario's simulation has
-    changed. About 1 or less where nothing else is left.
+    The numerical error is taken as the full change by refinement of the scenario's simulation. The
+    result is about 1 or less if nothing else is left.
     """
     w, told = found.comparison.whitening, found.comparison.told
     whole = whiten(
@@ -192,7 +194,7 @@ def _cause(named: Named, model: Model) -> Cause:
 
 
 def _scores(found: Found) -> list[Score]:
-    """Returns how every effect did at the start, best first."""
+    """Returns the scores of all effects in the first round, best first."""
     scores = []
     for s in best_of_each(found.screened):
         effect, gain = found.fitted.get(s.candidate.name, (s.start, None))
@@ -207,20 +209,20 @@ def _concluded(
     beyond: float,
     rng: np.random.Generator,
 ) -> Explanation:
-    """Returns the explanation that the search's result amounts to.
+    """Returns the explanation that follows from the search's result.
 
     Args:
-        found: where the search ended.
-        coarse: discretisation as a cause, where it is one.
-        numerics: RMS difference of scenario and refined simulation, m.
-        beyond: mean squared residual over noise and numerics, without effects.
-        rng: of the resampling.
+        found: result of the search.
+        coarse: discretisation as a cause, if it is one.
+        numerics: RMS difference between scenario and refined simulation, m.
+        beyond: mean squared residual without effects, relative to noise and numerics.
+        rng: random number generator for the resampling.
     """
     comparison, w = found.comparison, found.comparison.whitening
     physical = _causes(found)
     predicted = found.model.predicted
     scenario, refined = comparison.vector["scenario"], found.plain.predicted
-    # with discretisation among the causes, the scenario is what is mended
+    # with discretisation among the causes, the gain is relative to the scenario's simulation
     start = scenario if coarse else refined
     size = np.bincount(w.block)
 
@@ -234,7 +236,7 @@ def _concluded(
     is_open = left > LEFT and gain[0] < (_MOST if left > _MUCH else _EXPLAINED)
     is_covered = beyond <= LEFT
     if physical and found.rival is None and is_open and is_covered:
-        # numerics are all that is seen, and no effect explains them
+        # the numerical error covers the residual, and no effect explains it
         physical, predicted = [], refined
         gain, left = gain_of(predicted), mean_of(predicted)
     trust = 1.0 if left < _AT_NOISE else float(np.clip(gain[0] / _WHOLE, 0.0, 1.0))
@@ -264,10 +266,10 @@ def _verdict(causes: list[Cause], has_rival: bool, is_open: bool, is_left: bool)
     """Returns the verdict, as in `Explanation`.
 
     Args:
-        causes: that were found.
+        causes: causes that were found.
         has_rival: whether another effect explains nearly as much.
         is_open: whether the physical causes leave much of the residual unexplained.
-        is_left: whether more is left than noise and numerics account for.
+        is_left: whether the residual exceeds noise and numerical error.
     """
     if not causes:
         return "unexplained" if is_left else "nothing"
@@ -298,6 +300,6 @@ def _interval(
 
 
 def _rms(values: FloatArray, rows: BoolArray, dimensions: int = 3) -> float:
-    """Returns the RMS of vectors whose components are entries."""
+    """Returns the RMS norm of vectors with the chosen entries as components; 0 without entries."""
     chosen = values[rows]
     return float(np.sqrt(dimensions * np.mean(chosen**2))) if len(chosen) else 0.0

@@ -1,4 +1,4 @@
-"""Gauss–Newton fits of effects' parameters on whitened residuals, and how sure they are."""
+"""Gauss–Newton fits of effects' parameters to whitened residuals, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -19,29 +19,31 @@ from drake_dress.discrepancy.whitening import NUMERICS_SHARE, Whitening
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect, Parameter
 
-# Levels of the recordings, effects.
+# Level of each recording, effects.
 _Job = tuple[tuple[Level, ...], Sequence[Effect]]
 
-# Step of derivatives and largest step of an iteration, in sizes that matter.
+# Step of finite differences and largest step of an iteration, in typical sizes.
 _DIFFERENCE, _TRUST = 0.25, 4.0
-# How much a fit may raise what a recording has lost, before its simulation is taken to have gone
-# astray: coarse cloth may fold another way.
+# Growth of a recording's loss above which its coarse simulation counts as diverged: coarse cloth
+# may fold differently.
 _ASTRAY = 1.2
-# A block of a voice in which this much of the noise's variance is left counts less, as much less as
-# more is left: cloth that snaps a moment early says nothing about parameters. So often again.
+# A block of a voice that keeps more than this multiple of the noise's variance is weighted down in
+# proportion: cloth that snaps a moment too early carries no information on parameters. Number of
+# reweightings.
 _PLAUSIBLE, _REWEIGHTED = 2.0, 3
-# A step shorter than this, in sizes that matter, says nothing about slopes.
+# A step shorter than this, in typical sizes, does not update the slopes.
 _TELLING = 0.03
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What fits are made and judged by.
+    """Data and numerical error that fits are based on.
 
     Attributes:
-        whitening: with the data.
-        extrapolation: of the refined simulation.
-        numerics: (N,) what refining the scenario's simulation has changed, less what is free in it.
+        whitening: whitening, with the data.
+        extrapolation: extrapolation of the refined simulation to zero time step.
+        numerics: (N,) change by refinement of the scenario's simulation, without the part that
+            `extrapolation` explains.
     """
 
     whitening: Whitening
@@ -52,23 +54,24 @@ class Evidence:
     def of(
         cls, whitening: Whitening, extrapolation: Extrapolation, numerics: FloatArray
     ) -> Evidence:
-        """Takes all of what refining has changed (N,)."""
+        """Returns the evidence for the full change by refinement, `numerics` (N,)."""
         every = np.ones(len(numerics), dtype=np.bool_)
         return cls(whitening, extrapolation, extrapolation.without(numerics, every))
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects fitted jointly; lengths of steps are in sizes that matter.
+    """Effects fitted jointly; steps are in units of the parameters' typical sizes.
 
     Attributes:
-        effects: with parameters from all the data.
-        std: of each parameter, by effect's name and parameter: of what is random, robust to what
-            the blocks share, and of what the numerics leave open.
-        told: (N,) whitened, what the simulation is taken to say with `effects`.
-        change: (N,) of that with parameters from the blocks of which an entry is none.
-        slopes: (N,k) of `told` by the parameters.
-        step: (k,) that led here.
+        effects: effects with parameters fitted to all data.
+        std: standard deviation of each parameter, by name of effect and parameter. It includes
+            random error, robust to correlation within blocks, and numerical error.
+        told: (N,) whitened prediction of the simulation with `effects`, linear in the last step.
+        change: (N,) its change with parameters fitted to the blocks that an entry does not belong
+            to.
+        slopes: (N,k) derivatives of `told` by the parameters.
+        step: (k,) step that led to these parameters.
     """
 
     effects: tuple[Effect, ...]
@@ -88,19 +91,19 @@ def fit_all(
     iterations: int = 3,
     progress: Callable[[], None] | None = None,
 ) -> list[Fit]:
-    """Returns a fit for each set of effects in `start`; all run side by side.
+    """Returns a fit for each set of effects in `start`; their simulations run in parallel.
 
-    Simulations are run at the coarsest level that tells the effects. Cloth that coarse may fold
-    another way than what was measured: where a fit makes a recording much worse, that recording is
+    Simulations run at the coarsest level that resolves the effects. Cloth this coarse may fold
+    differently from the measured cloth. If a fit makes a recording much worse, that recording is
     simulated at the scenario's level from then on.
 
     Args:
-        experiment: with its recordings.
-        evidence: of them.
-        reference: (N,) whitened, what the refined simulation says with the effects `about`.
-        start: sets of effects with parameters to start from.
-        about: effects that `reference` holds.
-        iterations: of Gauss–Newton.
+        experiment: the recordings and their simulations.
+        evidence: data and numerical error.
+        reference: (N,) whitened prediction of the refined simulation with the effects `about`.
+        start: sets of effects with initial parameters.
+        about: effects that `reference` includes.
+        iterations: number of Gauss–Newton steps.
         progress: called after each replay.
     """
     recordings = len(experiment.recordings)
@@ -145,16 +148,16 @@ def with_slopes(
     told: FloatArray,
     progress: Callable[[], None] | None = None,
 ) -> Fit:
-    """Returns a fit that starts from its effects anew, with the refined simulation's own slopes.
+    """Returns a fit at the same effects, with slopes from the refined simulation and a zero step.
 
     Args:
-        experiment: with its recordings.
-        whitening: of them.
-        fit: whose effects are taken.
-        told: (N,) whitened, what the refined simulation says with them.
+        experiment: the recordings and their simulations.
+        whitening: whitening of the data.
+        fit: fit whose effects are used.
+        told: (N,) whitened prediction of the refined simulation with them.
         progress: called after each replay.
     """
-    # central ones: what snaps between two of three points does so on both sides of the middle
+    # central differences: a snap between any two of the three points enters them in the same way
     both = (_moved(fit.effects), _moved(fit.effects, -_DIFFERENCE))
     jobs: list[tuple[Level, Sequence[Effect]]] = [
         ("refined", effects) for side in both for effects, _ in side
@@ -163,7 +166,7 @@ def with_slopes(
     count = len(both[0])
     slopes = []
     for k, ((_, ahead), (_, behind)) in enumerate(zip(*both, strict=True)):
-        # at a bound both are on one side
+        # at a bound both shifts are to the same side: a one-sided difference
         low, at = (told, 0.0) if ahead == behind else (vectors[count + k], behind)
         slopes.append((vectors[k] - low) / (ahead - at))
     nothing = np.zeros_like(told)
@@ -171,22 +174,22 @@ def with_slopes(
 
 
 def fit_again(evidence: Evidence, fit: Fit, told: FloatArray) -> Fit:
-    """Returns a fit one step on, from what a better simulation says, with the slopes known so far.
+    """Returns a fit one step further, from a better simulation's prediction and the same slopes.
 
     Args:
-        evidence: of the recordings.
-        fit: to go on from.
-        told: (N,) whitened, what that simulation says with the fit's effects.
+        evidence: data and numerical error.
+        fit: fit to continue from.
+        told: (N,) whitened prediction of the better simulation with the fit's effects.
     """
     return _stepped(evidence, fit.effects, told, fit.slopes)
 
 
 def bettered(fit: Fit, change: FloatArray) -> Fit:
-    """Returns a fit with slopes that agree with what its step has changed (Broyden 1965).
+    """Returns a fit whose slopes agree with the change by its last step (Broyden 1965).
 
     Args:
-        fit: after its step.
-        change: (N,) whitened, of what the better simulation says, by that step.
+        fit: fit after its step.
+        change: (N,) change of the better simulation's whitened prediction by that step.
     """
     length2 = float(fit.step @ fit.step)
     if length2 < _TELLING**2:
@@ -196,7 +199,7 @@ def bettered(fit: Fit, change: FloatArray) -> Fit:
 
 
 def _astray(evidence: Evidence, before: FloatArray, after: FloatArray) -> list[bool]:
-    """Returns for each recording whether `after` (N,) is much worse than `before`."""
+    """Returns for each recording whether prediction `after` (N,) is much worse than `before`."""
     w = evidence.whitening
     every = np.ones(len(w.data), dtype=np.bool_)
     first, last = (
@@ -207,19 +210,19 @@ def _astray(evidence: Evidence, before: FloatArray, after: FloatArray) -> list[b
 
 
 def _raised(levels: Sequence[Level], astray: Sequence[bool]) -> tuple[Level, ...]:
-    """Returns the levels of recordings, the scenario's at least where one went astray."""
+    """Returns the levels of recordings, with the scenario's level where one diverged."""
     return tuple("scenario" if far else level for level, far in zip(levels, astray, strict=True))
 
 
 def _parameters(effects: Sequence[Effect]) -> list[tuple[int, Parameter]]:
-    """Returns the parameters of effects, each with its effect's number."""
+    """Returns the parameters of effects, each with the index of its effect."""
     return [(k, p) for k, e in enumerate(effects) for p in e.parameters()]
 
 
 def _moved(
     effects: Sequence[Effect], by: float = _DIFFERENCE
 ) -> list[tuple[tuple[Effect, ...], float]]:
-    """Returns the effects with one parameter a little further, and by how much, for each."""
+    """Returns, for each parameter, the effects with it shifted, and the shift in typical sizes."""
     found = []
     for k, p in _parameters(effects):
         changed = list(effects)
@@ -232,10 +235,11 @@ def _moved(
 def _stepped(
     evidence: Evidence, effects: Sequence[Effect], told: FloatArray, slopes: FloatArray
 ) -> Fit:
-    """Returns the fit one Gauss–Newton step on from effects with which (N,) is told.
+    """Returns the fit one Gauss–Newton step from effects whose whitened prediction is `told` (N,).
 
-    What finer numerics change moves the parameters too: a share of that is part of their
-    uncertainty. Blocks that stay far off are weighed down (iteratively reweighted least squares).
+    The change by refinement would move the parameters, too; a share of that shift is part of their
+    uncertainty. Blocks with large residuals are weighted down (iteratively reweighted least
+    squares).
     """
     w, free = evidence.whitening, _parameters(effects)
     now = np.array([getattr(effects[k], p.name) for k, p in free])
@@ -282,7 +286,7 @@ def _stepped(
 
 
 def _trust(w: Whitening, residual: FloatArray, rows: BoolArray) -> FloatArray:
-    """Returns (N,) the root of the weight of each entry's block and kind of signal."""
+    """Returns (N,) the square root of the weight of each entry's block and kind of signal."""
     part = 2 * w.block + w.is_force
     count = np.maximum(np.bincount(part[rows], minlength=part.max() + 1), 1)
     size = np.bincount(part[rows], residual[rows] ** 2, part.max() + 1) / count
@@ -291,9 +295,9 @@ def _trust(w: Whitening, residual: FloatArray, rows: BoolArray) -> FloatArray:
 
 
 def _robust_std(columns: FloatArray, residual: FloatArray, block: IndexArray) -> FloatArray:
-    """Returns (k,) standard deviations when residuals within a block hang together.
+    """Returns (k,) standard deviations for residuals that are correlated within a block.
 
-    The sandwich (JᵀJ)⁻¹ Σ_b (J_bᵀ r_b)(J_bᵀ r_b)ᵀ (JᵀJ)⁻¹ of clustered least squares.
+    The sandwich estimator (JᵀJ)⁻¹ Σ_b (J_bᵀ r_b)(J_bᵀ r_b)ᵀ (JᵀJ)⁻¹ of clustered least squares.
     """
     normal = columns.T @ columns
     inverse = np.linalg.pinv(normal + 1e-9 * np.trace(normal) * np.eye(len(normal)))

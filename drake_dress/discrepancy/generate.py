@@ -1,7 +1,7 @@
-"""Data that hides an effect: what a lab would measure if the garment were not quite the model's.
+"""Generates data that hide an effect: measurements of a garment that differs from the model.
 
-The truth is another simulation: Projective Dynamics to convergence on a finer mesh with a smaller
-step, other random draws, and a motion-capture system's noise and drop-outs on what it says.
+The true data come from another simulation: converged Projective Dynamics on a finer mesh with a
+smaller step and other random draws. Noise and drop-outs of a motion-capture system are added.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from drake_dress.models.garment.sampling import spread_out
 from drake_dress.models.human.body import ArmPose
 from drake_dress.worker_pool import WorkerPool
 
-# How much finer the truth is simulated than the scenario.
+# Mesh spacing and time step of the true simulation, relative to the scenario's.
 _FINER, _SHORTER = 0.84, 0.5
-# Where the garment hangs: free, before the person, and just before the limb, m.
+# Offsets of the hanging garment: free, behind the shoulders; and in front of the limb, m.
 _FREE_DISTANCE, _ABOVE_SHOULDERS, _BEFORE_LIMB, _ABOVE_LIMB = 0.8, 0.05, 0.25, 0.24
-# Where along the arm it is drawn over, from shoulder (0) to hand (1).
+# Point of the arm over which the garment is drawn, from shoulder (0) to hand (1).
 _ON_ARM = 0.55
-# Abduction of the arm that is held up: along a sleeve as it hangs, rad.
+# Abduction of the raised arm, along a hanging sleeve, rad.
 _RAISED = np.deg2rad(135.0)
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What measures, SI units.
+    """Sensors of a session.
 
     Attributes:
-        rate: Hz.
-        markers: number on the garment.
+        rate: sample rate, Hz.
+        markers: number of markers on the garment.
         marker_noise: standard deviation of a coordinate, m.
-        force_noise: of a component, N.
-        lost: share of the time that a marker is not seen, in bursts.
+        force_noise: standard deviation of a component, N.
+        lost: share of the time in which a marker is not seen, in bursts.
     """
 
     rate: float = 100.0
@@ -62,9 +62,9 @@ class Session:
     """What is recorded.
 
     Attributes:
-        motions: what is done with the garment, of `MOTIONS`; a recording each.
-        duration: of each recording, s.
-        sensors: what measures.
+        motions: motions of the garment, keys of `MOTIONS`; one recording each.
+        duration: duration of each recording, s.
+        sensors: sample rate, number of markers, noise and drop-outs.
     """
 
     motions: Sequence[str] = USUAL
@@ -72,7 +72,7 @@ class Session:
     sensors: Sensors = Sensors()
 
     def check(self, source: str) -> None:
-        """Raises UserError, which names `source`, where a motion is unknown or named twice."""
+        """Raises UserError, which names `source`, if a motion is unknown or named twice."""
         for name in self.motions:
             if name not in MOTIONS:
                 named = name or "an empty name"
@@ -83,11 +83,11 @@ class Session:
 
 @dataclass(frozen=True)
 class Dataset:
-    """Recordings, and what is hidden in them.
+    """Recordings, and the effects hidden in them.
 
     Attributes:
-        recordings: as measured, with noise.
-        hidden: effects of the truth that the scenario does not know.
+        recordings: recordings with noise.
+        hidden: effects in the data that the scenario does not have.
     """
 
     recordings: list[Recording]
@@ -104,20 +104,21 @@ def make_dataset(
     workers: int | None = None,
     stage: Callable[[str], None] = lambda _: None,
 ) -> Dataset:
-    """Returns what would be measured of a garment on which effects act.
+    """Returns simulated measurements of a garment on which hidden effects act.
 
     Args:
-        scenario: that knows nothing of the effects.
+        scenario: scenario without the hidden effects.
         base: directory that a mesh file's name is relative to.
-        hide: effects, or names joined by "+" of effects that are drawn, `nothing` or `random`.
-        seed: of all that is drawn.
-        size: of what is drawn, times what matters.
-        session: what is recorded.
-        workers: processes; by default as many as there are cores.
-        stage: told what is being done.
+        hide: effects; or names, joined by "+", of effects with random parameters, `nothing` or
+            `random`.
+        seed: seed of all random draws.
+        size: factor on the strength of effects with random parameters.
+        session: motions, duration and sensors.
+        workers: number of processes; by default the number of cores.
+        stage: called with a description of each stage.
 
     Raises:
-        UserError: an effect has no such name, or cannot be so large.
+        UserError: an effect is unknown or repeated, or a parameter of this size is out of bounds.
     """
     name = hide if isinstance(hide, str) else "+".join(e.NAME for e in hide) or NOTHING
     seeds = [seed, *name.encode()]
@@ -137,7 +138,7 @@ def make_dataset(
 
 
 def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> Lab:
-    """Returns the lab behind the data: the scenario's, simulated otherwise, with effects."""
+    """Returns the lab behind the data: the scenario's, with other numerics and with effects."""
     p = scenario.plant
     numerics = Numerics(_FINER * p.spacing, _SHORTER * p.time_step, "projective_dynamics")
     lab = Lab.of(scenario, base, numerics)
@@ -145,7 +146,7 @@ def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> Lab
 
 
 def stage(lab: Lab) -> Stage:
-    """Returns where a lab's motions take place."""
+    """Returns the positions at which a lab's motions take place."""
     joints = lab.person([]).posed
     shoulder, hand = joints[0], joints[2]
     rest = lab.garment.rest_position
@@ -163,13 +164,13 @@ def stage(lab: Lab) -> Stage:
         spread=left - right,
         hand=raised[2],
         up=up,
-        # the garment comes from outside, so it is the other side's
+        # the garment comes from beyond the left hand, so the arm enters its right cuff
         cuff=rest[lab.garment.loops["right_cuff"]].mean(axis=0) - 0.5 * (left + right),
     )
 
 
 def raised_arm(lab: Lab) -> Lab:
-    """Returns the lab whose person holds the left arm up sideways."""
+    """Returns the lab with the person's left arm raised sideways."""
     return replace(lab, arms={**lab.arms, "left": ArmPose(abduction=_RAISED)})
 
 
@@ -177,11 +178,11 @@ def unseen(lab: Lab, motion: str, path: FloatArray, time: FloatArray, nodes: Int
     """Returns a recording of a motion in which no marker was seen.
 
     Args:
-        lab: with the garment and the person.
-        motion: of `MOTIONS`.
-        path: (T,2,3) of the grippers, m.
-        time: (T,) s.
-        nodes: that carry markers.
+        lab: garment and person.
+        motion: key of `MOTIONS`.
+        path: (T,2,3) positions of the grippers, m.
+        time: (T,) time stamps, s.
+        nodes: nodes that carry markers.
     """
     posed = (raised_arm(lab) if motion in ARM_UP else lab).person([]).posed
     joints = seen_points(np.tile(posed, (len(time), 1, 1)), lab.effects)
@@ -192,14 +193,14 @@ def unseen(lab: Lab, motion: str, path: FloatArray, time: FloatArray, nodes: Int
 def record(
     lab: Lab, motion: str, duration: float, sensors: Sensors, rng: np.random.Generator
 ) -> Recording:
-    """Returns what would be measured without noise.
+    """Returns a simulated recording without noise.
 
     Args:
-        lab: the truth.
-        motion: of `MOTIONS`.
-        duration: s.
-        sensors: their rate and number are used.
-        rng: draws the motion and where markers sit.
+        lab: the true lab.
+        motion: key of `MOTIONS`.
+        duration: length of the recording, s.
+        sensors: sample rate and number of markers; noise and drop-outs are not added.
+        rng: random number generator for the motion and the places of the markers.
     """
     time = np.arange(round(duration * sensors.rate) + 1) / sensors.rate
     path = MOTIONS[motion](stage(lab), duration, rng)
@@ -225,16 +226,16 @@ def record_all(
     workers: int | None = None,
     done: Callable[[str], None] = lambda _: None,
 ) -> list[Recording]:
-    """Returns a recording of each motion without noise; they run side by side.
+    """Returns a recording of each motion without noise; the simulations run in parallel.
 
     Args:
-        scenario: that knows nothing of the effects.
+        scenario: scenario without the effects.
         base: directory that a mesh file's name is relative to.
-        effects: of the truth.
-        seed: of what is drawn; each motion draws from its own source.
-        session: what is recorded; of its sensors, rate and number are used.
-        workers: processes; by default as many as there are cores.
-        done: told the name of each motion that is there.
+        effects: effects in the true simulation.
+        seed: seed of random draws; each motion has its own generator.
+        session: motions, duration and sensors; noise and drop-outs are not added.
+        workers: number of processes; by default the number of cores.
+        done: called with the name of each motion when it is recorded.
     """
     motions, duration, sensors = session.motions, session.duration, session.sensors
     lab = truth(scenario, base, effects)
@@ -249,7 +250,7 @@ def record_all(
 
 
 def measured(recording: Recording, sensors: Sensors, rng: np.random.Generator) -> Recording:
-    """Returns a recording with the sensors' noise and drop-outs."""
+    """Returns a recording with the sensors' noise and drop-outs added."""
     markers = recording.marker_position
     markers = markers + sensors.marker_noise * rng.standard_normal(markers.shape)
     count, number = markers.shape[:2]

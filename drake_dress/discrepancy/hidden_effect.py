@@ -1,4 +1,4 @@
-"""Draws the effect that is hidden in generated data, at a size that matters."""
+"""Draws the effect that is hidden in generated data, at a relevant size."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Draw = Callable[[np.random.Generator, float], dict[str, float]]
 
 
 def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effect:
-    """Returns the effect called `name` with parameters drawn at `size` times what matters.
+    """Returns the effect called `name` with random parameters.
 
     Args:
-        name: of `EFFECTS` or `OUTSIDE`.
-        rng: source of chance.
-        size: factor on how strong it is.
+        name: key of `EFFECTS` or `UNLISTED`.
+        rng: random number generator.
+        size: factor on its strength; 1 is a relevant size.
     """
     kind = EFFECTS.get(name) or UNLISTED[name]
     draw = kind.draw if name in own_effects() else ALL_SIZES[name]
@@ -31,20 +31,21 @@ def draw_effect(name: str, rng: np.random.Generator, size: float = 1.0) -> Effec
 
 
 def hideable() -> tuple[str, ...]:
-    """Returns the names of the effects that `random` chooses from: those of the list, then own."""
+    """Returns the effects that `random` chooses from: the package's, then registered ones."""
     return (*SIZES, *own_effects())
 
 
 def draw_hidden(what: str, rng: np.random.Generator, size: float = 1.0) -> list[Effect]:
-    """Returns what is hidden.
+    """Returns the hidden effects with random parameters.
 
     Args:
-        what: names of effects joined by "+", `nothing`, or `random` for any of the list or nothing.
-        rng: source of chance.
-        size: factor on how strong it is.
+        what: names of effects joined by "+", `nothing`, or `random` for one of `hideable()` or
+            nothing.
+        rng: random number generator.
+        size: factor on the effects' strength.
 
     Raises:
-        UserError: there is no such effect, or it cannot be so large.
+        UserError: an effect is unknown or repeated, or a parameter of this size is out of bounds.
     """
     if what == RANDOM:
         what = str(rng.choice([NOTHING, *hideable()]))
@@ -81,7 +82,7 @@ def _one(name: str, low: float, high: float, both: bool = False) -> Draw:
 
 
 def _direction(names: str, low: float, high: float) -> Draw:
-    """Returns a vector of random direction and a length between `low` and `high`."""
+    """Returns a draw of vectors with random direction and a length from `low` to `high`."""
 
     def draw(rng: np.random.Generator, size: float) -> dict[str, float]:
         vector = rng.standard_normal(len(names.split()))
@@ -92,7 +93,7 @@ def _direction(names: str, low: float, high: float) -> Draw:
 
 
 def _local_mass(rng: np.random.Generator, size: float) -> dict[str, float]:
-    # a pocket: at the sides of the body or in front, between hem and chest
+    # a pocket anywhere around the body, between hem and chest
     angle = rng.uniform(-np.pi, np.pi)
     return {
         "mass": size * rng.uniform(0.03, 0.06),
@@ -121,7 +122,7 @@ def _magnetised_cuff(rng: np.random.Generator, size: float) -> dict[str, float]:
 
 
 def _snag(rng: np.random.Generator, size: float) -> dict[str, float]:
-    # where the front of a garment passes that is pressed against the arm held out
+    # where the front of a garment passes when it is pressed against the held-out arm
     return {
         "stiffness": size * rng.uniform(4.0, 8.0),
         "radius": 0.05,

@@ -1,4 +1,4 @@
-"""The lab as a scenario describes it: garment, person and how they are simulated."""
+"""The lab as a scenario describes it: garment, person and numerical settings."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ _ACCURACY = 2e-5
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely the garment is simulated.
+    """Numerical settings of the garment's simulation.
 
     Attributes:
-        spacing: of the mesh, m.
-        time_step: s.
+        spacing: spacing of the mesh, m.
+        time_step: time step, s.
         integrator: "implicit" or "projective_dynamics".
-        iterations: of the linear solver, at most.
+        iterations: iterations of the linear solver, at most.
         tolerance: relative residual at which it stops.
     """
 
@@ -57,14 +57,14 @@ class Numerics:
 
 @dataclass(frozen=True)
 class Lab:
-    """All that does not change between recordings.
+    """Everything that does not change between recordings.
 
     Attributes:
-        garment: the mesh.
-        material: of the garment.
-        numerics: how it is simulated.
-        measures, posture, arms: of the person.
-        effects: that the scenario switches on already.
+        garment: mesh of the garment.
+        material: fabric of the garment.
+        numerics: numerical settings of its simulation.
+        measures, posture, arms: sizes, posture and arm poses of the person.
+        effects: effects that the scenario switches on.
     """
 
     garment: GarmentMesh
@@ -80,9 +80,9 @@ class Lab:
         """Returns the lab of a scenario.
 
         Args:
-            scenario: its plant is the simulation that is held against data.
+            scenario: its plant is the simulation that is compared with data.
             base: directory that a mesh file's name is relative to.
-            numerics: in place of the scenario's.
+            numerics: settings in place of the scenario's.
         """
         p = scenario.plant
         numerics = numerics or Numerics(
@@ -100,7 +100,7 @@ class Lab:
 
     @property
     def held(self) -> tuple[IntArray, IntArray]:
-        """Nodes that grippers hold (k,), and which gripper holds each, 0 left, 1 right (k,)."""
+        """Held nodes (k,), and the gripper that holds each (k,): 0 left, 1 right."""
         parts = [self.garment.grasp[side] for side in SIDES]
         return (
             np.concatenate(parts).astype(np.int32),
@@ -108,7 +108,7 @@ class Lab:
         )
 
     def with_effects(self, further: Sequence[Effect]) -> list[Effect]:
-        """Returns the lab's effects and further ones, which take the place of those alike."""
+        """Returns the lab's effects and further ones, which replace those of the same name."""
         return list({e.NAME: e for e in (*self.effects, *further)}.values())
 
     def cloth(
@@ -117,12 +117,12 @@ class Lab:
         damping: float | None = None,
         time_step: float | None = None,
     ) -> GarmentWithEffects:
-        """Returns the garment with the lab's effects and further ones, ready to be stepped.
+        """Returns an integrator of the garment with the lab's effects and further ones.
 
         Args:
-            further: any.
-            damping: in place of the fabric's, s.
-            time_step: in place of the numerics', s.
+            further: further effects.
+            damping: damping in place of the fabric's, s.
+            time_step: time step in place of that of `numerics`, s.
         """
         n = self.numerics
         settings: ImplicitSettings | ProjectiveSettings
@@ -149,10 +149,10 @@ class Lab:
 
 
 class PersonShape:
-    """The person's capsules where joints were measured, or as posed.
+    """The person's capsules, placed by measured joints or as posed.
 
     Attributes:
-        limb: (c,) which of `LIMB_NAMES` a capsule is of, −1 for none.
+        limb: (c,) index in `LIMB_NAMES` of each capsule's limb, −1 for none.
     """
 
     LIMB_NAMES = tuple(f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm"))
@@ -166,11 +166,11 @@ class PersonShape:
         self._radius = np.array([c.radius for c in capsules])
         self._a = np.array([c.a_B for c in capsules])
         self._b = np.array([c.b_B for c in capsules])
-        # joints at the ends of a limb's axis: upper arm, forearm; the hand is a point
+        # a hand is a sphere of the forearm's limb: both ends of its axis coincide
         self._hand = np.array([np.array_equal(c.a_B, c.b_B) for c in capsules]) & (self.limb >= 0)
 
     def obstacles(self, joints: FloatArray, joint_velocity: FloatArray) -> Obstacles:
-        """Returns the person with joints (6,3), m, that move at (6,3), m/s."""
+        """Returns the person's capsules from joints (6,3), m, and their velocities (6,3), m/s."""
         a, b = self._a.copy(), self._b.copy()
         velocity, omega = np.zeros_like(a), np.zeros_like(a)
         for k in range(self.LIMBS):
@@ -187,14 +187,14 @@ class PersonShape:
         return Obstacles(a, b, self._radius, velocity, omega)
 
     def displaced(self, bodies: Obstacles, displacement: FloatArray, rate: FloatArray) -> Obstacles:
-        """Returns the person with limbs displaced by (4,3), m, at (4,3), m/s."""
+        """Returns the capsules with limbs displaced by (4,3), m, with velocities (4,3), m/s."""
         return displaced(bodies, self.limb, displacement, rate)
 
     def limb_forces(self, owner: IntArray, reaction: FloatArray) -> FloatArray:
         """Returns (4,3) the force of the garment on the limbs, N.
 
         Args:
-            owner: (n,) capsule that a node touches, −1 without.
-            reaction: (n,3) of the person on the nodes, N.
+            owner: (n,) capsule that each node touches, −1 for none.
+            reaction: (n,3) force of the person on the nodes, N.
         """
         return limb_forces(self.limb, self.LIMBS, owner, reaction)

@@ -16,7 +16,7 @@ from drake_dress.report.log_schema import JOINT_NAMES, SCHEMA
 
 
 def write_recordings(path: Path, recordings: Sequence[Recording], scenario_text: str) -> None:
-    """Writes `path`, an HDF5 file with a group a recording; nothing is left half written."""
+    """Writes an HDF5 file with a group for each recording; a failure leaves no partial file."""
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs["schema"] = SCHEMA
         file.attrs["scenario"] = scenario_text

@@ -1,4 +1,4 @@
-"""A recording as a user has it: arrays in a program, before they are held against a garment."""
+"""A recording as arrays in a user's program, before it is checked against a garment."""
 
 from __future__ import annotations
 
@@ -24,23 +24,25 @@ from drake_dress.models.sides import SIDES
 class Measurement:
     """One recording of a garment that two grippers hold; SI units, world frame, z up.
 
-    `explain` and `check_recordings` hold it against the scenario's garment, as they do with a file:
-    see `docs/explain.md` for what is refused.
+    `explain` and `check_recordings` check it against the scenario's garment, like a file. See
+    `docs/explain.md` for what they refuse.
 
     Args:
-        time: (T,) s, strictly increasing.
-        gripper_position: (T,2,3) of the left and the right gripper, m.
-        marker_position: (T,m,3) m; NaN where a marker was not seen.
-        marker_rest_position: (m,3) where the markers sit on the rest shape, garment frame, m.
-        marker_node: (m,) nodes of the scenario's garment in its place.
-        gripper_force: (T,2,3) of the garment on the grippers, N; None where not measured.
-        joint_position: (T,6,3) shoulder, elbow, hand of left, then of right, m; None likewise.
+        time: (T,) time stamps, strictly increasing, s.
+        gripper_position: (T,2,3) positions of the left and the right gripper, m.
+        marker_position: (T,m,3) positions of the markers, m; NaN where a marker was not seen.
+        marker_rest_position: (m,3) positions of the markers on the rest shape, garment frame, m.
+        marker_node: (m,) nodes of the scenario's garment, in place of `marker_rest_position`.
+        gripper_force: (T,2,3) force of the garment on the grippers, N; None if not measured.
+        joint_position: (T,6,3) shoulder, elbow, hand of the left, then the right arm, m; None if
+            not measured.
         marker_noise: standard deviation of a coordinate, m; estimated if None.
-        force_noise: of a component, N; estimated if None.
-        name: for messages and plots.
+        force_noise: standard deviation of a component, N; estimated if None.
+        name: name in messages and plots.
 
     Raises:
-        UserError: an array has the wrong shape or does not hold numbers.
+        UserError: an array or a noise cannot be used, or not exactly one of `marker_rest_position`
+            and `marker_node` is given.
     """
 
     time: npt.ArrayLike
@@ -64,7 +66,7 @@ class Measurement:
         self.raw()
 
     def raw(self) -> RawRecording:
-        """Returns it as what the readers of files give."""
+        """Returns the recording in the form that the readers of files return."""
         arrays = {
             dataset: self._array(field)
             for dataset, field in _WHOLE.items()
@@ -91,7 +93,7 @@ class Measurement:
         return value
 
 
-# Datasets of a file by the fields that hold them.
+# Correspondence of a file's datasets and the fields of `Measurement`.
 _WHOLE = {
     "time": "time",
     MARKERS: "marker_position",

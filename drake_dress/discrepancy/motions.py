@@ -1,7 +1,7 @@
-"""Motions to record: what two grippers do with a garment so that its physics shows.
+"""Motions to record: random paths of two grippers that reveal a garment's physics.
 
-Each is a path of both grippers over a few seconds that starts and ends at rest, drawn at random
-within a kind, so that no two recordings are alike.
+Each kind of motion is a path of both grippers over a few seconds that starts and ends at rest, with
+random parameters, so that no two recordings are alike.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ _STILL = 0.3
 
 @dataclass(frozen=True)
 class Stage:
-    """Where motions take place, world, m.
+    """Positions and directions for motions, world frame, m.
 
     Attributes:
-        free: (3,) middle of the grippers where nothing is near.
-        before: (3,) middle of the grippers when the garment hangs just before a limb.
-        along: (3,) unit, along that limb.
-        across: (3,) unit, horizontal, from `before` to the limb.
-        spread: (3,) from the right gripper to the left one, as the garment hangs without tension.
-        hand: (3,) of the arm held up; up: (3,) unit, along that forearm to the hand.
-        cuff: (3,) from the middle of the grippers to the cuff that the arm enters.
+        free: (3,) middle of the grippers, away from all obstacles.
+        before: (3,) middle of the grippers with the garment in front of a limb.
+        along: (3,) unit vector along that limb.
+        across: (3,) horizontal unit vector from `before` to the limb.
+        spread: (3,) vector from the right to the left gripper, with the garment free of tension.
+        hand: (3,) hand of the raised arm; up: (3,) unit vector along that forearm to the hand.
+        cuff: (3,) vector from the middle of the grippers to the cuff that the arm enters.
     """
 
     free: FloatArray
@@ -44,14 +44,14 @@ class Stage:
 
 
 def ease(t: FloatArray, start: float, end: float) -> FloatArray:
-    """Returns 0 before `start`, 1 after `end`, and a polynomial with two smooth derivatives."""
+    """Returns 0 before `start`, 1 after `end`, and between them a polynomial that is C² overall."""
     s = np.clip((t - start) / (end - start), 0.0, 1.0)
     eased: FloatArray = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
     return eased
 
 
 def sway(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns oscillations in both horizontal directions, in the open."""
+    """Returns a path that oscillates in both horizontal directions, away from the person."""
     size = rng.uniform(0.025, 0.04, 2)
     rate = np.array([rng.uniform(0.75, 0.95), rng.uniform(0.5, 0.7)])
 
@@ -66,7 +66,7 @@ def sway(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns fast heaves and a twist about the vertical, in the open."""
+    """Returns a path that heaves fast and twists about the vertical, away from the person."""
     height, rate = rng.uniform(0.05, 0.08), rng.uniform(1.0, 1.3)
     angle, turns = rng.uniform(0.15, 0.25), rng.uniform(0.5, 0.7)
 
@@ -84,7 +84,7 @@ def lift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a garment that is pressed against a limb and drawn up and down over it."""
+    """Returns a path that presses the garment against a limb and draws it up and down over it."""
     press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.055, 0.065)
 
     def path(t: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ def drag(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a garment that is pressed against a limb and drawn along it, there and back."""
+    """Returns a path that presses the garment against a limb and draws it along, back and forth."""
     press, rub = rng.uniform(0.25, 0.265), rng.uniform(0.09, 0.11) * rng.choice([-1.0, 1.0])
 
     def path(t: FloatArray) -> FloatArray:
@@ -108,7 +108,7 @@ def shift(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns grippers that draw the garment taut between them, twice."""
+    """Returns a path that pulls the garment taut between the grippers, twice."""
     first, second = rng.uniform(0.015, 0.02), rng.uniform(0.032, 0.042)
 
     def path(t: FloatArray) -> FloatArray:
@@ -121,7 +121,7 @@ def pull(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a garment that is let down fast and caught, twice, in the open."""
+    """Returns a path that lowers the garment fast and catches it, twice, away from the person."""
     first, second = rng.uniform(0.12, 0.16), rng.uniform(0.2, 0.25)
 
     def path(t: FloatArray) -> FloatArray:
@@ -134,7 +134,7 @@ def drop(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
 
 
 def dress(stage: Stage, duration: float, rng: np.random.Generator) -> Path:
-    """Returns a sleeve drawn over an arm held up, from its cuff, pulled taut and rubbed on it."""
+    """Returns a path that draws a sleeve over a raised arm from its cuff, taut, and rubs it."""
     depth, rub = rng.uniform(0.18, 0.21), rng.uniform(0.045, 0.055)
     aside, taut = rng.uniform(-0.008, 0.008, 3), rng.uniform(0.03, 0.04)
     above = np.array([0.0, 0.0, 1.0]) - stage.up[2] * stage.up
@@ -159,12 +159,12 @@ MOTIONS: dict[str, Callable[[Stage, float, np.random.Generator], Path]] = {
     "drop": drop,
     "dress": dress,
 }
-# During these the left arm is held up sideways.
+# Motions during which the left arm is raised sideways.
 ARM_UP = ("dress",)
-# What a lab records unless told otherwise.
+# Motions of a session by default.
 USUAL = ("sway", "lift", "drag", "pull", "dress")
 
 
 def _both(middle: FloatArray, spread: FloatArray) -> FloatArray:
-    """Returns (T,2,3) left and right gripper about a middle (T,3)."""
+    """Returns (T,2,3) the left and the right gripper from their middle (T,3) and spread."""
     return np.stack([middle + 0.5 * spread, middle - 0.5 * spread], axis=1)

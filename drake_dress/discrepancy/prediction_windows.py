@@ -1,9 +1,10 @@
-"""How long the simulation can be believed on its own, and how far it strays within that time.
+"""Free runs: how long the simulation can be trusted without markers, and how far it drifts.
 
-A replay of the inputs alone is chaotic: where cloth folds, two runs that start a hair apart are
-soon centimetres apart. So the simulation is started anew at every second from the state that the
-replay in step with the markers has then, runs on its own, and is compared for as long as an error
-of the markers' size does not grow beyond a few times that: the predictability horizon.
+A replay of the inputs alone is chaotic: where cloth folds, two runs from nearly the same state are
+soon centimetres apart. So about every second the simulation is restarted from the state of the
+replay that is coupled to the markers, and runs freely. It is compared with the data up to the
+predictability horizon: the time in which an error of the size of the markers' noise grows a few
+times larger.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.effects.effect import Effect
 
-# An error that has grown to so many times its size at the start is past the horizon.
+# Growth of an error, relative to its size at the start, that marks the horizon.
 _GROWN = 3.0
-# The least time that is compared, s; steps of the curves, s.
+# Shortest horizon, s; bin width of the curves, s.
 _LEAST, _BIN = 0.2, 0.05
 
 
 @dataclass(frozen=True)
 class Windows:
-    """How the simulation does on its own, before and after it was extended.
+    """Results of free runs, before and after the simulation was extended.
 
     Attributes:
-        horizon: of each recording, s; the windows' length where errors do not grow that far.
-        growth: (R,K) by how much an error of the markers' size grows.
+        horizon: horizon of each recording, s; the windows' length if errors do not grow that far.
+        growth: (R,K) growth of an error of the size of the markers' noise.
         since: (K,) time since a restart, s.
         before, after: (R,K) RMS of the markers' residual, m, NaN where nothing was seen.
         strayed: RMS within the horizon, before and after, m.
@@ -54,12 +55,12 @@ def windows(
     explanation: Explanation,
     progress: Callable[[], None] | None = None,
 ) -> Windows:
-    """Returns how the scenario's simulation does on its own, and how the extended one does.
+    """Returns the free runs of the scenario's simulation and of the extended one.
 
     Args:
-        experiment: open.
-        explanation: of it.
-        progress: called after each replay of one recording.
+        experiment: an open experiment.
+        explanation: explanation of the experiment.
+        progress: called after the free run of each recording.
     """
     finer = any(c.name == DISCRETISATION for c in explanation.causes)
     level: Level = "refined" if finer else "scenario"
@@ -93,7 +94,7 @@ def windows(
 
 
 def _growth(run: FreeRun, since: FloatArray) -> FloatArray:
-    """Returns (K,) the size of an error over its size at the start, median over the windows."""
+    """Returns (K,) the median over the windows of an error's size relative to its initial size."""
     sizes = []
     for window in run.windows:
         if window.disturbed is None:
@@ -105,7 +106,7 @@ def _growth(run: FreeRun, since: FloatArray) -> FloatArray:
 
 
 def _horizon(growth: FloatArray, since: FloatArray, length: float) -> float:
-    """Returns the time until an error has grown too far, s."""
+    """Returns the time until an error has grown past `_GROWN`, s."""
     past = np.flatnonzero(growth > _GROWN)
     return length if not len(past) else max(_LEAST, float(since[past[0]] - 0.5 * _BIN))
 

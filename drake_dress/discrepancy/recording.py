@@ -1,4 +1,4 @@
-"""What was measured: one recording, SI units, in the world that cameras and robot report."""
+"""A measured recording, in SI units and in the world frame that cameras and robot report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from drake_dress.models.arrays import BoolArray, FloatArray
 
-# Sightings that a parabola is fitted to, at least.
+# Fewest observations to which a parabola is fitted.
 _LEAST_SEEN = 3
 
 
@@ -18,16 +18,17 @@ class Recording:
     """One recording of a garment that two grippers hold.
 
     Attributes:
-        name: for messages and plots.
-        time: (T,) s, strictly increasing.
-        gripper_position: (T,2,3) of the left and the right gripper, m.
-        marker_position: (T,m,3) m; NaN where a marker was not seen.
-        marker_rest_position: (m,3) where markers sit on the rest shape, garment frame, m.
-        gripper_force: (T,2,3) of the garment on the grippers, N; None where not measured.
-        joint_position: (T,6,3) shoulder, elbow, hand of left, then of right, m; None likewise.
+        name: name in messages and plots.
+        time: (T,) time stamps, strictly increasing, s.
+        gripper_position: (T,2,3) positions of the left and the right gripper, m.
+        marker_position: (T,m,3) positions of the markers, m; NaN where a marker was not seen.
+        marker_rest_position: (m,3) positions of the markers on the rest shape, garment frame, m.
+        gripper_force: (T,2,3) force of the garment on the grippers, N; None if not measured.
+        joint_position: (T,6,3) shoulder, elbow, hand of the left, then the right arm, m; None if
+            not measured.
         marker_noise: standard deviation of a coordinate, m.
-        force_noise: of a component, N.
-        notes: what of the file was not used, or not taken as it stands.
+        force_noise: standard deviation of a component, N.
+        notes: which data of the file were not used, or were changed.
     """
 
     name: str
@@ -43,29 +44,30 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """From first to last sample, s."""
+        """Time from the first to the last sample, s."""
         return float(self.time[-1] - self.time[0])
 
     @property
     def gripper_path(self) -> CubicSpline:
-        """The grippers' way through all that was recorded, time to (2,3), m."""
+        """Spline through the recorded gripper positions, from time, s, to (2,3), m."""
         return CubicSpline(self.time, self.gripper_position, axis=0, bc_type="natural")
 
 
 def smoothed(
     time: FloatArray, position: FloatArray, half_window: float = 0.045
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Returns position, velocity and where they are known, of points seen with gaps.
+    """Returns smoothed positions and velocities of points seen with gaps, and where they are known.
 
-    A parabola is fitted to what was seen within the window around each time.
+    A parabola is fitted to the observations within a window around each time.
 
     Args:
         time: (T,) s.
         position: (T,m,3) m, NaN where not seen.
-        half_window: s.
+        half_window: half the width of the window, s.
 
     Returns:
-        (T,m,3) m, (T,m,3) m/s, zero where not known, and (T,m).
+        Positions (T,m,3), m, and velocities (T,m,3), m/s, both zero where not known; and (T,m)
+        whether they are known.
     """
     count, markers = position.shape[:2]
     seen: BoolArray = np.asarray(np.isfinite(position).all(axis=2))
@@ -81,7 +83,7 @@ def smoothed(
         weight = seen[s].astype(np.float64)
         normal = np.einsum("at,bt,tm->mab", powers, powers, weight)
         right = np.einsum("at,tm,tmc->mac", powers, weight, filled[s])
-        # both sides of the instant must have been seen, or the parabola is a guess
+        # without observations on both sides of the instant, the parabola would be a guess
         enough = (weight.sum(axis=0) >= _LEAST_SEEN) & (
             (weight * (t[:, None] < 0.5)).sum(axis=0) * (weight * (t[:, None] > -0.5)).sum(axis=0)
             > 0

@@ -1,11 +1,11 @@
-"""Least squares on whitened residuals of several voices whose simulation is a little off.
+"""Least squares on whitened residuals of several voices, for simulations with numerical error.
 
-A voice is one kind of signal in one recording. Two things are known of the simulation's own error
-beside its size. What is left of its time step is, to first order, a multiple of what halving the
-step has changed: that direction is free in each voice (Richardson's extrapolation with the factor
-left open). And it misleads one voice more than another: voices that disagree by more than noise
-are weighted alike, not by how much data they hold (the random-effects model of meta-analysis,
-DerSimonian and Laird 1986).
+A voice is one kind of signal in one recording. Two properties of the numerical error are used, in
+addition to its size. First, the remaining error of the time step is, to first order, a multiple of
+the change by the last halving of the step. Its factor is free in each voice (Richardson
+extrapolation with an unknown factor). Second, the error affects some voices more than others. The
+more the voices disagree beyond noise, the more equal their weights become, whatever their amount of
+data (the random-effects model of meta-analysis, DerSimonian and Laird 1986).
 """
 
 from __future__ import annotations
@@ -17,33 +17,34 @@ from scipy.optimize import brentq, lsq_linear
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-# Standard deviation of the factor of what halving the step has changed; exact time would be 1.
+# Prior standard deviation of the factor of the change by halving the step. A factor of 1
+# extrapolates to exact time integration.
 _FACTOR = 1.0
 _RIDGE = 1e-6
-# What a voice alone is taken to know of a parameter, in sizes that matter.
+# Prior standard deviation of a parameter in a single voice, in typical sizes.
 _VAGUE = 30.0
-# Largest scatter between voices, in sizes that matter.
+# Largest scatter between voices, in typical sizes.
 _MOST_SCATTER = 3.0
 
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """The part of a simulation's error that lies along a known direction.
+    """The part of a simulation's error along a known direction.
 
     Attributes:
-        direction: (N,) whitened, what the last halving of the time step has changed.
-        voice: (N,) number of the voice that an entry is of.
+        direction: (N,) whitened change by the last halving of the time step.
+        voice: (N,) index of each entry's voice.
     """
 
     direction: FloatArray
     voice: IndexArray
 
     def without(self, values: FloatArray, rows: BoolArray) -> FloatArray:
-        """Returns values (N,) or (N,k) less what the direction explains of them.
+        """Returns values without the part that the direction explains.
 
         Args:
-            values: residuals or columns.
-            rows: (N,) entries by which the factor is found, in each voice.
+            values: (N,) residuals or (N,k) columns.
+            rows: (N,) mask of the entries from which each voice's factor is found.
         """
         out = values.copy()
         for i in range(int(self.voice.max()) + 1):
@@ -59,9 +60,9 @@ class Solution:
     """Coefficients of columns.
 
     Attributes:
-        x: (k,).
-        std: (k,) of it.
-        scatter: standard deviation between voices beyond what noise explains.
+        x: (k,) coefficients.
+        std: (k,) their standard deviations.
+        scatter: standard deviation between voices beyond noise.
     """
 
     x: FloatArray
@@ -76,14 +77,14 @@ def solve_bounded(
     low: FloatArray | float,
     high: FloatArray | float,
 ) -> FloatArray:
-    """Returns x (k,) between bounds that explains a residual (N,) best.
+    """Returns the coefficients (k,) within bounds that best explain a residual (N,).
 
     Args:
-        columns: (N,k).
-        reduced: (N,k) columns without what is free to explain itself.
-        residual: (N,) without that too.
-        low: bounds (k,).
-        high: bounds (k,).
+        columns: (N,k) columns.
+        reduced: (N,k) columns without the part that the extrapolation explains.
+        residual: (N,) residual, likewise without that part.
+        low: lower bounds (k,).
+        high: upper bounds (k,).
     """
     return _bounded(columns.T @ reduced, columns.T @ residual, low, high)
 
@@ -96,15 +97,15 @@ def solve_pooled(
     low: FloatArray | float,
     high: FloatArray | float,
 ) -> Solution:
-    """Returns what voices agree on, in columns' units of sizes that matter; see above.
+    """Returns coefficients pooled over voices by the random-effects model, in typical sizes.
 
     Args:
-        columns: (N,k).
-        reduced: (N,k) columns without what is free to explain itself.
-        residual: (N,) without that too.
-        voice: (N,) number of the voice that an entry is of.
-        low: bounds (k,).
-        high: bounds (k,).
+        columns: (N,k) columns, each for a typical size.
+        reduced: (N,k) columns without the part that the extrapolation explains.
+        residual: (N,) residual, likewise without that part.
+        voice: (N,) index of each entry's voice.
+        low: lower bounds (k,).
+        high: upper bounds (k,).
     """
     k = columns.shape[1]
     normals, rights = _equations(columns, reduced, residual, voice)
@@ -126,15 +127,15 @@ def misleading(
     residual: FloatArray,
     voice: IndexArray,
 ) -> FloatArray:
-    """Returns (k,) how far a residual moves the coefficients in one voice, in the mean square.
+    """Returns (k,) the weighted RMS over voices of the shift of their coefficients by a residual.
 
-    What a mesh does is much the same in all voices, so their mean would not be smaller.
+    Averaging over voices would not reduce it: a mesh has much the same error in all of them.
 
     Args:
-        columns: (N,k).
-        reduced: (N,k) columns without what is free to explain itself.
-        residual: (N,) without that too.
-        voice: (N,) number of the voice that an entry is of.
+        columns: (N,k) columns.
+        reduced: (N,k) columns without the part that the extrapolation explains.
+        residual: (N,) residual, likewise without that part.
+        voice: (N,) index of each entry's voice.
     """
     k = columns.shape[1]
     total, weight = np.zeros(k), np.full(k, 1e-30)
@@ -162,7 +163,7 @@ def _equations(
 
 
 def _scatter2(normals: list[FloatArray], rights: list[FloatArray]) -> float:
-    """Returns the variance between voices, by Paule and Mandel's equation Q(τ²) = dof."""
+    """Returns the variance between voices from Paule and Mandel's equation Q(τ²) = dof."""
     k = len(rights[0])
     vague = _VAGUE**-2 * np.eye(k)
     each = [np.linalg.solve(n + vague, r) for n, r in zip(normals, rights, strict=True)]
@@ -186,13 +187,13 @@ def _scatter2(normals: list[FloatArray], rights: list[FloatArray]) -> float:
 def _bounded(
     normal: FloatArray, right: FloatArray, low: FloatArray | float, high: FloatArray | float
 ) -> FloatArray:
-    """Returns x (k,) between bounds with least ½ xᵀ normal x − rightᵀ x.
+    """Returns x (k,) within bounds that minimizes ½ xᵀ normal x − rightᵀ x.
 
-    Where nothing is known of a coefficient, it is the value between its bounds nearest to zero.
+    A coefficient without information is the value within its bounds nearest to zero.
     """
     low, high = np.broadcast_to(low, right.shape), np.broadcast_to(high, right.shape)
     x: FloatArray = np.array(low, dtype=np.float64)
-    # the solver wants room between bounds
+    # the solver needs low < high
     free = low < high
     if not free.any():
         return x
@@ -201,7 +202,7 @@ def _bounded(
     information = np.diag(normal)
     scale = np.sqrt(np.where(information > 0.0, information, 1.0))
     factor = np.linalg.cholesky(normal / np.outer(scale, scale) + _RIDGE * np.eye(len(scale)))
-    # an active set method ends on bounds, not near them
+    # an active-set method ends exactly on bounds, not near them
     found = lsq_linear(
         factor.T, np.linalg.solve(factor, right / scale), (low * scale, high * scale), "bvls"
     )

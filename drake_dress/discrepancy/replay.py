@@ -1,13 +1,13 @@
-"""What the simulation says to the inputs of a recording, kept in step with what was seen.
+"""Replays a recording's inputs in simulation, coupled to the observed markers.
 
-Folding cloth is chaotic: a replay of the inputs alone soon says nothing. So the simulation is
-pulled toward the markers by a soft spring and a damper (an observer, as state estimators have it):
+Folding cloth is chaotic: a replay of the inputs alone soon diverges. So a soft spring and a damper
+pull the simulation toward the markers (an observer, as in state estimation):
 
     f = M W (ω² (y − ŷ) + 2 ω (ẏ − ŷ̇)),
 
-y and ŷ the markers seen and simulated, W a smooth interpolation over the garment, M its mass. The
-innovations y − ŷ of a simulation that is right are the markers' noise; what is missing in it, an
-acceleration a, leaves a steady innovation near a / ω². With ω = 0 this is the plain replay.
+with y and ŷ the observed and simulated markers, W a smooth interpolation over the garment and M its
+mass. If the simulation is right, the innovations y − ŷ are the markers' noise. A missing
+acceleration a leaves a steady innovation near a / ω². With ω = 0 this is the plain replay.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mounts import Mounts, MountState
 from drake_dress.models.garment.transfer import attach
 
-# Length over which a marker's innovation speaks for its surroundings, m.
+# Correlation length ℓ of the interpolation of innovations, m.
 _REACH = 0.07
-# Variance of a marker against that of the garment between markers, for the interpolation.
+# Noise variance of a marker relative to the variance of the garment, for the interpolation.
 _MARKER_SHARE = 0.3
-# While the garment settles before a recording: damping of the fabric, s, and of all motion, 1/s.
+# Damping while the garment settles before a recording: of the fabric, s, and of all motion, 1/s.
 _SETTLE_DAMPING, _SETTLE_DRAG = 0.05, 6.0
 
 
 @dataclass(frozen=True)
 class _Settling:
-    """One way to settle: for how long, s, in which steps, s, with which ω, 1/s.
+    """One phase of settling: its duration, s, time step, s, and gain ω, 1/s.
 
-    `person` is the share of their radius that limbs have at its start; they grow to the full one.
-    None: nobody is there.
+    `person` is the share of their radius that the person's capsules have at its start; they grow to
+    full size. None: without the person.
     """
 
     duration: float
@@ -62,8 +62,8 @@ class _Settling:
     person: float | None = 1.0
 
 
-# From rest the garment is first brought to the markers through everything, then the person grows
-# in it, so that it comes to lie on the side where it was seen; then it is let hang.
+# From rest, the garment is first pulled to the markers without the person. Then the person grows
+# to full size, so that the cloth ends up on the side where it was observed. Then it hangs.
 _TO_MARKERS = (_Settling(1.0, 0.01, 20.0, None), _Settling(1.5, 0.005, 60.0, None))
 _FROM_REST = (_Settling(1.0, 0.005, 60.0, 0.0), _Settling(1.0, 0.01, 8.0))
 _AGAIN = _Settling(0.4, 0.01, 8.0)
@@ -71,13 +71,13 @@ _AGAIN = _Settling(0.4, 0.01, 8.0)
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a simulation says a recording should hold, at its times.
+    """A simulation's prediction of a recording, at the recording's times.
 
     Attributes:
-        marker_position: (T,m,3) as the cameras would report, m.
-        gripper_force: (T,2,3) of the garment on the grippers, N.
+        marker_position: (T,m,3) markers as the cameras would report them, m.
+        gripper_force: (T,2,3) force of the garment on the grippers, N.
         contact: (T,) share of the nodes that touch the person.
-        position, velocity: (K,n,3) of the garment at the times asked for, m, m/s.
+        position, velocity: (K,n,3) nodes of the garment at the requested times, m, m/s.
     """
 
     marker_position: FloatArray
@@ -91,8 +91,8 @@ class Replayer:
     """Replays one recording in a lab.
 
     Args:
-        lab: garment, person and numerics.
-        recording: with inputs and markers.
+        lab: garment, person and numerical settings.
+        recording: inputs and markers.
     """
 
     def __init__(self, lab: Lab, recording: Recording) -> None:
@@ -109,10 +109,10 @@ class Replayer:
         self._start: FloatArray | None = None
 
     def settled(self, near: FloatArray | None = None) -> FloatArray:
-        """Returns (n,3) how the garment hangs at the start without effects, m; remembered.
+        """Returns (n,3) the settled garment at the start without further effects, m; cached.
 
         Args:
-            near: (n,3) about how it hangs, m, if that is known.
+            near: (n,3) initial guess, m.
         """
         if self._start is None and near is not None:
             x = near.copy()
@@ -130,7 +130,7 @@ class Replayer:
         return self._start
 
     def start_from(self, position: FloatArray) -> None:
-        """Takes (n,3), m, for how the garment hangs at the start."""
+        """Sets the settled garment (n,3) at the start, m."""
         self._start = position
 
     def run(
@@ -142,14 +142,14 @@ class Replayer:
         end: float | None = None,
         keep: FloatArray | None = None,
     ) -> Prediction:
-        """Returns what the simulation says.
+        """Simulates the recording and returns its prediction.
 
         Args:
-            effects: beside those of the lab.
-            gain: ω, 1/s; 0 does not look at the markers, but for how the garment hangs at first.
+            effects: effects in addition to the lab's.
+            gain: ω, 1/s; with 0 the markers are used only to settle the garment at the start.
             start: positions and velocities (n,3) at `begin`, m, m/s; settled by default.
-            begin: of the part that is replayed, s; the recording's by default.
-            end: of it, s.
+            begin: start of the replayed part, s; by default the recording's.
+            end: end of the replayed part, s; by default the recording's.
             keep: (K,) times at which the whole garment is kept, s.
         """
         effects = self.lab.with_effects(effects)
@@ -179,21 +179,21 @@ class Replayer:
             if gain > 0.0:
                 pull = Influences(force=self._pull(cloth, state, *inputs.targets(k), gain))
             velocity = (target - state.x[self._held]) / h
-            # the garment goes on as it has accelerated
+            # first guess of the solve: the acceleration of the last step continues
             ahead, before = 2.0 * state.v - before, state.v
             state, _ = cloth.step(state, bodies, velocity, pull, ahead)
             trace.note(k + 1, state, self._map @ state.x, self._forces(state))
         return self._prediction(trace, clock, h, effects)
 
     def error(self, rng: np.random.Generator) -> FloatArray:
-        """Returns (n,3) how far off a state is that is as good as the markers' noise, m."""
+        """Returns (n,3) a random displacement of the garment that matches the markers' noise, m."""
         r = self.recording
         noise = r.marker_noise * rng.standard_normal(r.marker_rest_position.shape)
         off: FloatArray = self._interpolation @ noise
         return off
 
     def _clock(self, time_step: float, begin: float | None, end: float | None) -> FloatArray:
-        """Returns (N+1,) the times of N steps from `begin` to `end` or just beyond it, s."""
+        """Returns (N+1,) the times of N steps from `begin` to at least `end`, s."""
         r = self.recording
         begin = float(r.time[0]) if begin is None else begin
         end = float(r.time[-1]) if end is None else end
@@ -202,34 +202,34 @@ class Replayer:
         return clock
 
     def _inputs(self, clock: FloatArray, effects: Sequence[Effect], posed: FloatArray) -> _Inputs:
-        """Returns the recording's inputs at times (N,); joints are `posed` where not measured."""
+        """Returns the recording's inputs at times (N,); joints are `posed` if not measured."""
         held = self._held_at(clock, effects)
         return _Inputs(held, *self._targets(clock, effects), *self._joints(clock, effects, posed))
 
     def _state_at_begin(
         self, effects: Sequence[Effect], start: tuple[FloatArray, FloatArray] | None
     ) -> ClothState:
-        """Returns the garment at `start`, positions and velocities; settled by default."""
+        """Returns the garment with positions and velocities `start`; settled by default."""
         if start is not None:
             return replace(ClothState.at_rest(start[0]), v=start[1])
         return ClothState.at_rest(self._settle(effects, self.settled(), _AGAIN))
 
     def _off_grippers(self, x: FloatArray, held: FloatArray) -> FloatArray:
-        """Returns (2,3) how far held nodes of (n,3) are from `held` (k,3), by gripper, m."""
+        """Returns (2,3) the mean offset of each gripper's nodes in `x` from `held` (k,3), m."""
         away = x[self._held] - held
         return np.stack([away[self._side == i].mean(axis=0) for i in (0, 1)])
 
     def _prediction(
         self, trace: _Trace, clock: FloatArray, time_step: float, effects: Sequence[Effect]
     ) -> Prediction:
-        """Returns what was simulated at times `clock`, as the recording would hold it."""
+        """Returns the states simulated at times `clock` as a prediction of the recording."""
         r = self.recording
-        # before the first step no force is known
+        # no force is known before the first step
         trace.force[0] = trace.force[1]
         when = true_times(r.time, effects, "time_offset")
         return Prediction(
             seen_points(_at(when, clock, trace.marker), effects),
-            # a step's force is that of its middle
+            # a step's force is its value at the middle of the step
             _at(r.time, clock - 0.5 * time_step, trace.force),
             _at(r.time, clock, trace.touching),
             trace.position,
@@ -237,12 +237,12 @@ class Replayer:
         )
 
     def _forces(self, state: ClothState) -> FloatArray:
-        """Returns (2,3) of the garment on the grippers, N."""
+        """Returns (2,3) the force of the garment on the grippers, N."""
         reaction = state.reaction[self._held]
         return np.stack([-reaction[self._side == i].sum(axis=0) for i in (0, 1)])
 
     def _held_at(self, clock: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-        """Returns (N,k,3) where the held nodes are at times (N,), m."""
+        """Returns (N,k,3) the positions of the held nodes at times (N,), m."""
         t = true_times(clock, effects, "gripper_latency")
         t = np.clip(t, self.recording.time[0], self.recording.time[-1])
         held: FloatArray = self._path(t)[:, self._side] + self._offset
@@ -251,12 +251,12 @@ class Replayer:
     def _targets(
         self, clock: FloatArray, effects: Sequence[Effect]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Returns what was seen, (N,m,3) m and m/s, and whether it was, (N,m), at times (N,)."""
+        """Returns markers, (N,m,3) m and m/s, and whether they were seen, (N,m), at times (N,)."""
         x, v, known = self._seen
         stamped = true_times(self.recording.time, effects, "time_offset")
         position = world_points(x, effects)
         rate = world_rates(v, effects)
-        # between a frame that is known and one that is not, nothing is known
+        # a marker is known only between two frames in which it is known
         share = np.floor(_at(clock, stamped, known.astype(np.float64)) + 1e-9)
         share[(clock < stamped[0]) | (clock > stamped[-1])] = 0.0
         return _at(clock, stamped, position), _at(clock, stamped, rate), share
@@ -292,7 +292,7 @@ class Replayer:
         known: FloatArray,
         gain: float,
     ) -> FloatArray:
-        """Returns (n,3) the force toward what was seen, N."""
+        """Returns (n,3) the observer's force toward the observed markers, N."""
         away = gain**2 * (seen - self._map @ state.x) + 2.0 * gain * (rate - self._map @ state.v)
         pull: FloatArray = cloth.mass[:, None] * (self._interpolation @ (known[:, None] * away))
         return pull
@@ -303,7 +303,7 @@ class Replayer:
         x: FloatArray,
         how: _Settling,
     ) -> FloatArray:
-        """Returns (n,3) where the garment comes to rest from `x`, pulled to the first markers."""
+        """Returns (n,3) the garment settled from `x`, pulled to the first frame's markers, m."""
         effects = self.lab.with_effects(effects)
         h = how.time_step
         cloth = self.lab.cloth(effects, _SETTLE_DAMPING, h)
@@ -338,13 +338,13 @@ class Replayer:
 
 @dataclass(frozen=True)
 class _Inputs:
-    """What a replay is given at its N times.
+    """Inputs of a replay at its N times.
 
     Attributes:
-        held: (N,k,3) where the held nodes are, m.
-        seen, seen_rate: (N,m,3) of the markers, m, m/s.
+        held: (N,k,3) positions of the held nodes, m.
+        seen, seen_rate: (N,m,3) positions and velocities of the markers, m, m/s.
         known: (N,m) whether they were seen, 1 or 0.
-        joints, joint_rate: (N,6,3) of the person, m, m/s.
+        joints, joint_rate: (N,6,3) positions and velocities of the person's joints, m, m/s.
     """
 
     held: FloatArray
@@ -361,14 +361,14 @@ class _Inputs:
 
 @dataclass(frozen=True)
 class _Trace:
-    """What a replay keeps of its N states.
+    """Record of the N states of a replay.
 
     Attributes:
-        marker: (N,m,3), m.
-        force: (N,2,3) of the garment on the grippers, N.
+        marker: (N,m,3) markers, m.
+        force: (N,2,3) force of the garment on the grippers, N.
         touching: (N,) share of the nodes that touch the person.
-        kept: (K,) states of which the whole garment is kept.
-        position, velocity: (K,n,3) of these, m, m/s.
+        kept: (K,) indices of the states of which the whole garment is kept.
+        position, velocity: (K,n,3) nodes in these states, m, m/s.
     """
 
     marker: FloatArray
@@ -382,7 +382,7 @@ class _Trace:
     def empty(
         markers: tuple[int, ...], garment: tuple[int, ...], kept: npt.NDArray[np.int_]
     ) -> _Trace:
-        """Returns a trace for markers of shape (N,m,3) and a garment of shape (n,3)."""
+        """Returns an empty trace for markers of shape (N,m,3) and a garment of shape (n,3)."""
         count = markers[0]
         position, velocity = np.empty((len(kept), *garment)), np.empty((len(kept), *garment))
         return _Trace(
@@ -390,7 +390,7 @@ class _Trace:
         )
 
     def note(self, k: int, state: ClothState, marker: FloatArray, force: FloatArray) -> None:
-        """Keeps state k with its markers (m,3), m, and forces (2,3), N."""
+        """Records state k with its markers (m,3), m, and forces (2,3), N."""
         self.marker[k], self.force[k] = marker, force
         self.touching[k] = np.count_nonzero(state.owner >= 0) / len(state.x)
         now = self.kept == k
@@ -398,17 +398,17 @@ class _Trace:
 
 
 def _steps_at(time: FloatArray | None, begin: float, time_step: float) -> npt.NDArray[np.int_]:
-    """Returns (K,) the steps from `begin` that are nearest to times (K,), s; none by default."""
+    """Returns (K,) the steps from `begin` nearest to times (K,), s; none by default."""
     if time is None:
         return np.array([], dtype=int)
     return np.array(np.rint((np.asarray(time) - begin) / time_step), dtype=int)
 
 
 def _interpolation(lab: Lab, markers: sp.csr_array) -> FloatArray:
-    """Returns W (n,m): markers' innovations to the whole garment, zero where it is held.
+    """Returns W (n,m), which spreads markers' innovations over the garment; zero at held nodes.
 
-    Optimal interpolation with the covariance (A + ℓ² L)⁻¹ A (A + ℓ² L)⁻¹, A node areas, L the
-    Laplacian of the rest shape: what one marker says fades over ℓ.
+    Optimal interpolation with the covariance (A + ℓ² L)⁻¹ A (A + ℓ² L)⁻¹, with A the node areas and
+    L the Laplacian of the rest shape: the influence of a marker decays over ℓ.
     """
     elements = lab.cloth([]).elements
     area = elements.node_area
@@ -423,7 +423,10 @@ def _interpolation(lab: Lab, markers: sp.csr_array) -> FloatArray:
 
 
 def _at(time: FloatArray, clock: FloatArray, values: FloatArray) -> FloatArray:
-    """Returns values (N,…) given at `clock` (N,) at `time` (T,): linear, constant beyond."""
+    """Returns values (N,…), given at `clock` (N,), interpolated linearly at `time` (T,).
+
+    Beyond the ends of `clock` they are constant.
+    """
     j = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, max(len(clock) - 2, 0))
     if len(clock) == 1:
         return np.broadcast_to(values[0], (len(time), *values.shape[1:])).copy()

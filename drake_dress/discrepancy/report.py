@@ -1,4 +1,4 @@
-"""The explanation as one page to read, `report.html`; self-contained."""
+"""Writes the explanation as one self-contained page, `report.html`."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def report_page(
     scenario_text: str,
     notes: Sequence[str] = (),
 ) -> str:
-    """Returns the page.
+    """Returns the page as HTML.
 
     Args:
-        explanation: what was found.
-        experiment: its recordings are drawn.
-        spots: where the simulation was off, worst first.
-        alone: how it does on its own.
+        explanation: result of the search.
+        experiment: its recordings are plotted.
+        spots: parts of the data by their residual, worst first.
+        alone: results of the free runs.
         suggestion: what to record next.
         scenario_text: resolved YAML of the scenario.
-        notes: what of the data was not used, or not taken as it stands.
+        notes: which data were not used, or were changed.
     """
     x = explanation
     parts = [
@@ -127,7 +127,7 @@ def _sizes(x: Explanation) -> str:
 
 
 def _residual_charts(x: Explanation, experiment: Experiment) -> list[str]:
-    """Returns the residuals over time, on the garment and by frequency."""
+    """Returns charts of the residuals over time, on the garment and by frequency."""
     residuals = _Residuals(x, experiment)
     return [
         _chart("Over time", "RMS over the markers.", len(experiment.recordings), residuals.course),
@@ -213,7 +213,7 @@ def _since(alone: Windows, experiment: Experiment, axes: list[Axes]) -> None:
 
 
 class _Residuals:
-    """Whitened residuals before and after, sorted for the charts."""
+    """Residuals before and after the extension, arranged for the charts."""
 
     def __init__(self, x: Explanation, experiment: Experiment) -> None:
         w = x.comparison.whitening
@@ -230,7 +230,7 @@ class _Residuals:
         )
 
     def course(self, axes: list[Axes]) -> None:
-        """Draws the RMS over the markers of each recording over time."""
+        """Plots the RMS over the markers against time, for each recording."""
         w = self._w
         for i, (ax, r) in enumerate(zip(axes, self._experiment.recordings, strict=True)):
             rows = (w.recording == i) & ~w.is_force
@@ -248,7 +248,7 @@ class _Residuals:
         axes[-1].set_xlabel("time, s")
 
     def on_garment(self, axes: list[Axes]) -> None:
-        """Draws markers on the rest shape by their RMS, before and after, both sides."""
+        """Plots the RMS of each marker on the rest shape, before and after, back and front."""
         w = self._w
         rest = self._experiment.labs["scenario"].garment.rest_position
         sizes = []
@@ -290,7 +290,7 @@ class _Residuals:
             figure.colorbar(drawn, ax=axes, label="RMS, mm", shrink=0.8)
 
     def spectrum(self, axes: list[Axes]) -> None:
-        """Draws power spectrum and autocorrelation of whitened marker residuals."""
+        """Plots power spectrum and autocorrelation of whitened marker residuals."""
         w = self._w
         for name, color, residual, _ in self._pairs:
             powers, correlations, period = [], [], 0.02

@@ -1,4 +1,4 @@
-"""Where, when and in which signal the residual exceeds noise most."""
+"""Finds where, when and in which signal the residual exceeds noise most."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.cloth.contact.distance import nearest_obstacle
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 
-# Phases by the grippers' speed, m/s, and by contact.
+# Gripper speeds below which a phase is at rest, and from which it is fast, m/s.
 _STILL, _FAST = 0.01, 0.15
-# A marker no farther than this from a limb's skin is of the cloth that lies on it, m.
+# Largest distance from a limb's surface at which a marker counts as lying on it, m.
 _ON_LIMB = 0.02
 KINDS = ("signal", "recording", "region", "limb", "phase", "time", "marker")
 
 
 @dataclass(frozen=True)
 class Spot:
-    """A part of the data and how far off it is.
+    """A part of the data and its residual.
 
     Attributes:
         kind: one of `KINDS`.
-        name: of the part.
-        rms: residual, m or N.
-        noise: of it.
-        whitened: mean squared residual in units of the noise; 1 where there is nothing but noise.
+        name: name of the part.
+        rms: RMS of the residual, m or N.
+        noise: RMS of the sensors' noise, likewise.
+        whitened: mean squared whitened residual; 1 if there is only noise.
     """
 
     kind: str
@@ -53,13 +53,13 @@ def spots(
     """Returns all parts, worst first.
 
     Args:
-        whitening: of the data.
-        predicted: (N,) whitened, what the simulation says.
-        recordings: what was measured.
-        mesh: that markers sit on.
+        whitening: whitening of the data.
+        predicted: (N,) whitened prediction of the simulation.
+        recordings: measured recordings.
+        mesh: mesh that carries the markers.
         contact: share of nodes in contact at each compared sample of each recording.
-        samples: indices that are compared, of each recording.
-        person: whose limbs the garment touches.
+        samples: indices of the compared samples of each recording.
+        person: person whose limbs the garment touches.
     """
     w = whitening
     squared = (w.data - predicted) ** 2
@@ -83,22 +83,22 @@ def spots(
 
 
 def worst(found: Sequence[Spot], most: int = 3) -> list[Spot]:
-    """Returns the first `most` spots of each kind, from the whole to the fine.
+    """Returns the first `most` spots of each kind, in the order of `KINDS`.
 
     Args:
-        found: worst first.
-        most: of a kind.
+        found: spots, worst first.
+        most: number of spots of a kind, at most.
     """
     return [s for kind in KINDS for s in [s for s in found if s.kind == kind][:most]]
 
 
 def limbs_touched(recording: Recording, samples: IndexArray, person: PersonShape) -> IndexArray:
-    """Returns (S,m) the limb, of `person.LIMB_NAMES`, that each marker was seen on, or −1.
+    """Returns (S,m) the index in `person.LIMB_NAMES` of the limb that each marker lies on, or −1.
 
     Args:
-        recording: whose joints, where they were measured, place the limbs.
-        samples: (S,) indices.
-        person: its pose and sizes.
+        recording: markers, and joints that place the limbs if they were measured.
+        samples: (S,) indices of samples.
+        person: sizes of the person, and the pose if joints were not measured.
     """
     joints = recording.joint_position
     markers = recording.marker_position.shape[1]
@@ -117,7 +117,7 @@ def limbs_touched(recording: Recording, samples: IndexArray, person: PersonShape
 
 
 class _Part(NamedTuple):
-    """A part of the data: its kind, its name, and which of the N values belong to it."""
+    """A part of the data: its kind, its name, and the mask of its values among all N."""
 
     kind: str
     name: str
@@ -132,7 +132,7 @@ def _parts(
     samples: Sequence[IndexArray],
     person: PersonShape,
 ) -> Iterator[_Part]:
-    """Yields all parts, one at a time since there are many; arguments as in `spots`."""
+    """Yields all parts, lazily since there are many; arguments as in `spots`."""
     markers = ~w.is_force
     yield _Part("signal", "markers", markers)
     for k, side in enumerate(("left", "right")):
@@ -141,7 +141,7 @@ def _parts(
         rows = (w.recording == i) & markers
         yield _Part("recording", r.name, rows)
         yield from _places(w, rows, r, mesh)
-        # of each marker value, its row in `samples`
+        # index in `samples` of each marker value
         at = np.searchsorted(r.time[samples[i]] - r.time[0], w.time[rows] - 1e-9)
         at = np.minimum(at, len(samples[i]) - 1)
         limb = limbs_touched(r, samples[i], person)
@@ -156,10 +156,10 @@ def _places(
     """Yields the regions of the garment and the single markers.
 
     Args:
-        w: of the data.
-        markers: (N,) the values of the recording's markers.
-        recording: whose markers these are.
-        mesh: that they sit on.
+        w: whitening of the data.
+        markers: (N,) mask of the recording's marker values.
+        recording: the recording.
+        mesh: mesh that carries the markers.
     """
     r = recording
     region = _regions(mesh, r.marker_rest_position)
@@ -177,10 +177,10 @@ def _limbs(
     """Yields the person's limbs.
 
     Args:
-        recording: whose name the parts carry.
-        markers: (N,) the values of its markers.
-        limb: of each of these values, −1 for none.
-        person: whose limbs they are.
+        recording: recording that the parts are named after.
+        markers: (N,) mask of its marker values.
+        limb: index of the limb of each of these values, −1 for none.
+        person: person with these limbs.
     """
     for number, name in enumerate(person.LIMB_NAMES):
         rows = _among(markers, limb == number)
@@ -193,9 +193,9 @@ def _phases(
     """Yields the phases of the motion, with contact and without.
 
     Args:
-        recording: whose name the parts carry.
-        markers: (N,) the values of its markers.
-        phase: of each of these values, 0 to 2.
+        recording: recording that the parts are named after.
+        markers: (N,) mask of its marker values.
+        phase: phase of each of these values, 0 to 2.
         touching: for each of these values, whether the garment touches the person.
     """
     for number, name in enumerate(("at rest", "slow", "fast")):
@@ -206,27 +206,27 @@ def _phases(
 
 
 def _seconds(w: Whitening, markers: BoolArray, recording: Recording) -> Iterator[_Part]:
-    """Yields each second of a recording, whose markers have the values `markers` (N,)."""
+    """Yields each second of a recording; `markers` (N,) masks its marker values."""
     for second in range(int(np.ceil(recording.duration))):
         rows = markers & (w.time >= second) & (w.time < second + 1)
         yield _Part("time", f"{second} to {second + 1} s of {recording.name}", rows)
 
 
 def _among(rows: BoolArray, chosen: BoolArray) -> BoolArray:
-    """Returns (N,) those of `rows` (N,) that are chosen; `chosen` has an entry for each of them."""
+    """Returns the mask `rows` (N,) narrowed by `chosen`, which has an entry for each set row."""
     narrowed = np.zeros(len(rows), dtype=np.bool_)
     narrowed[rows] = chosen
     return narrowed
 
 
 def _phase(recording: Recording, samples: IndexArray) -> IndexArray:
-    """Returns (S,) at rest (0), slow (1) or fast (2), by the grippers' speed at these samples."""
+    """Returns (S,) the phase at each sample by gripper speed: at rest (0), slow (1) or fast (2)."""
     speed = _speed(recording)[samples]
     return np.where(speed < _STILL, 0, np.where(speed < _FAST, 1, 2))
 
 
 def _speed(recording: Recording) -> FloatArray:
-    """Returns (T,) of the faster gripper, m/s."""
+    """Returns (T,) the speed of the faster gripper, m/s."""
     rate = np.gradient(recording.gripper_position, recording.time, axis=0)
     speed: FloatArray = np.linalg.norm(rate, axis=2).max(axis=1)
     return speed

@@ -1,4 +1,4 @@
-"""What `drake-dress explain` writes beside its report: explanation.json and extended.yaml."""
+"""Makes the other files of `drake-dress explain`: explanation.json and extended.yaml."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def as_json(
     suggestion: str | None,
     notes: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Returns the content of explanation.json; `notes` tell what of the data was not used."""
+    """Returns the content of explanation.json; `notes` say which data were dropped or changed."""
     x = explanation
     causes = []
     for c in x.causes:
@@ -78,7 +78,7 @@ def as_json(
 
 
 def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Explanation) -> str:
-    """Returns the scenario with what was found, as YAML that `drake-dress run` takes."""
+    """Returns the scenario extended by the causes found, as YAML for `drake-dress run`."""
     content = read_yaml("scenario", resolved_yaml(scenario))
     found: dict[str, Any] = {}
     for effect in effects(scenario.effects):
@@ -100,14 +100,14 @@ def extended_yaml(scenario: Scenario, experiment: Experiment, explanation: Expla
             iterations=n.iterations,
             tolerance=n.tolerance,
         )
-    # what is not there is not written: the loader refuses empty groups
+    # absent groups are left out, because the loader refuses empty ones
     text = write_yaml(_without_none(content))
     head = "# The scenario with what `drake-dress explain` found; *_std are standard deviations.\n"
     return head + _how_to_load(found) + text
 
 
 def _how_to_load(names: Collection[str]) -> str:
-    """Returns a comment that says where the effects are from that are not the package's."""
+    """Returns a YAML comment on which effects are not the package's, and where they are defined."""
     own = [f"{name} of {EFFECTS[name].__module__}" for name in names if name in own_effects()]
     if not own:
         return ""
@@ -117,7 +117,7 @@ def _how_to_load(names: Collection[str]) -> str:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Writes JSON so that it is whole or not there."""
+    """Writes JSON; the file is complete or absent."""
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 

@@ -1,7 +1,7 @@
-"""The search for causes: rounds of screening, fitting and refining that each add one effect.
+"""The search for causes: rounds of screening, fitting and refinement that each add an effect.
 
-The simulations of a fit are coarse, so the fits that come near the best are held against the
-refined simulation, and fitted again about what that says, until they stay where they are.
+Fits use coarse simulations. So the best fits are compared with the refined simulation and refitted
+around it until they converge.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from drake_dress.discrepancy.fitting import Evidence, Fit, bettered, fit_again, 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect
 
-# Least share of the held-out loss that a cause takes away, and a further one of what is left then:
-# what numerics feign stays below; and the share of resamples of blocks in which it is a gain.
+# Least share of the held-out loss that a first cause removes, and that a further one removes of the
+# rest. Numerical error alone stays below these. Least share of resamples in which it is a gain.
 _LEAST_GAIN, _FURTHER, _SURELY = 0.012, 0.025, 0.9
-# Two causes are not told apart where the first is the better one in less than this share of the
+# Two causes are not distinguished if the first is the better one in less than this share of the
 # resamples of blocks.
 _SURE = 0.9
-# A second candidate is refined too where it takes away this share of what the best does, unless the
-# best is the better one in this share of the resamples.
+# A second candidate is refined, too, if its gain is at least this share of the best one's, unless
+# the best is better in this share of the resamples.
 _NEAR, _CERTAIN = 0.3, 0.99
-# Refinements of a fit at most; it is settled where a step is within these shares of its uncertainty
-# or of itself.
+# Most refinements of a fit. It has converged if each parameter's step is within these shares of its
+# standard deviation or of its value.
 _POLISHED, _WITHIN, _STEADY = 5, 0.35, 0.03
 _MOST_CAUSES = 3
-# Gauss–Newton steps of fits by coarse simulations: of a first effect, and of one beside others.
+# Gauss–Newton steps of fits with coarse simulations: for a first effect, and for further ones.
 _STEPS, _FURTHER_STEPS = 3, 2
 _RESAMPLES = 1000
 
@@ -49,11 +49,11 @@ class Model:
     """The simulation with effects.
 
     Attributes:
-        fit: of the effects; None without any.
-        reference: (N,) whitened, what the refined simulation says with them.
-        predicted: (N,) that with parameters, and what is left of the step, as found by the blocks
-            of which an entry is none.
-        settled: whether another fit would leave them where they are.
+        fit: fit of the effects; None without any.
+        reference: (N,) whitened prediction of the refined simulation with them.
+        predicted: (N,) held-out prediction: for each entry, the parameters and the error of the
+            time step are found from the blocks that it does not belong to.
+        settled: whether the fit has converged.
     """
 
     fit: Fit | None
@@ -63,7 +63,7 @@ class Model:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """With their parameters."""
+        """The effects with their parameters."""
         return () if self.fit is None else self.fit.effects
 
 
@@ -72,8 +72,8 @@ class Named:
     """One effect that was named.
 
     Attributes:
-        name: of the effect.
-        gain: share of the held-out loss that it took away when it was found.
+        name: name of the effect.
+        gain: share of the held-out loss that it removed when it was found.
         confidence: share of the resamples in which it is the best.
     """
 
@@ -84,14 +84,14 @@ class Named:
 
 @dataclass(frozen=True)
 class Found:
-    """Where the search ended.
+    """Result of the search.
 
     Attributes:
-        comparison: of the levels without effects, whitened as the models are.
-        plain: without effects; model: with all that was found.
-        named: in the order found.
-        rival: another effect in the last one's place and the model with it, if that explains nearly
-            as much.
+        comparison: simulations at all levels without effects, whitened like the models.
+        plain: model without effects; model: model with all effects found.
+        named: effects in the order found.
+        rival: another effect that explains nearly as much in place of the last one, and the model
+            with it; None if there is none.
         screened: all candidates at the start.
         fitted: effect and gain of the candidates that were fitted in the first round, by name.
     """
@@ -109,10 +109,10 @@ class Search:
     """A search for what the refined simulation lacks.
 
     Args:
-        experiment: open.
-        comparison: of its levels without effects.
-        rng: of the resampling.
-        stage: told what is being done.
+        experiment: an open experiment.
+        comparison: its simulations at all levels without effects.
+        rng: random number generator for the resampling.
+        stage: called with a description of each stage.
         progress: called after each replay.
     """
 
@@ -130,13 +130,13 @@ class Search:
         self._take(comparison, _numerics(comparison))
 
     def _take(self, comparison: Comparison, numerics: FloatArray) -> None:
-        """Goes on with a comparison; refining the scenario's simulation has changed `numerics`."""
+        """Continues with a comparison, and with the change by refinement `numerics` (N,)."""
         self._comparison, self._whitening = comparison, comparison.whitening
         self._evidence = Evidence.of(self._whitening, comparison.extrapolation, numerics)
         self._plain = self._model(None, comparison.vector["refined"])
 
     def run(self) -> Found:
-        """Returns what was found."""
+        """Runs the search and returns its result."""
         self._stage("screening effects")
         self._columns = probe(self._experiment, self._comparison, self._progress)
         first = screened = screen(self._comparison, self._columns, self._plain.reference)
@@ -177,7 +177,7 @@ class Search:
             without = self._comparison, self._columns
             best = self._with_its_numerics(best)
             if begun and not self._is_gain(best):
-                # what its own numerics may be off explains as much: it is not this one
+                # its own numerical error explains as much, so this is not the cause
                 refused.add(news[0].name)
                 self._comparison, self._columns = without
                 self._take(self._comparison, _numerics(self._comparison))
@@ -198,20 +198,20 @@ class Search:
         return Found(self._comparison, self._plain, model, tuple(named), rival, screened, fitted)
 
     def _is_gain(self, model: Model) -> bool:
-        """Returns whether a model is surely better than none."""
+        """Returns whether a model is a significant gain over the one without effects."""
         return (
             self._gain(self._plain, model) >= _LEAST_GAIN
             and self._confidence(self._plain, [model]) >= _SURELY
         )
 
     def _with_its_numerics(self, model: Model) -> Model:
-        """Returns a model refined until it is settled, judged by the numerics that it has itself.
+        """Returns a model refined until it converges, judged by its own numerical error.
 
-        What refining changes depends on the effects: cloth that snaps from a limb does so a little
-        earlier or later on another mesh, with the friction that is there and not with the one
-        that the scenario has. From here on all is whitened by that. Coarse simulations have led
-        here; the last steps are led by the refined one's own slopes: where cloth snaps, the others'
-        may point the wrong way.
+        The change by refinement depends on the effects. For example, cloth snaps from a limb a
+        little earlier or later on another mesh, at a time that depends on the actual friction. From
+        here on, all residuals are whitened by the numerical error with the effects. The last steps
+        use slopes of the refined simulation: where cloth snaps, coarse slopes may have the wrong
+        sign.
         """
         if model.fit is None:
             return model
@@ -233,18 +233,18 @@ class Search:
         return self._settled(self._model(fit, told, settled=False))
 
     def _gain(self, before: Model, after: Model) -> float:
-        """Returns the share of the held-out loss of one model that another takes away."""
+        """Returns the share of the held-out loss of model `before` that `after` removes."""
         return 1.0 - self._loss(after) / self._loss(before)
 
     def _loss(self, model: Model) -> float:
         return float(self._blocks(model).sum())
 
     def _blocks(self, model: Model) -> FloatArray:
-        """Returns the loss of each block by what the others have taught."""
+        """Returns the held-out loss of each block."""
         return block_loss(self._whitening, model.predicted)
 
     def _fits(self, about: Model, start: Sequence[Sequence[Effect]]) -> list[Model]:
-        """Returns fits of sets of effects, told from a model by coarse simulations."""
+        """Returns fits of sets of effects; coarse simulations give the change from `about`."""
         fits = fit_all(
             self._experiment,
             self._evidence,
@@ -257,7 +257,7 @@ class Search:
         return [self._model(f, f.told, settled=False) for f in fits]
 
     def _model(self, fit: Fit | None, reference: FloatArray, settled: bool = True) -> Model:
-        """Returns the model whose refined simulation says `reference` (N,)."""
+        """Returns the model whose refined simulation predicts `reference` (N,)."""
         told = reference if fit is None else reference + fit.change
         predicted = self._whitening.data.copy()
         for rows in self._whitening.trained_on:
@@ -266,7 +266,7 @@ class Search:
         return Model(fit, reference, predicted, settled)
 
     def _best(self, before: Model, fits: Sequence[Model]) -> tuple[Model, Model | None, float]:
-        """Returns the best of fits, the one that comes near it if any, and how sure that is."""
+        """Returns the best fit, the second if it comes near, and the confidence in the best."""
         ranked = sorted(fits, key=self._loss)[:2]
         gains = [self._gain(before, f) for f in ranked]
         if gains[0] < _LEAST_GAIN:
@@ -277,7 +277,7 @@ class Search:
         self._stage(f"refining {', '.join(f.effects[-1].NAME for f in ranked)}")
         ranked = [self._refined(f) for f in ranked]
         if len(ranked) == 1:
-            # what is a gain by coarse simulations need not be one here before it is polished
+            # a gain in coarse simulations may be none in the refined one until it is polished
             confidence = min(confidence, self._confidence(before, ranked))
         for _ in range(_POLISHED):
             if confidence >= _CERTAIN or all(f.settled for f in ranked):
@@ -288,13 +288,13 @@ class Search:
         return ranked[0], ranked[1] if len(ranked) > 1 else None, confidence
 
     def _settled(self, model: Model) -> Model:
-        """Returns a refined fit refined further until it is settled."""
+        """Returns a refined fit, polished until it converges."""
         for _ in range(_POLISHED):
             model = self._polished(model)
         return model
 
     def _both(self, before: Model, one: Model, other: Model) -> Model | None:
-        """Returns the model with the last effects of both, if either adds to the other."""
+        """Returns `one` with the last effect of `other` added; None if that gains too little."""
         effects = (*one.effects, other.effects[-1])
         if len(effects) > _MOST_CAUSES:
             return None
@@ -306,14 +306,14 @@ class Search:
         return both if self._gain(one, both) >= _FURTHER else None
 
     def _lean(self, model: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
-        """Returns the model without earlier effects that the later ones have made idle."""
+        """Returns the model without earlier effects that later ones have made superfluous."""
         named = list(named)
         for name in [n.name for n in named[:-1]]:
             rest = [e for e in model.effects if e.NAME != name]
             self._stage(f"fitting {', '.join(e.NAME for e in rest)} alone")
-            # about the model: coarse simulations tell what little dropping it changes, not all
+            # around the model: coarse simulations give only the small change by dropping an effect
             (leaner,) = self._fits(model, [rest])
-            # the refined simulation may better a fit, but not by so much
+            # refinement may improve the leaner fit, but not by this much
             if self._gain(leaner, model) > 5.0 * _FURTHER:
                 continue
             leaner = self._settled(self._refined(leaner))
@@ -324,21 +324,21 @@ class Search:
         return model, named
 
     def _refined(self, model: Model) -> Model:
-        """Returns a fit with what the refined simulation says in place of the coarse one."""
+        """Returns a fit with the refined simulation's prediction in place of the coarse one's."""
         return self._model(model.fit, self._told(model.effects), settled=False)
 
     def _told(self, effects: Sequence[Effect]) -> FloatArray:
-        """Returns (N,) whitened, what the refined simulation says with effects."""
+        """Returns (N,) the whitened prediction of the refined simulation with effects."""
         (told,) = self._experiment.tell([("refined", effects)], self._progress)
         return self._whitening.vector(told)
 
     def _polished(self, last: Model) -> Model:
-        """Returns a fit about what the refined simulation says at the last one.
+        """Returns the fit refitted around the refined simulation at its parameters.
 
-        One that is settled stays. The slopes, told by coarser simulations, become those of the
-        refined one on the way. Coarse contact feels friction more than fine contact does: by the
-        slopes of the screening level alone a coefficient of friction came out at half of what it
-        was.
+        A converged fit is returned unchanged. The slopes come from coarser simulations and turn
+        into those of the refined one on the way. Coarse contact is more sensitive to friction: with
+        the slopes of the screening level alone, a coefficient of friction came out at half its
+        value.
         """
         if last.fit is None or last.settled:
             return last
@@ -350,13 +350,13 @@ class Search:
             for p in new.parameters()
         ]
         if all(moved):
-            # so short a step is linear
+            # for such a short step the linear prediction is good enough
             return self._model(better, better.told)
         told = self._told(better.effects)
         return self._model(bettered(better, told - last.reference), told, settled=False)
 
     def _confidence(self, before: Model, after: Sequence[Model]) -> float:
-        """Returns the share of resamples of blocks in which the first is best, and is a gain."""
+        """Returns the share of resamples of blocks in which the first is the best and a gain."""
         start, losses = self._blocks(before), [self._blocks(m) for m in after]
         draws = self._rng.integers(len(start), size=(_RESAMPLES, len(start)))
         totals = np.stack([a[draws].sum(axis=1) for a in losses])
@@ -365,5 +365,5 @@ class Search:
 
 
 def _numerics(comparison: Comparison) -> FloatArray:
-    """Returns (N,) whitened, what refining the scenario's simulation changes without effects."""
+    """Returns (N,) the whitened change by refinement of the scenario's simulation, no effects."""
     return comparison.vector["refined"] - comparison.vector["scenario"]

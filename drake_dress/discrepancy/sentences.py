@@ -1,4 +1,4 @@
-"""What was found, in words that a lab member can read."""
+"""The result of `explain` in plain words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to record next."""
+"""Suggests what to record next."""
 
 from __future__ import annotations
 
@@ -37,16 +37,18 @@ def suggest(
     base: Path,
     stage: Callable[[str], None] = lambda _: None,
 ) -> str | None:
-    """Returns which motion to record; None where nothing is open.
+    """Returns a sentence on which motion to record; None if no question is open.
 
-    For two candidates, or a doubted cause and the next best, every motion is simulated under
-    both: that in which markers and forces differ most, in units of their noise, tells them apart.
+    For unexplained data, it suggests to record each motion on its own. Otherwise every motion is
+    simulated with each of two rivals: the ambiguous causes, or a doubted cause and the next best
+    candidate. The motion in which markers and forces differ most, in units of typical noise (1 mm,
+    0.05 N), distinguishes them best.
 
     Args:
-        explanation: what was found.
-        scenario: of the lab.
+        explanation: result of the search.
+        scenario: scenario of the lab.
         base: directory that a mesh file's name is relative to.
-        stage: told what is being done.
+        stage: called with a description of each stage.
     """
     if explanation.verdict == "unexplained":
         return (
@@ -78,10 +80,9 @@ def suggest(
 
 
 def _rivals(explanation: Explanation) -> tuple[Effect, Effect] | None:
-    """Returns two effects of which one may be there; None where nothing is open.
+    """Returns two effects that the data do not distinguish; None if no question is open.
 
-    A cause that is named with little confidence has the candidate that did best beside it for its
-    rival.
+    The rival of a cause with low confidence is the best of the other candidates.
     """
     found = explanation.effects
     if explanation.verdict == "ambiguous":
@@ -90,7 +91,7 @@ def _rivals(explanation: Explanation) -> tuple[Effect, Effect] | None:
     if explanation.verdict != "named" or doubted is None or doubted.effect is None:
         return None
     others = [s for s in explanation.scores if s.effect and s.name not in {e.NAME for e in found}]
-    # a fit may have gone astray, so what screening says counts as well
+    # a fit may have diverged, so the screened gain counts as well
     best = max(others, key=lambda s: max(s.screened, s.fitted or 0.0), default=None)
     return (doubted.effect, best.effect) if best and best.effect else None
 

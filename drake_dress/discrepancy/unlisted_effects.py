@@ -1,6 +1,6 @@
-"""Effects that are missing from the list of `models/effects`, to hide in generated data.
+"""Effects to hide in generated data that are not in the list of `models/effects`.
 
-`explain` does not know them, and has to say that something is unexplained.
+`explain` does not know them and should call such data unexplained.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import Effect, ForceEffect, Sheet, norms, parameter
 
-# Where the magnet sits in the rest shape: nodes this near to the lowest of the left sleeve, m.
+# The magnet is at nodes this close to the outermost node on the left of the rest shape, m.
 _CUFF = 0.06
-# The magnet's pull does not grow within this distance, m.
+# Distance d₀ below which the magnet's pull is constant, m.
 _NEAREST = 0.08
-# Speed below which dry friction of the lining is taken as viscous, m/s.
+# Speed below which the lining's dry friction is regularised as viscous, m/s.
 _CREEP = 0.01
-# Share of the garment's height, from the top, that the lining is sewn to.
+# Share of the garment's height, from the top, to which the lining is sewn.
 _SEWN = 0.06
 
 
@@ -28,10 +28,10 @@ class MagnetisedCuff(ForceEffect):
     """A magnet in the left cuff that a steel post attracts: F = strength (d₀ / max(d, d₀))³.
 
     Args:
-        strength: N at d₀ = 0.08 m and nearer.
-        x: of the post relative to the highest node at the same side, m.
-        y: m.
-        z: m.
+        strength: force at d₀ = 0.08 m and nearer, N.
+        x: position of the post relative to the highest node on the same side, m.
+        y: likewise, m.
+        z: likewise, m.
     """
 
     NAME = "magnetised_cuff"
@@ -56,14 +56,14 @@ class MagnetisedCuff(ForceEffect):
 
 @dataclass(frozen=True)
 class Snag(ForceEffect):
-    """A burr at a fixed point of the world that holds cloth near it: F = k d exp(−d² / r²) a node.
+    """A burr at a fixed point that holds cloth near it: F = k d exp(−d² / r²) on each node.
 
     Args:
         stiffness: k, N/m.
         radius: r, m.
-        x: of the point, world, m.
-        y: m.
-        z: m.
+        x: position of the point, world frame, m.
+        y: likewise, m.
+        z: likewise, m.
     """
 
     NAME = "snag"
@@ -85,13 +85,13 @@ class Snag(ForceEffect):
 
 @dataclass(frozen=True)
 class SlidingLayer(ForceEffect):
-    """A stiff lining that hangs from the same seams, over which the cloth slides with dry friction.
+    """A stiff lining sewn to the garment's top, over which the cloth slides with dry friction.
 
-    The lining moves as the top of the garment does; with w the cloth's velocity relative to it,
-    F = −τ A w / max(‖w‖, 1 cm/s) for a node of area A.
+    The lining moves with the top of the garment. With w the cloth's velocity relative to it,
+    F = −τ A w / max(‖w‖, 1 cm/s) on a node of area A.
 
     Args:
-        stress: τ, N/m².
+        stress: friction stress τ, N/m².
     """
 
     NAME = "sliding_layer"

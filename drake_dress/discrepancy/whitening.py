@@ -1,13 +1,13 @@
-"""Markers and forces of all recordings as one vector whose entries are noise of variance 1.
+"""Whitens markers and forces of all recordings: one vector of residuals with unit variance.
 
-What the simulation's own numerics leave open counts as noise too: where the refined replay differs
-from the scenario's, nothing finer than a share of that difference can be held against physics. Such
-an error stays for a while, other than the sensors'. So a signal's noise is taken for
+Numerical error counts as noise, too: the refined simulation may be off by a share of the change by
+refinement. Unlike the sensors' noise, such an error is correlated in time. So the noise of a signal
+is modelled as
 
     σ ε_t + s_t z_t,    z an Ornstein–Uhlenbeck process of variance 1 and memory τ,
 
-with σ of the sensor and s_t of the numerics, and a residual is whitened by the innovations of the
-Kalman filter of that model: what a long quiet offset is worth, it is worth once.
+with σ for the sensor and s_t for the numerical error. The whitened residual is the innovations of
+the Kalman filter of this model, so a long constant offset counts only once.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from drake_dress.discrepancy.experiment import Told
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-# Share of the difference between scenario and refined replay that the refined one may still be off.
+# Numerical error of the refined replay, as a share of the change by refinement.
 NUMERICS_SHARE = 0.45
-# Memory τ of errors of numerics, s; time over which their size is averaged, s.
+# Memory τ of the numerical error, s; time over which its size is averaged, s.
 MEMORY, _AVERAGED = 0.4, 0.3
-# One pair of simulations says little about a marker's error: so much comes from it, the rest from
-# all markers that touch, or do not touch, the person.
+# One pair of simulations is a poor estimate of a single marker's error. This share of its variance
+# comes from that marker, the rest is the mean over all samples with, or without, contact.
 _OWN = 0.6
-# Length of a block that is judged as one, s.
+# Length of a block of held-out data, s.
 BLOCK = 0.5
 
 
 @dataclass(frozen=True)
 class Whitening:
-    """Maps what simulations say to one vector.
+    """Whitened data, and the map from predictions to whitened vectors.
 
     Attributes:
-        data: (N,) what was measured, whitened.
-        block: (N,) number of the block that an entry is in.
-        recording: (N,) its recording; time: (N,) s.
+        data: (N,) measured data, whitened.
+        block: (N,) index of each entry's block.
+        recording: (N,) index of its recording; time: (N,) time since the recording's start, s.
         is_force: (N,) whether it is a force.
-        marker: (N,) which marker, or gripper for forces.
+        marker: (N,) index of its marker, or of its gripper for forces.
         sensor: (N,) standard deviation of the sensor's noise, m or N.
-        filters: of the recordings.
+        filters: noise filters of the recordings.
     """
 
     data: FloatArray
@@ -61,33 +61,33 @@ class Whitening:
 
     @property
     def voice(self) -> IndexArray:
-        """(N,) number of the recording and the kind of signal that an entry is of."""
+        """(N,) index of each entry's voice: its recording and kind of signal."""
         return 2 * self.recording + self.is_force
 
     @property
     def trained_on(self) -> tuple[BoolArray, BoolArray]:
-        """Two sets of entries (N,): who trains on one is judged on the other."""
+        """Two masks of entries (N,): what is trained on one is judged on the other."""
         odd: BoolArray = self.block % 2 == 1
         return odd, ~odd
 
     def vector(self, told: Sequence[Told]) -> FloatArray:
-        """Returns (N,) what simulations say of the recordings, whitened."""
+        """Returns (N,) the whitened predictions of all recordings."""
         return np.concatenate(
             [f.whitened(_series(t)) for f, t in zip(self.filters, told, strict=True)]
         )
 
     def size(self, residual: FloatArray) -> FloatArray:
-        """Returns a whitened residual (N,) in m and N."""
+        """Returns (N,) a whitened residual (N,) converted to m and N."""
         parts = zip(self.filters, self._split(residual), strict=True)
         return np.concatenate([f.unwhitened(part) for f, part in parts])
 
     def of_size(self, values: FloatArray) -> FloatArray:
-        """Returns (N,) whitened what is given in m and N, (N,): the inverse of `size`."""
+        """Returns (N,) values in m and N, (N,), whitened: the inverse of `size`."""
         parts = zip(self.filters, self._split(values), strict=True)
         return np.concatenate([f.innovations(part) for f, part in parts])
 
     def _split(self, values: FloatArray) -> list[FloatArray]:
-        """Returns the entries of each recording."""
+        """Returns the values (N,) split by recording."""
         return np.split(values, np.cumsum([f.count for f in self.filters])[:-1])
 
 
@@ -95,13 +95,13 @@ class NoiseFilter:
     """Whitens the signals of one recording.
 
     Args:
-        time: (S,) s, of the samples.
+        time: (S,) time stamps of the samples, s.
         sensor: (C,) standard deviation of the sensors' noise.
-        numerics: (S,C) of the numerics' error.
-        kept: (S,C) which were measured.
+        numerics: (S,C) standard deviation of the numerical error.
+        kept: (S,C) which values were measured.
 
     Attributes:
-        count: of entries that were measured.
+        count: number of measured values.
     """
 
     def __init__(
@@ -140,14 +140,14 @@ def whiten(
     refined: Sequence[Told],
     share: float = NUMERICS_SHARE,
 ) -> Whitening:
-    """Returns the whitening of what was measured.
+    """Returns the whitening of recordings.
 
     Args:
-        recordings: what was measured.
-        samples: indices that are compared, of each.
-        scenario: what the scenario's simulation says.
-        refined: what the refined one says.
-        share: of the difference between both that the refined one may still be off.
+        recordings: measured recordings.
+        samples: indices of the compared samples, for each recording.
+        scenario: predictions of the scenario's simulation.
+        refined: predictions of the refined simulation.
+        share: numerical error of the refined simulation, as a share of the difference of the two.
     """
     numerics = _numerics(recordings, samples, scenario, refined, share)
     filters, data = [], []
@@ -191,7 +191,7 @@ def _numerics(
     refined: Sequence[Told],
     share: float,
 ) -> list[FloatArray]:
-    """Returns (S,C) for each recording: standard deviation of the numerics' error."""
+    """Returns (S,C) for each recording: the standard deviation of the numerical error."""
     own: list[tuple[FloatArray, FloatArray]] = []
     for r, s, coarse, fine in zip(recordings, samples, scenario, refined, strict=True):
         window = max(1, round(_AVERAGED / float(np.median(np.diff(r.time[s])))))
@@ -222,14 +222,14 @@ def _numerics(
 
 
 def _series(told: Told) -> FloatArray:
-    """Returns (S,C): coordinates of the markers, then components of the forces."""
+    """Returns (S,C) the coordinates of the markers, then the components of the forces."""
     count = len(told.marker)
     return np.concatenate([told.marker.reshape(count, -1), told.force.reshape(count, -1)], axis=1)
 
 
 @nb.njit(cache=True, nogil=True)
 def _gains(sensor, numerics, kept, decay):  # type: ignore[no-untyped-def]
-    """Returns gains and scales (S,C) of the filters of all signals."""
+    """Returns Kalman gains and innovation standard deviations (S,C) of all signals."""
     gain, scale = np.zeros(kept.shape), np.zeros(kept.shape)
     for c in range(kept.shape[1]):
         variance = 1.0

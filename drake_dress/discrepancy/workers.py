@@ -1,8 +1,8 @@
-"""Processes that run simulations of an experiment.
+"""Worker processes that run the simulations of an experiment.
 
-Each gets what it works with once, as it begins, so that experiments that are open at once have
-processes and data of their own. What is sent may hold classes that the other process cannot import,
-such as an effect from a notebook's cell: cloudpickle sends those themselves.
+Each process receives the common data once, when it starts, so that experiments that are open at the
+same time have their own processes and data. Data are pickled with cloudpickle: they may use classes
+that the worker process cannot import, such as an effect defined in a notebook's cell.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _common: Any = None
 
 
 class Workers:
-    """Calls functions in processes.
+    """Calls functions in worker processes.
 
     Args:
-        common: what every function is given first; it is pickled once.
-        count: of processes.
+        common: first argument of every function; it is pickled once.
+        count: number of processes.
     """
 
     def __init__(self, common: Any, count: int) -> None:
@@ -42,9 +42,9 @@ class Workers:
         """Returns `function(common, *arguments)` for all arguments in `work`, in order.
 
         Args:
-            function: can be pickled.
+            function: a function that can be pickled.
             work: arguments of each call.
-            progress: called after each.
+            progress: called after each result.
 
         Raises:
             FailedError: a process has ended.
@@ -52,7 +52,7 @@ class Workers:
         return answers([submit(self._pool, _call, function, *w) for w in work], progress)
 
     def end(self) -> None:
-        """Ends the processes, and what they do."""
+        """Kills the processes and cancels pending calls."""
         self._pool.kill()
         self._pool.shutdown(cancel_futures=True)
 
@@ -81,12 +81,12 @@ def answers(
 
 
 def submit(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-    """Returns what will be the result of a function in another process.
+    """Calls a function in a worker process and returns the future of its result.
 
     Args:
-        pool: of processes.
-        function: that is called.
-        arguments: of it; their classes need not be known to the other process.
+        pool: pool of processes.
+        function: function to call.
+        arguments: its arguments; the worker process need not be able to import their classes.
     """
     return pool.submit(_unpacked, cloudpickle.dumps((function, arguments)))
 

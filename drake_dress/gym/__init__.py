@@ -6,9 +6,9 @@
     env = gymnasium.make("drake_dress/Dressing-v0", scenario="dummy_varied")
     observation, info = env.reset(seed=0)
 
-`DressingEnv` is the environment, `RewardWeights` weighs its reward, and `ControllerPolicy` lets the
-scenario's own controllers act in it. `docs/gym.md` has the layout of observations and actions. What
-stands in `__all__` is public.
+`DressingEnv` is the environment, `RewardWeights` sets the weights of its reward, and
+`ControllerPolicy` runs the scenario's own controllers in it. `docs/gym.md` describes observations
+and actions. The names in `__all__` are public.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ ENV_ID = "drake_dress/Dressing-v0"
 
 
 def make_vec(num_envs: int, **arguments: Any) -> gymnasium.vector.VectorEnv[Any, Any, Any]:
-    """Returns environments that run side by side, each in a process of its own.
+    """Returns environments that run in parallel, each in its own process.
 
-    It is `gymnasium.make_vec` with processes that are spawned: one forked from a process with
-    threads, as Numba and linear algebra have them, may hang.
+    Like `gymnasium.make_vec`, but processes are spawned: Numba and linear algebra use threads, and
+    a process forked from one with threads may hang.
 
     Args:
-        num_envs: how many.
-        arguments: of `DressingEnv`.
+        num_envs: number of environments.
+        arguments: arguments of `DressingEnv`.
     """
     return gymnasium.make_vec(
         ENV_ID,
@@ -45,6 +45,6 @@ def make_vec(num_envs: int, **arguments: Any) -> gymnasium.vector.VectorEnv[Any,
     )
 
 
-# `gymnasium.register` warns of a name that is registered twice, as when a module is loaded again.
+# `gymnasium.register` warns if a name is registered twice, for example when a module is reloaded.
 if ENV_ID not in gymnasium.registry:
     gymnasium.register(id=ENV_ID, entry_point="drake_dress.gym.environment:DressingEnv")

@@ -1,4 +1,4 @@
-"""The scenario's own controllers as a policy: what a run requests, an agent may request."""
+"""The scenario's own controllers as a policy for the environment."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from drake_dress.gym.environment import DressingEnv
 from drake_dress.gym.observations import Observation
 from drake_dress.models.sides import SIDES
 
-# Beyond an observation's time, s, which is rounded: what the controllers do at it is done then.
+# Time by which the controllers are advanced past an observation's rounded time, s, so that their
+# events at that time are done.
 _ROUNDING = 1e-4
 
 
 class ControllerPolicy:
-    """Acts as `controller.method` of the environment's scenario says, from observations alone.
+    """Acts like `controller.method` of the environment's scenario, from observations alone.
 
-    The controllers are the systems of a run: the global one plans at its rate and with its delay,
-    the local one, where the method has one, solves at its rate. They see the group `state` of an
-    observation, and each act takes what they request after the local controller's delay.
+    The controllers are the systems of a run. The global controller plans at its rate and with its
+    delay; the local controller, if the method has one, solves at its rate. They receive the group
+    `state` of an observation. `act` returns what they request after the local controller's delay.
 
-    Call `reset` after each reset of the environment: a new episode may have another person and
-    garment. At a control rate below the local controller's, its solves between two observations
-    see the newer of the two.
+    Call `reset` after each reset of the environment, since a new episode may have another person
+    and garment. If the control rate is below the local controller's, its solves between two
+    observations use the newer one.
 
     Args:
-        env: with the group `state` among its observations, and an episode begun; wrapped or not.
+        env: environment, wrapped or not, that observes the group `state` and has been reset.
 
     Raises:
-        ValueError: it does not observe the state, or is no dressing.
+        ValueError: `env` is not a `DressingEnv`, or does not observe the group `state`.
     """
 
     def __init__(self, env: gymnasium.Env[Observation, npt.NDArray[np.float32]]) -> None:
@@ -49,12 +50,12 @@ class ControllerPolicy:
         self.reset()
 
     def reset(self) -> None:
-        """Begins anew, with the person and garment of the environment's episode."""
+        """Restarts the controllers with the person and garment of the environment's episode."""
         parts = self._env.parts
         self.close()
         local = local_setup(parts.setup.scenario.controller, parts.policy)
         self._has_local = local is not None
-        # what the controllers request is used from their delay on
+        # requests take effect after the local controller's delay
         self._delay = 0.0 if local is None else local.delay
         self._diagram = make_controller_diagram(parts)
         self._simulator = Simulator(self._diagram)
@@ -62,17 +63,17 @@ class ControllerPolicy:
         self._begun = False
 
     def close(self) -> None:
-        """Frees the memory of the controllers, and ends their thread."""
+        """Frees the memory of the controllers and ends their thread."""
         if self._diagram is not None:
             del self._simulator, self._root
             release(self._diagram)
             self._diagram = None
 
     def act(self, observation: Observation) -> npt.NDArray[np.float32]:
-        """Returns the action (2,3), m/s, that follows from an observation.
+        """Returns the controllers' action (2,3), m/s, for an observation.
 
         Args:
-            observation: of the episode, each once and in their order.
+            observation: next observation of the episode; pass each one once and in order.
 
         Raises:
             ValueError: the policy is closed.

@@ -1,4 +1,4 @@
-"""Dressing as an environment: an agent moves two grippers in place of the controllers."""
+"""Dressing as a Gymnasium environment: an agent moves two grippers instead of the controllers."""
 
 from __future__ import annotations
 
@@ -27,57 +27,58 @@ from drake_dress.shipped import scenario_file
 
 Action = npt.NDArray[np.float32]
 
-# Range of the seeds of episodes that are reset without one; results are reported on smaller ones.
+# Range of the seeds that are drawn by a reset without one; results are reported on smaller seeds.
 _DRAWN_SEEDS = (2**32, 2**62)
-# Names of the cameras that an environment adds: for observations, and for `render`.
+# Names of the cameras that an environment adds for observations and for `render`.
 _VIEW, _RENDER_VIEW = "view", "render_view"
 _VIEW_SIZE = (128, 128)  # pixels
-# s from which on a sleeve counts as on, as in `summary.json`.
+# Progress s from which a sleeve counts as on, as in `summary.json`.
 _LEAST_S = SuccessRules().min_s
 
 
 class DressingEnv(gymnasium.Env[Observation, Action]):
-    """Two grippers put a coat on a person; the agent asks for the velocities of both.
+    """Two grippers put a coat on a person; the agent commands the velocities of both.
 
     The world is that of `drake-dress run`: the simulated station with person, garment, and arms or
-    floating grippers, behind the safety governor. The agent takes the place of the controllers.
+    floating grippers, behind the safety governor. The agent replaces the controllers.
 
     Action, Box (2,3) float32: velocity of left and right gripper in the world frame, m/s, held for
-    a control period. The governor limits the speed of each gripper to `safety.max_speed`, which
-    bounds each component here, and its acceleration, force and distances; see docs/safety.md.
+    a control period. Each component is bounded by `safety.max_speed`. The governor limits the speed
+    of each gripper to the same value, and limits acceleration, force and distances, too; see
+    docs/safety.md.
 
     Observation, Dict: see docs/gym.md.
 
     An episode terminates when both sleeves have stayed on for `stay`, when the governor stops the
     grippers, or when the simulation breaks down; it is truncated at the scenario's duration.
-    `info` holds `ended_by` (empty while it goes on), `is_success`, `seed`, `time` (s), `s` (2,)
+    `info` holds `ended_by` (empty during the episode), `is_success`, `seed`, `time` (s), `s` (2,)
     and `linking` (2,) of the true garment, `governor` (2,) the flags of
     `models.control.safety.Verdict`, and, after a step, `reward`: its terms by name.
 
-    `reset(seed=n)` draws what `drake-dress run --seed n` draws. The same seed and actions give the
-    same observations bit for bit. Without a seed one is drawn, 2³² or more, from the environment's
-    generator, so that training never uses a seed on which results are reported. A reset that draws
-    what the last one drew keeps the diagram. Any other builds a new one, which takes a second or
-    two and leaves about 1 MB behind that Drake does not free.
+    `reset(seed=n)` draws the same variation as `drake-dress run --seed n`. The same seed and
+    actions give the same observations bit for bit. A reset without a seed draws one, 2³² or more,
+    from the environment's generator, so that training never uses a seed on which results are
+    reported. A reset that draws the same variation as the last one keeps the diagram. Any other
+    builds a new one, which takes a second or two and leaks about 1 MB that Drake does not free.
 
     Args:
         scenario: name of a scenario that ships, or a YAML file.
-        overrides: KEY=VALUE, as `--set` takes them.
-        observe: some of `state`, `force`, `color` and `depth`. The images are of the scenario's
-            cameras, or of one camera `view` where it has none.
-        control_rate: of actions, Hz; None: the rate of the scenario's local controller. Its period
-            has to be a multiple of `plant.time_step`.
-        reward: weights of the reward, or a mapping of those that are not the defaults.
-        stay: for which both sleeves must stay on, s.
+        overrides: KEY=VALUE, as for `--set`.
+        observe: some of `state`, `force`, `color` and `depth`. Images come from the scenario's
+            cameras, or from one camera `view` if it has none.
+        control_rate: rate of actions, Hz; None: the rate of the scenario's local controller. Its
+            period has to be a multiple of `plant.time_step`.
+        reward: weights of the reward, or a mapping of those that differ from the defaults.
+        stay: time for which both sleeves must stay on, s.
         render_mode: `rgb_array`, or None.
-        render_size: width and height of what `render` returns, pixels.
+        render_size: width and height of the image from `render`, pixels.
 
     Raises:
-        UserError: an argument or the scenario cannot be used; by `reset`, too, where what was drawn
-            cannot.
+        UserError: an argument or the scenario cannot be used. `reset` raises it, too, if the drawn
+            scenario cannot be used.
     """
 
-    # an instance's own is written below; Gymnasium declares it as a variable of instances
+    # Gymnasium declares it as an instance variable; instances set their own below
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
@@ -100,7 +101,7 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
         self._plant_steps = _plant_steps(self._scenario, control_rate)
         self._period = self._plant_steps * self._scenario.plant.time_step
         self._step_count = max(1, round(self._scenario.duration / self._period))
-        # of this environment: `RecordVideo` reads the rate of its frames here
+        # `RecordVideo` reads the frame rate of this environment here
         self.metadata = {**type(self).metadata, "render_fps": 1.0 / self._period}
         self._world: World | None = None
         self._ended = True
@@ -122,14 +123,14 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
 
     @property
     def control_period(self) -> float:
-        """Time for which an action is held, s."""
+        """Duration for which an action is held, s."""
         return self._period
 
     @property
     def parts(self) -> Parts:
-        """What this episode's diagram is made of: its drawn scenario, garments, policy and limits.
+        """Parts of this episode's diagram: the drawn scenario, garments, policy and limits.
 
-        Garments and policy may be kept; the station is freed by the next reset.
+        Garments and policy may be kept. The next reset frees the station.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -139,11 +140,11 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins an episode; returns the observation and `info`.
+        """Starts an episode and returns the observation and `info`.
 
         Args:
-            seed: of the scenario's variation; None draws one.
-            options: there are none.
+            seed: seed of the scenario's variation; None draws one.
+            options: must be empty or None.
         """
         super().reset(seed=seed)
         if options:
@@ -169,7 +170,7 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
             action: (2,3) velocity of left and right gripper, m/s; clipped to the action space.
 
         Returns:
-            observation, reward, terminated, truncated, `info`.
+            Observation, reward, terminated, truncated, `info`.
         """
         world = self._begun()
         if self._ended:
@@ -196,7 +197,7 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
         return seen, float(sum(terms.values())), terminated, ended_by == "time", info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Returns a picture (height, width, 3), RGB; None where there is no render mode."""
+        """Returns an RGB image (height, width, 3); None without a render mode."""
         if self.render_mode is None:
             return None
         image = self._begun().image(f"{_RENDER_VIEW}.color_image")
@@ -227,7 +228,7 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
         return np.clip(velocity, -fastest, fastest)
 
     def _ended_by(self, advance: Advance, dressed: bool) -> str:
-        """Returns why the episode has ended; nothing while it goes on."""
+        """Returns why the episode has ended; empty if it has not."""
         if advance.fault is not None:
             return advance.fault
         if dressed:
@@ -248,7 +249,7 @@ class DressingEnv(gymnasium.Env[Observation, Action]):
         }
 
     def _add_cameras(self, observe: Sequence[str], render_size: tuple[int, int]) -> None:
-        """Adds a camera to observe with where the scenario has none, and one to render with."""
+        """Adds a camera for observations if the scenario has none, and one for rendering."""
         cameras = self._scenario.station.cameras
         if {"color", "depth"} & set(observe) and not cameras:
             cameras.append(view_of(self._scenario, _VIEW, *_VIEW_SIZE))
@@ -293,10 +294,10 @@ def _simulated(scenario: Scenario, source: Path) -> Scenario:
 
 
 def _plant_steps(scenario: Scenario, control_rate: float | None) -> int:
-    """Returns for how many of the plant's steps an action is held."""
+    """Returns the number of plant steps for which an action is held."""
     step = scenario.plant.time_step
     if control_rate is None:
-        # in all scenarios that ship, the local controller's period is a multiple of the step
+        # in all shipped scenarios, the local controller's period is a multiple of the step
         return max(1, round(scenario.controller.local.period / step))
     steps = 1.0 / (control_rate * step) if control_rate > 0.0 else 0.0
     if not (steps < np.inf and round(steps) >= 1 and abs(steps - round(steps)) < 1e-6):

@@ -1,8 +1,9 @@
-"""What an agent observes: names, shapes, bounds, and where each value comes from.
+"""Observations of an agent: names, shapes, bounds and sources.
 
 All positions are in the world frame W (z up, the person faces +x), SI units, left before right.
-Observations are what the scenario's own controllers get: estimates of garment and person, and what
-grippers measure. The only exceptions are the forces on the person, which only a simulation has.
+Observations are the inputs of the scenario's own controllers: estimates of garment and person, and
+measurements of the grippers. The only exceptions are the forces on the person, which exist only in
+simulation.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from drake_dress.models.dressing.stages import StageState
 GROUPS = ("state", "force", "color", "depth")
 Observation = dict[str, Any]
 
-# Bounds of the spaces; what is beyond is clipped to them. A dressing stays far inside.
+# Bounds of the spaces, to which values are clipped. A dressing stays far inside them.
 _FARTHEST = 10.0  # m
 _FASTEST = 10.0  # m/s
 _STRONGEST = 1000.0  # N
@@ -36,10 +37,10 @@ class Observer:
     """Reads observations from a world.
 
     Args:
-        groups: of `GROUPS`, those that are observed.
-        node_count: m, of the controller's garment.
-        cameras: whose images are observed.
-        duration: of an episode, s.
+        groups: observed groups, some of `GROUPS`.
+        node_count: number m of nodes of the controller's garment.
+        cameras: cameras whose images are observed.
+        duration: duration of an episode, s.
     """
 
     def __init__(
@@ -67,17 +68,17 @@ class Observer:
         self.space = spaces.Dict(bounds)
 
     def begin(self, world: World) -> None:
-        """Is called at the begin of each episode, before anything is read."""
+        """Starts an episode; call this before `read`."""
         self._world = world
         self._gauge = SleeveGauge(world.belief)
         self._stages = StageState()
         self._looks = 0
 
     def read(self, time_on: float) -> Observation:
-        """Returns the observation now.
+        """Returns the current observation.
 
         Args:
-            time_on: for which both sleeves have stayed on, s.
+            time_on: time for which both sleeves have stayed on, s.
         """
         seen: Observation = {}
         if "state" in self._groups:
@@ -89,7 +90,7 @@ class Observer:
                 image = self._world.image(f"{camera.name}.color_image")
                 seen[f"{camera.name}_color"] = np.ascontiguousarray(image[:, :, :3])
             if "depth" in self._groups:
-                # infinite where nothing is near enough
+                # depth is infinite where nothing is in range
                 depth = self._world.image(f"{camera.name}.depth_image").astype(np.float32)
                 seen[f"{camera.name}_depth"] = np.clip(depth, 0.0, _DEEPEST)
         return seen
@@ -124,7 +125,7 @@ class Observer:
         }
 
     def _update_stages(self, x: FloatArray, joints: FloatArray) -> None:
-        """Updates the stages as often as the scenario's global controller does."""
+        """Updates the stages at the rate of the scenario's global controller."""
         parts, now = self._world.parts, self._world.time
         if now < self._looks * parts.setup.scenario.controller.global_mpc.period - 1e-9:
             return

@@ -1,4 +1,4 @@
-"""The reward of a control step: progress as the change of a potential, forces, and how it ended."""
+"""The reward of a control step: change of a progress potential, forces, and outcome."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ class RewardWeights:
 
         Φ = Σ progress · s - Σ approach · d,
 
-    over both sleeves: s is the progress of a sleeve that covers its arm (0 hand, 1 elbow,
-    2 shoulder; 0 for a sleeve that does not), d the distance of the armhole's centre to the hand
-    of a sleeve that does not cover its arm (0 for one that does). A step is rewarded by the change
-    of Φ. The sum over an episode is Φ at its end less Φ at its begin, whichever way was taken.
+    over both sleeves. s is the progress of a sleeve that covers its arm (0 hand, 1 elbow,
+    2 shoulder) and 0 for one that does not. d is the distance from the armhole's centre to the hand
+    for a sleeve that does not cover its arm, and 0 for one that does. A step is rewarded by the
+    change of Φ, so the sum over an episode is Φ at its end minus Φ at its start, on any path.
 
     Attributes:
-        progress: per unit of s and sleeve.
-        approach: per metre, 1/m.
-        gripper_force: per impulse of the garment on the grippers beyond `free_force`, 1/(N·s).
-        person_force: per impulse of contact on the person, summed over the nodes' magnitudes,
+        progress: weight of s, for each sleeve.
+        approach: weight of the distance d, 1/m.
+        gripper_force: weight of the impulse of the garment on the grippers beyond `free_force`,
             1/(N·s).
-        free_force: of the garment on a gripper that costs nothing, N. The default is the
-            governor's soft limit, from which on pulling fades.
-        success: given once, when both sleeves have stayed on.
-        failure: taken once, when the governor stops the grippers or the simulation breaks down.
+        person_force: weight of the contact impulse on the person, summed over the magnitudes of the
+            nodes' forces, 1/(N·s).
+        free_force: largest force of the garment on a gripper without cost, N. The default is the
+            governor's soft limit, from which pulling is reduced.
+        success: bonus, given once when both sleeves have stayed on.
+        failure: penalty, given once when the governor stops the grippers or the simulation breaks
+            down.
     """
 
     progress: float = 1.0
@@ -57,7 +59,7 @@ class RewardWeights:
 
     @staticmethod
     def of(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights:
-        """Returns weights as they are, or the defaults with those of a mapping replaced.
+        """Returns given weights, or the defaults with those of a mapping replaced.
 
         Raises:
             UserError: a name or a value cannot be used.
@@ -82,9 +84,9 @@ class Loads:
     """Forces during a control step, sampled at each step of the plant.
 
     Attributes:
-        gripper_force: (k,2) of the garment on left and right gripper, N.
-        contact_force: (k,) of the garment on the person, sum of the nodes' magnitudes, N.
-        period: between samples, s.
+        gripper_force: (k,2) magnitude of the garment's force on left and right gripper, N.
+        contact_force: (k,) sum of the magnitudes of the nodes' forces on the person, N.
+        period: time between samples, s.
     """
 
     gripper_force: FloatArray
@@ -103,10 +105,10 @@ def reward_terms(
     """Returns the terms of the reward by name; the reward is their sum.
 
     Args:
-        weights: of the terms.
-        before: progress at the begin of the control step.
+        weights: weights of the terms.
+        before: progress at the start of the control step.
         after: progress at its end.
-        loads: forces in it.
+        loads: forces during the step.
         succeeded: whether both sleeves have stayed on.
         failed: whether the grippers were stopped, or the simulation broke down.
     """

@@ -1,4 +1,4 @@
-"""Cameras that an environment adds to a scenario: where it has none, and for videos."""
+"""Cameras that an environment adds to a scenario: for images if it has none, and for videos."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from drake_dress.diagrams.scenario.schema import Camera
 from drake_dress.diagrams.sections.person import measures, posture
 from drake_dress.models.human.body import shoulder_height
 
-# From behind and aside, where both openings and both hands are seen.
+# From behind and to the left, where both openings and both hands are visible.
 _DIRECTION = np.array([-0.82, 0.48, 0.32])
 _DISTANCE = 2.6  # m
 _FIELD_OF_VIEW = 45.0  # vertical, degrees
-_BELOW_SHOULDERS, _BEHIND = 0.3, 0.15  # of the middle of the image, m
+_BELOW_SHOULDERS, _BEHIND = 0.3, 0.15  # of the image's centre, from the shoulders, m
 
 
 def view_of(scenario: Scenario, name: str, width: int, height: int) -> Camera:
     """Returns a camera that sees person and garment.
 
     Args:
-        scenario: whose person it looks at.
-        name: of the camera.
-        width: of its image, pixels.
-        height: likewise.
+        scenario: scenario with the person.
+        name: name of the camera.
+        width: width of its image, pixels.
+        height: height of its image, pixels.
     """
     shoulders = shoulder_height(measures(scenario.person), posture(scenario.person))
     target = np.array([-_BEHIND, 0.0, shoulders - _BELOW_SHOULDERS])

@@ -1,4 +1,4 @@
-"""One simulated dressing that an agent acts in, from a scenario whose variation is drawn."""
+"""One simulated dressing for an agent, from a scenario with its variation drawn."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from drake_dress.models.sides import SIDES
 
 @dataclass(frozen=True)
 class Advance:
-    """What happened while time went on.
+    """Result of simulating one control step.
 
     Attributes:
-        loads: forces.
-        verdict: (2,) all flags of the safety governor for left and right.
-        fault: why the simulation cannot go on; None while it can.
+        loads: forces during the step.
+        verdict: (2,) flags that the safety governor set during the step, for left and right.
+        fault: why the simulation cannot continue; None if it can.
     """
 
     loads: Loads
@@ -40,20 +40,21 @@ class Advance:
 
     @property
     def stopped(self) -> bool:
-        """Whether the governor stopped the grippers: a force was too high for too long."""
+        """Whether the governor stopped the grippers because a force was too high for too long."""
         return bool(np.any(self.verdict & int(Verdict.STOPPED)))
 
 
 class World:
-    """A drawn scenario's diagram with its simulator.
+    """The diagram of a drawn scenario, and its simulator.
 
     Args:
-        drawn: scenario with nothing left to draw.
-        nominal: the scenario before the draw, whose controller's mesh all draws share.
-        source: the scenario's file.
+        drawn: scenario with its variation drawn.
+        nominal: scenario before the draw; its controller's mesh is shared by all draws.
+        source: file of the scenario.
 
     Raises:
-        UserError: garment or arms cannot be used, or hang where grippers may not be.
+        UserError: the garment or the arms cannot be used, or the grippers start where they must
+            not be.
     """
 
     def __init__(self, drawn: Scenario, nominal: Scenario, source: Path) -> None:
@@ -68,7 +69,7 @@ class World:
         self.restart()
 
     def restart(self) -> None:
-        """Goes back to the begin; what is drawn stays."""
+        """Restarts the simulation with the same drawn scenario."""
         self._simulator.reset_context(self._agent.diagram.CreateDefaultContext())
         self._root = self._simulator.get_mutable_context()
         self._inside = self._station.GetMyContextFromRoot(self._root)
@@ -77,7 +78,7 @@ class World:
         self._steps = 0
 
     def close(self) -> None:
-        """Frees the memory of the diagram; nothing can be asked of this world afterwards."""
+        """Frees the memory of the diagram; the world cannot be used afterwards."""
         diagram = self._agent.diagram
         # simulator and contexts first: they use the diagram
         self.__dict__.clear()
@@ -86,7 +87,7 @@ class World:
     def is_of(self, drawn: Scenario) -> bool:
         """Returns whether this is the world of a drawn scenario, so that it can be restarted.
 
-        The seed itself counts where the run goes on drawing from it, as a tremor does.
+        The seed itself must match only if the run draws from it later, as a tremor does.
         """
         own = self._drawn
         draws = own.person.behaviour.tremor is not None
@@ -108,25 +109,25 @@ class World:
         return self.parts.setup.garments.belief
 
     def value(self, port: str) -> FloatArray:
-        """Returns a copy of a vector port of the station, by its name, in rows of three."""
+        """Returns a copy of the value of a vector port of the station, in rows of three."""
         values = self._station.GetOutputPort(port).Eval(self._inside)
         return np.array(values, dtype=np.float64).reshape(-1, 3)
 
     def grippers(self, quantity: str) -> FloatArray:
-        """Returns (2,3) `position`, `velocity` or `force` that both grippers measure; SI units."""
+        """Returns (2,3) measured `position`, `velocity` or `force` of both grippers; SI units."""
         ports = [f"{side}_gripper.{quantity}_measured" for side in SIDES]
         return np.concatenate([self.value(port) for port in ports])
 
     def image(self, port: str) -> npt.NDArray[np.generic]:
-        """Returns a copy of a camera's image (height, width, channels), by the name of its port."""
+        """Returns a copy of the camera image (height, width, channels) at a port of the station."""
         return np.array(self._station.GetOutputPort(port).Eval(self._inside).data)
 
     def advance(self, velocity: FloatArray, steps: int) -> Advance:
-        """Simulates with one request.
+        """Simulates plant steps with a constant velocity request.
 
         Args:
-            velocity: (2,3) that is asked of left and right gripper, m/s.
-            steps: of the plant.
+            velocity: (2,3) requested velocity of left and right gripper, m/s.
+            steps: number of plant steps.
         """
         self._command.FixValue(self._root, velocity.ravel())
         pull, contact = np.zeros((steps, 2)), np.zeros(steps)
@@ -139,7 +140,7 @@ class World:
             try:
                 self._simulator.AdvanceTo(self.time)
             except ValueError as error:
-                # nodes that are not finite: the garment's step tells
+                # the garment's step raises it if nodes are not finite
                 fault = " ".join(str(error).split())
                 break
             pull[k] = np.linalg.norm(self.grippers("force"), axis=1)
@@ -153,7 +154,7 @@ class World:
 
 
 def draw(nominal: Scenario, seed: int) -> Scenario:
-    """Returns the scenario of an episode: with what its seed draws written in."""
+    """Returns the scenario of an episode, with the variation that its seed draws."""
     return apply_variation(replace(nominal, seed=seed))
 
 

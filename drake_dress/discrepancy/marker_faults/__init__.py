@@ -1,11 +1,11 @@
-"""Finds what a motion-capture system reports of markers that it did not see where it says.
+"""Finds faulty marker positions in motion-capture data.
 
-Each function returns positions with NaN where a marker was not measured, and a line for each kind
-and marker that says where. What counts as evidence:
+Each function returns positions with NaN in place of faulty values, and notes that name the fault,
+the markers and the samples. One module finds each kind of fault:
 
-    lost        a value that stands for "not seen": zeros, 9999, the last position again and again
-    exchanges   two or more markers that take each other's places
-    tracks      a marker that is elsewhere for a while, or farther away than the cloth reaches
+    lost        a value that encodes "not seen": zeros, 9999, the last position repeated
+    exchanges   two or more markers that are swapped
+    tracks      a marker that leaves its track for a while, or is farther away than cloth allows
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ __all__ = ["without_faults", "without_substitutes"]
 def without_substitutes(
     time: FloatArray, marker: FloatArray, gripper: FloatArray, names: tuple[str, ...]
 ) -> tuple[FloatArray, list[str]]:
-    """Returns markers without the values that stand for lost ones, and what is to be said of them.
+    """Returns markers with NaN in place of values that encode lost ones, and notes on them.
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) in any unit of length, NaN where not seen; infinity may stand for that too.
-        gripper: (T,2,3) in any unit of length: a garment that is not moved may stand still.
-        names: of the markers.
+        marker: (T,m,3) positions in any unit of length; NaN or infinity where not seen.
+        gripper: (T,2,3) positions in any unit of length; while they are still, so may the garment.
+        names: names of the markers.
     """
     infinite = np.asarray(np.isinf(marker).any(axis=2))
     notes = told(names, infinite, "is infinite: taken as not seen")
@@ -52,15 +52,15 @@ def without_faults(
     noise: float,
     names: tuple[str, ...],
 ) -> tuple[FloatArray, list[str]]:
-    """Returns markers without spikes and exchanged labels, and what is to be said of them.
+    """Returns markers with NaN in place of spikes and swapped markers, and notes on them.
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) m, NaN where not seen.
-        places: (m,3) on the rest shape, m; None where they are not known.
-        reach: (m,m) m, the farthest that cloth lets two markers part; None likewise.
+        marker: (T,m,3) positions, m, NaN where not seen.
+        places: (m,3) positions on the rest shape, m; None if unknown.
+        reach: (m,m) distance along the cloth between markers, m; None if unknown.
         noise: standard deviation of a coordinate, m.
-        names: of the markers.
+        names: names of the markers.
     """
     notes = []
     jumps = find_jumps(time, marker, noise)
@@ -75,7 +75,7 @@ def without_faults(
     astray = strays(time, marker, jumps, far)
     notes += told(names, astray, "jumps away from its track: taken as not seen")
     marker = np.where(astray[:, :, None], np.nan, marker)
-    # what stood too far from a marker that is gone now may be well where it is
+    # markers that were too far only from values that are removed now are kept
     far = out_of_reach(marker, reach, noise)
     notes += told(
         names, far, "is farther from its neighbours than the cloth reaches: taken as not seen"

@@ -1,4 +1,4 @@
-"""Markers that take each other's places: labels that were exchanged."""
+"""Finds markers whose labels were swapped."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import numpy as np
 from drake_dress.discrepancy.marker_faults.tracks import Jump
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-# A marker takes another's place if it is so much nearer to that than to its own.
+# A marker has jumped to another's place if it is nearer to it than this share of the distance to
+# its own.
 _NEARER = 0.4
-# Labels are exchanged all along if distances to other markers fit so much better the other way
-# round, and are off by at least so much as they are, m; only neighbours are so near, m.
+# Labels are swapped throughout if the distances to other markers are off by more than _OFF, m, and
+# by less than this share of that after a swap. Only markers within _NEAR, m, are tried.
 _FITS, _OFF, _NEAR = 0.4, 0.05, 0.6
 _NEIGHBOURS, _INSTANTS = 8, 25
 
@@ -18,13 +19,13 @@ _NEIGHBOURS, _INSTANTS = 8, 25
 def exchanged(
     time: FloatArray, marker: FloatArray, places: FloatArray | None, jumps: list[Jump]
 ) -> list[tuple[tuple[int, ...], BoolArray]]:
-    """Returns groups of markers that exchanged their labels, and (T,) when.
+    """Returns groups of markers whose labels are swapped, and the samples (T,) at which they are.
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) m, NaN where not seen.
-        places: (m,3) on the rest shape, m; None where they are not known.
-        jumps: of the markers.
+        marker: (T,m,3) positions, m, NaN where not seen.
+        places: (m,3) positions on the rest shape, m; None if unknown.
+        jumps: jumps of the markers.
     """
     found: list[tuple[tuple[int, ...], BoolArray]] = []
     turns: dict[tuple[int, ...], list[int]] = {}
@@ -50,7 +51,7 @@ def exchanged(
 
 
 def _cycles(marker: FloatArray, jumps: list[Jump]) -> list[tuple[tuple[int, ...], int]]:
-    """Returns groups of markers that jump to each other's places, and the sample they do it at."""
+    """Returns groups of markers that jump to each other's places, and the samples of the jumps."""
     if not jumps:
         return []
     whose = np.array([j.marker for j in jumps])
@@ -77,7 +78,7 @@ def _cycles(marker: FloatArray, jumps: list[Jump]) -> list[tuple[tuple[int, ...]
 
 
 def _fits_exchanged(marker: FloatArray, places: FloatArray, i: int, j: int) -> bool:
-    """Returns whether distances to other markers say that i and j are each other."""
+    """Returns whether distances to other markers show that i and j are swapped."""
     near = np.minimum(*(np.linalg.norm(places - places[k], axis=1) for k in (i, j)))
     near[[i, j]] = np.inf
     others = np.argsort(near)[: min(_NEIGHBOURS, len(places) - 2)]
@@ -89,7 +90,7 @@ def _fits_exchanged(marker: FloatArray, places: FloatArray, i: int, j: int) -> b
 
 
 def _off(marker: FloatArray, places: FloatArray, k: int, place: int, others: IndexArray) -> float:
-    """Returns how far a marker's distances to others are off those of a place at rest, mean, m."""
+    """Returns the mean error of marker k's distances to others if its rest place is `place`, m."""
     seen = np.flatnonzero(np.isfinite(marker[:, k]).all(axis=1))
     if not len(seen):
         return 0.0
@@ -100,7 +101,7 @@ def _off(marker: FloatArray, places: FloatArray, k: int, place: int, others: Ind
 
 
 def _suspects(marker: FloatArray, places: FloatArray) -> list[tuple[int, int]]:
-    """Returns pairs of near markers that both are off their places."""
+    """Returns pairs of nearby markers that are both away from their places."""
     distance = np.linalg.norm(places[:, None] - places[None], axis=2)
     count = min(_NEIGHBOURS, len(places) - 2) + 1
     off = [

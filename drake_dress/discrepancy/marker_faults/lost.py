@@ -1,4 +1,4 @@
-"""Values that stand for a marker that was lost: a constant, or the last position again."""
+"""Finds values that encode a lost marker: a constant, or the last position repeated."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray
 
-# A value farther from the middle of all markers than so many times their usual distance is none.
+# A value is no position if it is farther from the median of all markers than this multiple of their
+# median distance from it.
 _FAR = 12.0
-# Two markers never share a position; so often is no chance.
+# Two markers never share a position; this many occurrences are no coincidence.
 _SHARED = 3
-# Chance of a repetition anywhere in a recording below which it is no chance.
+# Probability of a repetition anywhere in a recording below which it is no coincidence.
 _CHANCE = 1e-3
-# Grippers that move less than this, of the garment's size per second, do not move it.
+# Gripper speed below which the garment is still, in distances between the grippers per second.
 _STILL = 0.005
 
 
 def substitutes(marker: FloatArray) -> list[tuple[str, BoolArray]]:
-    """Returns what constants stand for markers that were lost, and where (T,m).
+    """Returns descriptions of the values that encode lost markers, and where (T,m) they are.
 
     Args:
-        marker: (T,m,3) in any unit of length, NaN where not seen.
+        marker: (T,m,3) positions in any unit of length, NaN where not seen.
     """
     found = []
     x, y, z = (marker[:, :, k] for k in range(3))
@@ -47,15 +48,15 @@ def substitutes(marker: FloatArray) -> list[tuple[str, BoolArray]]:
 
 
 def held_values(time: FloatArray, marker: FloatArray, gripper: FloatArray) -> BoolArray:
-    """Returns (T,m) where a marker repeats its last position and noise would not let it.
+    """Returns (T,m) where a marker repeats its last position although noise would change it.
 
-    What is stored with few digits repeats now and then, and a garment that stands still in data
-    without noise repeats as long as its grippers do: neither is a fault.
+    Two kinds of repetition are no fault: occasional ones in data that are stored with few digits,
+    and those of a garment that is still in data without noise, while its grippers are still.
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) in any unit of length, NaN where not seen.
-        gripper: (T,2,3) in any unit of length.
+        marker: (T,m,3) positions in any unit of length, NaN where not seen.
+        gripper: (T,2,3) positions in any unit of length.
     """
     held = np.zeros(marker.shape[:2], dtype=np.bool_)
     held[1:] = (marker[1:] == marker[:-1]).all(axis=2)
@@ -69,7 +70,7 @@ def held_values(time: FloatArray, marker: FloatArray, gripper: FloatArray) -> Bo
     still &= held.sum(axis=1) >= 0.9 * np.maximum((seen & np.roll(seen, 1, axis=0)).sum(axis=1), 1)
     held &= ~still[:, None]
     chance = _accidental(marker)
-    # so many repetitions in a row are no chance
+    # length of each run of repetitions, to find those that are no coincidence
     length = np.zeros(held.shape, dtype=np.int64)
     for t in range(1, len(held)):
         length[t] = np.where(held[t], length[t - 1] + 1, 0)
@@ -80,7 +81,7 @@ def held_values(time: FloatArray, marker: FloatArray, gripper: FloatArray) -> Bo
 
 
 def _accidental(marker: FloatArray) -> float:
-    """Returns the chance that noise repeats a position, from the digits that are stored."""
+    """Returns the probability that noise repeats a position, given the stored digits."""
     second = np.abs(marker[2:] - 2.0 * marker[1:-1] + marker[:-2])
     second = second[np.isfinite(second)]
     noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
@@ -88,16 +89,16 @@ def _accidental(marker: FloatArray) -> float:
     steps = np.diff(values)
     digit = float(np.min(steps[steps > 1e-12 * np.abs(values).max()], initial=np.inf))
     if digit > noise:
-        # what is stored hides the noise: a garment at rest repeats for long
+        # rounding hides the noise: positions of a garment at rest repeat for long
         return 1.0
-    # N(0, σ²) is rounded to the same value of a grid of width q at most so often
+    # upper bound on the probability that N(0, σ²) is rounded to the same value of a grid of width q
     return math.erf(digit / (2.0 * np.sqrt(2.0) * noise)) ** 3
 
 
 def _shared(marker: FloatArray, seen: BoolArray) -> BoolArray:
-    """Returns (T,m) where a position is one that several markers have had."""
+    """Returns (T,m) where a position occurs for several markers."""
     found = np.zeros(seen.shape, dtype=np.bool_)
-    # the same first coordinate is rare, so only those are compared whole
+    # equal first coordinates are rare, so only those positions are compared in full
     x, count = np.unique(marker[:, :, 0][seen], return_counts=True)
     likely = seen & np.isin(marker[:, :, 0], x[count >= _SHARED])
     if not likely.any():

@@ -1,4 +1,4 @@
-"""Says in a line which marker has a fault, and at which samples."""
+"""Writes notes that say which markers have a fault, and at which samples."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray
 
-# Stretches of samples that a line lists; names of markers with the same stretches.
+# Most ranges of samples and most markers that a note lists.
 _LISTED, _NAMED = 4, 8
 
 
 def told(names: Sequence[str], bad: BoolArray, what: str, kind: str = "marker") -> list[str]:
-    """Returns a line for each marker with a fault; those with the same samples share one.
+    """Returns a note for each marker with a fault; markers with the same samples share one.
 
     Args:
-        names: of the markers (m,).
+        names: names of the markers (m,).
         bad: (T,m) where each has the fault.
-        what: is wrong, and what is done.
-        kind: what the names are names of.
+        what: the fault, and what is done about it.
+        kind: what the names stand for.
     """
     groups: dict[bytes, list[int]] = {}
     for k in np.flatnonzero(bad.any(axis=0)):
@@ -35,7 +35,7 @@ def told(names: Sequence[str], bad: BoolArray, what: str, kind: str = "marker") 
 
 
 def _samples(bad: BoolArray) -> str:
-    """Returns the stretches of samples where `bad` (T,) holds, such as "samples 3–7, 12"."""
+    """Returns the ranges of samples where `bad` (T,) holds, such as "samples 3–7, 12"."""
     edge = np.diff(np.concatenate([[0], bad.astype(np.int8), [0]]))
     begins, ends = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1) - 1
     parts = [

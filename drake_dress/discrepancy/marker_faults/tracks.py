@@ -1,4 +1,4 @@
-"""Pieces of a marker's track: where it jumps, and which pieces are not of the marker."""
+"""Splits a marker's track at its jumps and finds the pieces that do not belong to the marker."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
-# A step is a jump where it is off the steps about it by more than
+# A step is a jump if it differs from the median of the steps around it by more than
 #     _FLOOR + _NOISES σ + min(_CURVED dt², _FASTEST dt).
-# In generated data of all motions the largest honest one is 5 mm at 100 Hz, 14 mm at 50 Hz and
-# 29 mm at 25 Hz, and of noise alone 9 σ is one in ten million. m, 1, m/s², m/s.
+# In generated data of all motions the largest real difference is 5 mm at 100 Hz, 14 mm at 50 Hz and
+# 29 mm at 25 Hz. Noise alone reaches 9 σ once in ten million. Units: m, 1, m/s², m/s.
 _FLOOR, _NOISES, _CURVED, _FASTEST = 0.01, 9.0, 50.0, 2.0
-# Steps on either side that tell how a marker moves.
+# Steps on either side from which a marker's velocity is estimated.
 _ABOUT = 2
-# Pieces are joined over what lies between if they part no faster than this, m/s.
+# Pieces join across others if the marker could get from one to the next at this speed, m/s.
 _JOINED = 1.5
-# A piece that lasts so long, s, is not thrown away for a step up to so many times a jump.
+# Consecutive pieces that last at least this long, s, join across a jump of less than this size.
 _LASTING, _SURE = 0.3, 2.0
-# A track in more pieces than this is none.
+# A track in more pieces than this is discarded.
 _MOST_PIECES = 400
-# Neighbours that a marker is held against; the least that must be there.
+# Neighbours that a marker is compared with; fewest that must be seen.
 _NEIGHBOURS, _LEAST = 8, 3
-# By how much cloth stretches, and what rounding of its way leaves, m; noise in it, σ.
+# Allowed stretch of the cloth; tolerance on the distance along it, m; allowance for noise, σ.
 _STRETCHED, _SLACK, _SLACK_NOISES = 1.15, 0.04, 8.0
 
 
@@ -32,11 +32,11 @@ class Jump:
     """A step of one marker that its own motion does not explain.
 
     Attributes:
-        marker: which.
-        before: the sample it was last seen at; after: the sample it is seen at next.
-        size: of the step, over what makes a jump.
-        expected: (3,) where it would have been, m.
-        allowed: how far from there it may be, m.
+        marker: index of the marker.
+        before: last sample before the step; after: first sample after the step.
+        size: deviation from the expected position, relative to `allowed`.
+        expected: (3,) expected position after the step, m.
+        allowed: allowed deviation from it, m.
     """
 
     marker: int
@@ -52,7 +52,7 @@ def find_jumps(time: FloatArray, marker: FloatArray, noise: float) -> list[Jump]
 
     Args:
         time: (T,) s.
-        marker: m, NaN where not seen.
+        marker: positions, NaN where not seen, m.
         noise: standard deviation of a coordinate, m.
     """
     found = []
@@ -79,11 +79,11 @@ def find_jumps(time: FloatArray, marker: FloatArray, noise: float) -> list[Jump]
 
 
 def out_of_reach(marker: FloatArray, reach: FloatArray | None, noise: float) -> BoolArray:
-    """Returns (T,m) where a marker is farther from most of its neighbours than cloth lets it be.
+    """Returns (T,m) where a marker is farther from most of its neighbours than the cloth allows.
 
     Args:
-        marker: (T,m,3) m, NaN where not seen.
-        reach: (m,m) way along the cloth between markers, m; None where it is not known: then none.
+        marker: (T,m,3) positions, m, NaN where not seen.
+        reach: (m,m) distance along the cloth between markers, m; None, if unknown, finds nothing.
         noise: standard deviation of a coordinate, m.
     """
     count = marker.shape[1]
@@ -104,13 +104,13 @@ def out_of_reach(marker: FloatArray, reach: FloatArray | None, noise: float) -> 
 def strays(time: FloatArray, marker: FloatArray, jumps: list[Jump], far: BoolArray) -> BoolArray:
     """Returns (T,m) where a marker is not on its track.
 
-    Jumps cut a track into pieces. The marker's own are those that join without a jump and hold the
-    most samples in which it is where its neighbours let it be.
+    Jumps cut a track into pieces. The marker's own pieces are those that join and hold the most
+    samples within the reach of its neighbours, less those out of reach.
 
     Args:
         time: (T,) s.
-        marker: (T,m,3) m, NaN where not seen.
-        jumps: of all markers.
+        marker: (T,m,3) positions, m, NaN where not seen.
+        jumps: jumps of all markers.
         far: (T,m) where a marker is out of its neighbours' reach.
     """
     astray = np.zeros(marker.shape[:2], dtype=np.bool_)
@@ -131,7 +131,7 @@ def strays(time: FloatArray, marker: FloatArray, jumps: list[Jump], far: BoolArr
 def _joined(
     time: FloatArray, track: FloatArray, pieces: list[IndexArray], cuts: list[Jump], far: BoolArray
 ) -> set[int]:
-    """Returns which pieces are the marker's: the heaviest chain of pieces that join."""
+    """Returns the indices of the marker's pieces: the heaviest chain of pieces that join."""
     weight = [len(p) - 2.0 * np.count_nonzero(far[p]) for p in pieces]
     total, last = list(weight), [-1] * len(pieces)
     for b in range(len(pieces)):
@@ -158,13 +158,13 @@ def _lasts(time: FloatArray, *pieces: IndexArray) -> bool:
 def _meet(
     time: FloatArray, track: FloatArray, a: IndexArray, b: IndexArray, allowed: float
 ) -> bool:
-    """Returns whether the marker may have got from the end of one piece to the begin of another."""
+    """Returns whether the marker could move from the end of piece a to the start of piece b."""
     gap = float(time[b[0]] - time[a[-1]])
     return float(np.linalg.norm(track[b[0]] - track[a[-1]])) <= allowed + _JOINED * gap
 
 
 def _steady(rate: FloatArray) -> FloatArray:
-    """Returns (K,3) the median of rates over the steps about each, itself among them."""
+    """Returns (K,3) the running median of rates over the steps around each, including itself."""
     padded = np.pad(rate, ((_ABOUT, _ABOUT), (0, 0)), mode="reflect" if len(rate) > 2 else "edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _ABOUT + 1, axis=0)
     median: FloatArray = np.median(windows, axis=2)

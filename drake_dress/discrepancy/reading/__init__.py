@@ -1,24 +1,23 @@
-"""Measured logs: HDF5 in the layout of `run.h5`, NPZ with the same names, CSV with a column each.
+"""Reads measured logs: HDF5 in the layout of `run.h5`, NPZ with the same names, and CSV.
 
-A file holds one recording, or several as groups `recording_0`, `recording_1`, …. Names:
+A file holds one recording, or several in groups `recording_0`, `recording_1`, …. Names:
 
     time                                (T,) s, strictly increasing
     gripper/{left,right}/position       (T,3) m
-    gripper/{left,right}/force          (T,3) N, of the garment on the gripper; may lack
+    gripper/{left,right}/force          (T,3) N, of the garment on the gripper; optional
     garment/marker_position             (T,m,3) m, NaN where not seen
     garment/marker_rest_position        (m,3) m, garment frame; or garment/marker_node (m,)
-    human/joint_position                (T,6,3) m; may lack
+    human/joint_position                (T,6,3) m; optional
 
-An HDF5 dataset's attribute `noise_std` is its noise; without it the noise is estimated. Its
-attribute `unit`, if there, must be `m`, `N` or `s`; its attribute `names`, if there, tells its
-points apart. A CSV has columns such as `gripper/left/position/x` and
-`garment/marker_position/12/z`, empty where a marker was not seen, and a file `NAME.markers.csv`
-beside it with the columns marker, x, y, z. A group's attribute `motion`, one word, is what its
-recording is called.
+The attributes of an HDF5 dataset are optional. `noise_std` is the standard deviation of its noise,
+which is estimated without it. `unit` must be `m`, `N` or `s`, or that unit spelled out. `names`
+identifies the points. A group's attribute `motion`, one word, is the name of the recording. A CSV
+file has columns such as `gripper/left/position/x` and `garment/marker_position/12/z`, empty where a
+marker was not seen. A file `NAME.markers.csv` beside it has the columns marker, x, y, z.
 
-One file of this package reads each format (`hdf5`, `npz`, `csv_file`) into a `RawRecording`, and
-`assembling` makes a `Recording` of that: it checks shapes, clock, units and plausibility, and takes
-out what markers did not measure.
+One module reads each format (`hdf5`, `npz`, `csv_file`) into a `RawRecording`. `assembling` turns
+that into a `Recording`: it checks shapes, time stamps, units and plausibility, and removes faulty
+marker values.
 """
 
 from __future__ import annotations
@@ -54,12 +53,12 @@ def read_recordings(
 
     Args:
         paths: files.
-        mesh: the scenario's garment: markers are given on it, and lengths are held against it.
-        surface_density: of the scenario's fabric, kg/m², which forces are held against; without it
-            any fabric is taken for possible.
+        mesh: the scenario's garment. It carries the markers, and lengths are compared with it.
+        surface_density: of the scenario's fabric, kg/m², with which forces are compared; None
+            allows any fabric.
 
     Raises:
-        UserError: a file cannot be used; says where and why.
+        UserError: a file cannot be used; the message says where and why.
     """
     recordings: list[Recording] = []
     opened: set[Path] = set()
@@ -81,7 +80,7 @@ def read_recordings(
 
 
 def _reader(path: Path) -> Callable[[Path], list[RawRecording]]:
-    """Returns what reads a file of this kind; the file is there and is not empty."""
+    """Returns a file's reader; raises UserError if it is missing, empty or of unknown kind."""
     source = str(path)
     try:
         if path.is_dir():

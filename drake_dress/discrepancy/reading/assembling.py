@@ -1,4 +1,4 @@
-"""Makes a recording of what stands in a file: shapes, clock, plausibility, noise, lost markers."""
+"""Turns a file's content into a recording: shapes, clock, plausibility, noise, lost markers."""
 
 from __future__ import annotations
 
@@ -33,23 +33,24 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
 
-# Fewest and most markers: fewer say nothing, each costs time in every step of every simulation.
+# Fewest and most markers: fewer carry too little information, and each one costs time in every step
+# of every simulation.
 _LEAST_MARKERS, _MOST_MARKERS = 4, 1000
-# Nothing that is measured is beyond this in any unit; times of an epoch in nanoseconds are 2e18.
+# No measured value exceeds this in any unit; time since an epoch in nanoseconds is 2e18.
 _WILDEST = 1e20
 _FORCES = tuple(f"gripper/{side}/force" for side in SIDES)
 
 
 def recording_of(raw: RawRecording, mesh: GarmentMesh, surface_density: float | None) -> Recording:
-    """Returns what was measured, in SI units; its notes say what was not taken as it stands.
+    """Returns the recording in SI units; its notes say what was dropped or changed.
 
     Args:
-        raw: of a file.
+        raw: content of a file.
         mesh: the scenario's garment.
-        surface_density: of it, kg/m²; None for any.
+        surface_density: of its fabric, kg/m²; None allows any.
 
     Raises:
-        UserError: something lacks, is misshapen, or cannot be what it says it is.
+        UserError: a dataset is missing, has the wrong shape, or is implausible.
     """
     notes = list(raw.notes)
     time, said = checked_time(raw.source, raw.key("time"), _taken(raw, "time", (None,)))
@@ -105,10 +106,10 @@ def recording_of(raw: RawRecording, mesh: GarmentMesh, surface_density: float | 
 def _taken(
     raw: RawRecording, dataset: str, shape: tuple[int | None, ...], gaps: bool = False
 ) -> FloatArray:
-    """Returns a dataset as numbers of a shape; with `gaps`, NaN may stand in it.
+    """Returns a dataset as numbers with the given shape; `gaps` allows NaN.
 
     Raises:
-        UserError: it is missing, has another shape, or holds what is not finite.
+        UserError: it is missing, has another shape, or holds values that are not finite.
     """
     if dataset not in raw.arrays:
         raise raw.missing(dataset)
@@ -123,11 +124,11 @@ def _taken(
         wanted = ", ".join("any" if s is None else str(s) for s in shape)
         raise UserError(raw.source, key, f"has shape {value.shape}, expected ({wanted})")
     bad = np.isinf(value) if gaps else ~np.isfinite(value)
-    # infinity is one of the values that stand for a marker that was lost
+    # infinity may encode a lost marker
     if bad.any() and dataset != MARKERS:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         raise UserError(raw.source, key, f"is {value[where]} at {where}, expected finite numbers")
-    # a damaged number, whose square may not be one any more
+    # a corrupted number, whose square may overflow
     wild = np.abs(value) > _WILDEST
     if wild.any() and dataset != MARKERS:
         where = tuple(int(i) for i in np.argwhere(wild)[0])
@@ -136,7 +137,7 @@ def _taken(
 
 
 def _places(raw: RawRecording, number: int, mesh: GarmentMesh) -> FloatArray:
-    """Returns (m,3) where the markers sit at rest, in the order of the markers, m."""
+    """Returns (m,3) the markers' positions on the rest shape, in the order of the markers, m."""
     if PLACES in raw.arrays:
         dataset, places = PLACES, _taken(raw, PLACES, (number, 3))
     elif NODES in raw.arrays:
@@ -154,7 +155,7 @@ def _places(raw: RawRecording, number: int, mesh: GarmentMesh) -> FloatArray:
 
 
 def _at_nodes(raw: RawRecording, number: int, mesh: GarmentMesh) -> FloatArray:
-    """Returns (m,3) the rest places of markers that are given as nodes, m."""
+    """Returns (m,3) the rest positions of markers that are given as nodes, m."""
     key, given = raw.key(NODES), _taken(raw, NODES, (number,))
     points = mesh.rest_position
     if "garment/rest_position" in raw.arrays:
@@ -176,7 +177,7 @@ def _at_nodes(raw: RawRecording, number: int, mesh: GarmentMesh) -> FloatArray:
 
 
 def _marker_names(raw: RawRecording, number: int, otherwise: str = "{}") -> tuple[str, ...]:
-    """Returns what the markers are called, by default `otherwise` with their numbers, if any."""
+    """Returns the markers' names, by default made from `otherwise` and their numbers."""
     for dataset in (MARKERS, MARKER_NAMES):
         names = raw.labels.get(dataset, ())
         if names:
@@ -186,7 +187,7 @@ def _marker_names(raw: RawRecording, number: int, otherwise: str = "{}") -> tupl
 
 
 def _force(raw: RawRecording, count: int) -> tuple[FloatArray | None, list[str]]:
-    """Returns (T,2,3) forces, N, if both grippers have them, and what is to be said if one has."""
+    """Returns (T,2,3) forces, N, if both grippers have them, and a note if only one has."""
     there = [name for name in _FORCES if name in raw.arrays]
     if len(there) == 1:
         (lacks,) = set(_FORCES) - set(there)
@@ -201,7 +202,7 @@ def _force(raw: RawRecording, count: int) -> tuple[FloatArray | None, list[str]]
 
 
 def _joints(raw: RawRecording, count: int) -> FloatArray | None:
-    """Returns (T,6,3) the person's joints in the order of `JOINT_NAMES`, m, where measured."""
+    """Returns (T,6,3) the person's joints, ordered as `JOINT_NAMES`, m; None if not measured."""
     if JOINTS not in raw.arrays:
         return None
     joints = _taken(raw, JOINTS, (count, len(JOINT_NAMES), 3))
@@ -217,7 +218,7 @@ def _joints(raw: RawRecording, count: int) -> FloatArray | None:
 
 
 def _check_seen(raw: RawRecording, marker: FloatArray) -> None:
-    """Raises UserError where too few markers (T,m,3) are ever seen."""
+    """Raises UserError if too few markers (T,m,3) are ever seen."""
     ever = int(np.isfinite(marker).all(axis=2).any(axis=0).sum())
     if ever < _LEAST_MARKERS:
         raise UserError(
@@ -228,6 +229,6 @@ def _check_seen(raw: RawRecording, marker: FloatArray) -> None:
 
 
 def all_notes(recordings: Sequence[Recording]) -> list[str]:
-    """Returns what is to be said of recordings, each line with its recording's name, once."""
+    """Returns the notes of all recordings, each with its recording's name, without repetitions."""
     lines = [f"{r.name}: {note}" for r in recordings for note in r.notes]
     return list(dict.fromkeys(lines))

@@ -1,4 +1,4 @@
-"""Holds a recording's clock against what a recording can be: seconds, increasing, without holes."""
+"""Checks a recording's time stamps: in seconds, strictly increasing, without gaps."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 
-# Fewest samples that say anything; shortest and longest recording, s: an hour of simulations at
-# four levels of numerics begins at about ten minutes.
+# Fewest samples of use; shortest and longest recording, s. Ten minutes of data take about an hour
+# to simulate at four levels of numerics.
 _LEAST_SAMPLES, _SHORTEST, _LONGEST = 20, 0.5, 600.0
-# Time between samples, s: the median, and the longest time without any. Cloth that swings by moves
-# within 0.1 s; faster than a force sensor's 20 kHz nothing measures.
+# Bounds on the median time between samples, and the longest gap, s. 0.1 s still resolves swinging
+# cloth; no force sensor is faster than 20 kHz.
 _FASTEST, _SLOWEST, _LONGEST_GAP = 5e-5, 0.1, 0.5
-# A clock that begins later than this, s, counts from another time than the recording's begin, and
-# rounding would show in it.
+# A clock that starts later than this, s, counts from an epoch, and rounding errors would show.
 _EPOCH = 1e5
-# What a time unit would have to be for the spacing to be right.
+# Other units that the time stamps may be in, s.
 _UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 
 
 def checked_time(source: str, key: str, time: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Returns (T,) s, from 0 on where the clock begins at an epoch, and a note if it does.
+    """Returns time stamps (T,), s, shifted to start at 0 if they count from an epoch, and notes.
 
     Raises:
-        UserError: too few samples, too short or too long, not increasing, too slow, or with a gap.
+        UserError: too few samples, too short or too long, not increasing, sampled too slowly or too
+            fast, or with a gap.
     """
     count = len(time)
     if count < _LEAST_SAMPLES:
@@ -69,7 +69,7 @@ def checked_time(source: str, key: str, time: FloatArray) -> tuple[FloatArray, l
 
 
 def _meant(usual: float) -> str:
-    """Returns in which unit a spacing would be usual, 1 to 20 ms."""
+    """Returns a hint at the unit in which a spacing would be usual, 0.5 to 50 ms; empty if none."""
     for size, name in _UNITS:
         if 5e-4 <= usual * size <= 0.05:
             return f"; is it in {name}, or are these frame numbers?"

@@ -1,4 +1,4 @@
-"""Reads measured logs in CSV: a column for each number, markers' places in a second file."""
+"""Reads measured logs in CSV: a column for each number, marker rest places in a second file."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _VECTORS = [f"gripper/{side}/{q}" for side in SIDES for q in ("position", "force
 
 
 def read_csv(path: Path) -> list[RawRecording]:
-    """Returns the one recording of a CSV file.
+    """Returns the single recording of a CSV file.
 
     Raises:
-        UserError: the file, or the one with the markers' places, cannot be used.
+        UserError: the file, or the one with the markers' rest places, cannot be used.
     """
     source = str(path)
     header, rows, lines = read_table(path)
@@ -58,7 +58,7 @@ def read_csv(path: Path) -> list[RawRecording]:
             columns = [f"{name}/{written}/{axis}" for written in points.values() for axis in "xyz"]
             arrays[name] = take(columns).reshape(len(rows), len(points), 3)
             labels[name] = tuple(points)
-    # numbers of joints are their order in the layout
+    # a joint's number is its index in the layout
     joints = labels.get(JOINTS)
     if joints and all(label.isdigit() for label in joints):
         order = order_of(source, [str(k) for k in range(len(JOINT_NAMES))], joints, "joint")
@@ -72,7 +72,7 @@ def read_csv(path: Path) -> list[RawRecording]:
 
 
 def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
-    """Returns the labels of a dataset's points, numbers in their order, and how each is written."""
+    """Returns the labels of a dataset's points, numbers sorted, and the spelling of each."""
     depth = name.count("/") + 1
     points: dict[str, str] = {}
     for h in header:
@@ -91,7 +91,7 @@ def _points(source: str, name: str, header: list[str]) -> dict[str, str]:
 
 
 def _places(path: Path, wanted: tuple[str, ...]) -> FloatArray:
-    """Returns (m,3) where the markers sit, in the order of the labels wanted, m."""
+    """Returns (m,3) the markers' rest places, in the order of the wanted labels, m."""
     source = str(path)
     if not path.is_file():
         raise UserError(source, "", "no such file, expected columns marker, x, y, z")

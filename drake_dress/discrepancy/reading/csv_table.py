@@ -1,4 +1,4 @@
-"""Reads a CSV file as a header and a table of numbers, in the dialects that spreadsheets write."""
+"""Reads a CSV file into a header and a table of numbers, in the dialects of spreadsheets."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 
-# A file is not larger than this, bytes: 600 s of 60 markers at 100 Hz are 0.1 GB.
+# Largest file, bytes: 600 s of 60 markers at 100 Hz are 0.1 GB.
 _MOST_BYTES = 2**29
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf(inity)?)", re.ASCII | re.I)
 
 
 def read_table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
-    """Returns header, cells of each row as text, and the rows' lines in the file.
+    """Returns the header, the cells of each row as text, and the rows' line numbers in the file.
 
-    Takes UTF-8 with or without a byte order mark, UTF-16 with one, and Latin-1; columns divided by
-    commas, semicolons or tabs. Empty lines are passed over.
+    Reads UTF-8 and UTF-16, with or without a byte order mark, and Latin-1. Columns are separated by
+    commas, semicolons or tabs. Empty lines are skipped.
 
     Raises:
-        UserError: the file is not such a table, or a column stands twice.
+        UserError: the file is not such a table, or a column name is repeated.
     """
     source = str(path)
     text = _decoded(path).replace("\r\n", "\n").replace("\r", "\n")
@@ -56,7 +56,7 @@ def read_table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
 
 
 def _check_shape(source: str, header: list[str], rows: list[list[str]], lines: list[int]) -> None:
-    """Refuses columns of one name, and rows that are not as long as the header."""
+    """Raises UserError if a column name is repeated, or a row is not as long as the header."""
     for k, name in enumerate(header):
         if name and name in header[:k]:
             raise UserError(source, name, "column stands twice, expected each name once")
@@ -70,9 +70,9 @@ def _check_shape(source: str, header: list[str], rows: list[list[str]], lines: l
 def numbers(
     source: str, header: list[str], rows: list[list[str]], lines: list[int], columns: list[int]
 ) -> FloatArray:
-    """Returns (T,k) the numbers of some columns, NaN where a cell is empty.
+    """Returns (T,k) the numbers in the given columns, NaN for empty cells.
 
-    A decimal comma is taken where no cell of these columns has a decimal point.
+    Decimal commas are read if no cell of these columns has a decimal point.
 
     Raises:
         UserError: a cell is not a number.
@@ -96,10 +96,10 @@ def numbers(
 
 
 def column(source: str, header: list[str], name: str) -> int:
-    """Returns the number of a column.
+    """Returns the index of a column.
 
     Raises:
-        UserError: there is none of that name.
+        UserError: there is no column of that name.
     """
     if name not in header:
         raise UserError(source, name, "column is missing")
@@ -117,7 +117,7 @@ def _decoded(path: Path) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         coding = "utf-16"
     elif content[:64].count(0) >= 16:
-        # UTF-16 without its mark: every other byte of a header is 0
+        # UTF-16 without a byte order mark: every other byte of the header is 0
         coding = "utf-16-le" if content[1:2] == b"\0" else "utf-16-be"
     else:
         coding = "utf-8-sig"
@@ -126,5 +126,5 @@ def _decoded(path: Path) -> str:
     except UnicodeDecodeError:
         if coding != "utf-8-sig":
             raise UserError(source, "", "is not text, expected CSV in UTF-8") from None
-    # names and numbers are ASCII, so what other bytes mean does not matter
+    # names and numbers are ASCII, so the meaning of other bytes does not matter
     return content.decode("latin-1")

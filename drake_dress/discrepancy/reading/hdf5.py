@@ -1,4 +1,4 @@
-"""Reads measured logs in HDF5, the layout of `run.h5`."""
+"""Reads measured logs in HDF5, in the layout of `run.h5`."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from drake_dress.discrepancy.reading.raw import (
 from drake_dress.errors import UserError
 from drake_dress.hdf5_state import Hdf5State, look_at
 
-# What h5py raises where a file is damaged: the library's errors, and Python's on what it decodes.
+# Errors that h5py raises on damaged files: the library's, and Python's when it decodes content.
 _DAMAGED = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
-# A file holds no more names than this.
+# Largest number of names in a file.
 _MOST_NAMES = 20_000
 # Attributes that name the points of a dataset.
 _NAMES = ("names", "marker_name", "labels")
@@ -36,7 +36,7 @@ def read_hdf5(path: Path) -> list[RawRecording]:
     """Returns the recordings of an HDF5 file.
 
     Raises:
-        UserError: the file or a dataset of it cannot be read.
+        UserError: the file or one of its datasets cannot be read.
     """
     source = str(path)
     _check_state(path)
@@ -49,7 +49,7 @@ def read_hdf5(path: Path) -> list[RawRecording]:
 
 
 def _check_state(path: Path) -> None:
-    """Raises UserError where a file is not whole, or is being written."""
+    """Raises UserError if a file is damaged, or is being written."""
     with _guarded(str(path), "", "cannot be read"):
         found = look_at(path)
     if found.state not in (Hdf5State.SOUND, Hdf5State.KILLED):
@@ -132,8 +132,8 @@ def _key_of(
     group: str,
     name: str,
 ) -> str | None:
-    """Returns where a dataset of a recording stands; None where there is none."""
-    # what does not change between recordings may stand once, at the root
+    """Returns the path of a recording's dataset; None if there is none."""
+    # datasets that recordings share may be stored once, at the root
     key = next((k for k in (group + name, name) if k in content), None)
     if key is not None:
         return key
@@ -146,7 +146,7 @@ def _key_of(
 
 
 def _check_meaning(source: str, key: str, name: str, attributes: dict[str, Any]) -> None:
-    """Refuses another unit or frame than that of the layout."""
+    """Raises UserError if a dataset has another unit or frame than the layout."""
     for unit in ("unit", "units"):
         if unit in attributes:
             check_unit(source, key, name, _text(attributes[unit]))
@@ -176,20 +176,20 @@ def _read(source: str, key: str, data: h5py.Dataset) -> np.ndarray:
 
 
 def _identity(group: h5py.Group) -> tuple[int, int]:
-    """Returns what tells a group apart under whatever name; groups may hold each other."""
+    """Returns an identity of a group, whatever its name; links between groups may form cycles."""
     info = h5py.h5o.get_info(group.id)
     return info.fileno, info.addr
 
 
 def _attributes(source: str, key: str, data: h5py.HLObject) -> dict[str, Any]:
-    """Returns the attributes that mean something here."""
+    """Returns the attributes that are used here."""
     with _guarded(source, key, "has attributes that cannot be read"):
         wanted = ("unit", "units", "frame", "noise_std", "motion", *_NAMES)
         return {name: data.attrs[name] for name in wanted if name in data.attrs}
 
 
 def _texts(source: str, key: str, value: Any) -> tuple[str, ...]:
-    """Returns names of points, from an attribute or a dataset of texts or whole numbers."""
+    """Returns the names of points from an attribute or a dataset of strings or integers."""
     with _guarded(source, key, "cannot be read"):
         entries = np.atleast_1d(np.asarray(value[()] if isinstance(value, h5py.Dataset) else value))
         if entries.ndim != 1 or entries.dtype.kind not in "OSUiu":
@@ -198,7 +198,7 @@ def _texts(source: str, key: str, value: Any) -> tuple[str, ...]:
 
 
 def _text(value: Any) -> str:
-    """Returns an attribute as text; one that is none, as Python writes it."""
+    """Returns an attribute as text; other types as Python prints them."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.flat[0]
     if isinstance(value, bytes):
@@ -208,7 +208,7 @@ def _text(value: Any) -> str:
 
 @contextmanager
 def _guarded(source: str, key: str, message: str) -> Iterator[None]:
-    """Tells what goes wrong inside in one line."""
+    """Turns errors of damaged files into a UserError of one line."""
     try:
         yield
     except UserError:

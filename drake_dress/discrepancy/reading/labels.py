@@ -1,4 +1,4 @@
-"""Matches points by what they are called: a label is an identity, never a place in an order."""
+"""Matches points by their labels; a label is an identity, never a position in a list."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from drake_dress.errors import UserError
 
 
 def label_of(text: str) -> str:
-    """Returns a label as it is compared: whole numbers however they are written, other text as is.
+    """Returns the canonical form of a label: whole numbers as integers, other text unchanged.
 
-    `07`, `7` and `7.0` are one label; `7.5` and `LSHO` are labels of their own.
+    `07`, `7` and `7.0` are one label; `7.5` and `LSHO` are different ones.
     """
     text = text.strip()
     try:
@@ -24,16 +24,16 @@ def label_of(text: str) -> str:
 def order_of(
     source: str, wanted: Sequence[str], given: Sequence[str], kind: str = "marker"
 ) -> list[int]:
-    """Returns for each wanted label where it stands among the given ones.
+    """Returns the index of each wanted label among the given ones.
 
     Args:
         source: file of the given labels, for messages.
         wanted: labels, each once.
-        given: labels, to be the same ones in any order.
-        kind: what they are labels of, for messages.
+        given: the same labels in any order.
+        kind: what the labels stand for, for messages.
 
     Raises:
-        UserError: a label is missing, stands twice, is empty, or is not wanted.
+        UserError: a label is missing, repeated, empty, or not wanted.
     """
     expected = f"expected {_listed(wanted)} once each"
     count = Counter(given)
@@ -53,7 +53,7 @@ def order_of(
 
 
 def check_unique(source: str, key: str, labels: Sequence[str], count: int) -> None:
-    """Raises UserError where labels are not one for each of `count` points."""
+    """Raises UserError unless there is one unique label for each of `count` points."""
     if len(labels) != count:
         raise UserError(source, key, f"has {len(labels)} names of points, expected {count}")
     label, times = Counter(labels).most_common(1)[0] if labels else ("", 1)

@@ -1,4 +1,4 @@
-"""The noise of a recording: as its file gives it, or as the data tell."""
+"""The noise of a recording: as given in its file, or estimated from the data."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from drake_dress.discrepancy.reading.raw import MARKERS, UNITS, RawRecording
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 
-# Noise is never taken below this, and no sensor of use has more, by unit.
+# Smallest noise that is estimated, and largest that is accepted, by unit.
 _LEAST = {"m": 1e-4, "N": 1e-3}
 _MOST = {"m": 0.05, "N": 20.0}
-# Noise of forces where none are measured, N.
+# Noise of forces that are not measured, N.
 _UNMEASURED = 0.05
-# Where the data scatter by so many times what is given, or so much less, that is told.
+# Ratio of estimated to given noise, or its inverse, above which a note is made.
 _OTHERWISE = 3.0
 
 
 def noise_of(
     raw: RawRecording, datasets: Sequence[str], values: FloatArray | None
 ) -> tuple[float, list[str]]:
-    """Returns the standard deviation of a coordinate, and a note where the data say otherwise.
+    """Returns the standard deviation of a coordinate, and a note if the data contradict it.
 
     Args:
         raw: the recording.
-        datasets: of one kind; the largest noise given for any of them counts.
-        values: (T,k,3) of them, NaN where not measured; None where nothing was.
+        datasets: datasets of one kind; the largest noise given for any of them is used.
+        values: (T,k,3) their values, NaN where not measured; None if nothing was measured.
 
     Raises:
-        UserError: the noise given is none that a sensor has.
+        UserError: the given noise is larger than that of any useful sensor.
     """
     if values is None:
         return _UNMEASURED, []
@@ -57,10 +57,10 @@ def noise_of(
 
 
 def _estimated(values: FloatArray, least: float) -> float:
-    """Returns the noise (standard deviation of a coordinate) of values (T,k,3).
+    """Returns the noise (standard deviation of a coordinate) of values (T,k,3), at least `least`.
 
-    From second differences, which still and steady phases leave to the noise: their median size,
-    over the quietest half of the time.
+    It is estimated from the median absolute second difference over the quieter half of the time:
+    at rest and in steady motion, second differences are noise alone.
     """
     second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
     second = second[np.isfinite(second).any(axis=(1, 2))]

@@ -1,4 +1,4 @@
-"""Reads measured logs in NPZ: arrays with the names that they have in HDF5."""
+"""Reads measured logs in NPZ: arrays with the same names as in HDF5."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from drake_dress.discrepancy.reading.raw import (
 )
 from drake_dress.errors import UserError
 
-# What zipfile, zlib and NumPy raise on damaged, encrypted or unknown content.
+# Errors that zipfile, zlib and NumPy raise on damaged, encrypted or unknown content.
 _DAMAGED = (
     OSError,
     ValueError,
@@ -36,7 +36,7 @@ _DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
 )
-# An array's magic string, version and header take no more than this, bytes.
+# Largest size of an array's magic string, version and header, bytes.
 _HEADER = 70_000
 _ATTRIBUTES = ("noise_std", "unit", "units")
 
@@ -44,10 +44,10 @@ _ATTRIBUTES = ("noise_std", "unit", "units")
 def read_npz(path: Path) -> list[RawRecording]:
     """Returns the recordings of an NPZ file.
 
-    An array `NAME/noise_std` or `NAME/unit` is what the attribute of that name is in HDF5.
+    An array `NAME/noise_std` or `NAME/unit` stands for the HDF5 attribute of that name.
 
     Raises:
-        UserError: the file or an array of it cannot be read.
+        UserError: the file or one of its arrays cannot be read.
     """
     source = str(path)
     try:
@@ -74,7 +74,7 @@ def read_npz(path: Path) -> list[RawRecording]:
 
 
 def _is_known(stem: str) -> bool:
-    """Returns whether an array of that name, in a group or not, is one that is used."""
+    """Returns whether an array of this name, in a group or not, is used."""
     parts = stem.split("/")
     if parts[0].startswith("recording_"):
         parts = parts[1:]
@@ -84,7 +84,7 @@ def _is_known(stem: str) -> bool:
 
 
 def _read(source: str, archive: zipfile.ZipFile, member: str) -> npt.NDArray[Any]:
-    """Returns one array; what it claims to be is checked before it is read."""
+    """Returns one array; size, shape and type in its header are checked before it is read."""
     key = member.removesuffix(".npy")
     try:
         whole = archive.getinfo(member).file_size

@@ -1,10 +1,10 @@
-"""Holds the positions of a recording against each other: units, axes, sides and jumps.
+"""Checks the positions of a recording against each other: units, axes, sides and jumps.
 
-How the garment hangs at the start is about how it lies at rest, moved and turned as a whole: both
-grippers hold it where the scenario says. So the rest places are held against the scenario's
-garment, the markers against the rest places, the grippers against the markers, and the person's
-joints against what limbs can be. What is hidden in measured data (a size that is 3 % off, cameras
-that are turned by a degree) is far within the bounds; another unit is far beyond them.
+Both grippers hold the garment where the scenario says, so at the start it hangs roughly in its rest
+shape, rigidly moved. The rest places are compared with the scenario's garment, the markers with the
+rest places, the grippers with the markers, and the person's joints with the lengths of human limbs.
+The bounds are wide: real discrepancies (a size that is 3 % off, cameras turned by a degree) stay
+far within them, and a wrong unit is far beyond them.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import JOINT_NAMES
 
-# A world's origin is within this, m.
+# All positions are within this distance of the world's origin, m.
 _FARTHEST = 20.0
-# A rest place is no farther than this from the scenario's garment, m: most of them, and any.
+# Largest distance of the rest places from the scenario's garment, m: their median, and any.
 _OFF_GARMENT, _ANY_OFF_GARMENT = 0.1, 0.3
-# Size of the cloud of markers over that of their rest places.
+# Bounds on the size of the cloud of markers, relative to that of their rest places.
 _SMALLEST, _LARGEST = 0.4, 2.8
-# Share of the rest cloud's size that a rigid motion leaves where it fits; mixed-up markers leave
-# more. Hanging garments leave 0.05 to 0.1.
+# Largest misfit of a rigid motion, relative to the size of the rest cloud. Mixed-up markers leave
+# more; hanging garments leave 0.05 to 0.1.
 _MISFIT = 0.6
-# A mirrored fit that is so much better than one that is not, which leaves at least so much.
+# Markers are mirrored if the rigid fit leaves more than _POOR, and the mirrored fit leaves less
+# than _POOR and less than the share _MIRRORED of the rigid fit's misfit.
 _MIRRORED, _POOR = 0.4, 0.12
-# The garment's up axis is turned from the world's by no more than this at the start, degrees.
+# Largest angle between the garment's up axis and the world's at the start, degrees.
 _TURNED = 60.0
-# A gripper is no farther from where it holds the garment, m.
+# Largest distance of a gripper from where it holds the garment, m.
 _OFF_GRASP = 0.35
-# Nor from the middle of the markers, whatever they are numbered, m.
+# Largest distance of a gripper from the middle of the markers, in any order of them, m.
 _AWAY = 2.0
-# Beginning of a recording, in which the garment hangs still, s.
+# Start of a recording, during which the garment hangs still, s.
 _START = 0.3
 # Limbs of adults and children, m: upper arm, forearm with the wrist; between the shoulders.
 _LIMB, _SHOULDERS = (0.12, 0.5), (0.12, 0.65)
-# A person that faces +x has the left shoulder at the left, whatever way it turns: share of the
-# distance between the shoulders by which it may be at the right.
+# A person who faces +x has the left shoulder on the left (+y), even when turning: share of the
+# distance between the shoulders by which it may be on the right.
 _TURNED_AWAY = 0.5
-# The line through the shoulders of who sits or stands is level within this, degrees.
+# Largest tilt of the line through the shoulders of a sitting or standing person, degrees.
 _LEVEL = 45.0
-# Nothing moved by arms or of a person accelerates more, m/s²; and noise of a coordinate, m.
+# Largest acceleration of a gripper or of a person's joint, m/s², and allowance for noise, m.
 _ACCELERATION, _JITTER = 150.0, 0.03
 _UNITS = (
     (1e3, "millimetres"),
@@ -62,14 +63,14 @@ _AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Start:
-    """How the garment hangs at the start: x ≈ R rest + t.
+    """Pose of the garment at the start: x ≈ R rest + t.
 
     Attributes:
         rotation: (3,3) R; translation: (3,) t, m.
-        middle: (3,) of the markers, m.
-        misfit: what is left, over the size of the cloud at rest.
-        mirrored: the same of the best fit that mirrors.
-        flat: whether the places lie too near to a line to tell a rotation.
+        middle: (3,) middle of the markers, m.
+        misfit: residual of the best fit, relative to the size of the rest cloud.
+        mirrored: residual of the best fit with a reflection, likewise.
+        flat: whether the rest places are too close to a line to determine a rotation.
     """
 
     rotation: FloatArray
@@ -81,17 +82,17 @@ class Start:
 
     @property
     def fits(self) -> bool:
-        """Whether the markers are in their places, so that the motion says something."""
+        """Whether the rigid motion fits the markers, so that it can be used in further checks."""
         return not self.flat and self.misfit <= _MISFIT
 
 
 def check_places(raw: RawRecording, key: str, places: FloatArray, mesh: GarmentMesh) -> None:
-    """Raises UserError where rest places (m,3), m, are not on the scenario's garment.
+    """Raises UserError if rest places are not on the scenario's garment, or two are the same.
 
     Args:
         raw: the recording.
-        key: of the places, for messages.
-        places: garment frame, m.
+        key: name of the places' dataset, for messages.
+        places: (m,3) garment frame, m.
         mesh: the scenario's garment.
     """
     off, _ = cKDTree(mesh.rest_position).query(places)
@@ -126,16 +127,17 @@ def check_places(raw: RawRecording, key: str, places: FloatArray, mesh: GarmentM
 def check_markers(
     raw: RawRecording, time: FloatArray, marker: FloatArray, places: FloatArray
 ) -> Start | None:
-    """Returns how the garment hangs at the start; None where too few markers are seen.
+    """Returns the pose of the garment at the start; None if too few markers are seen.
 
     Args:
         raw: the recording.
         time: (T,) s.
         marker: (T,m,3) m, NaN where not seen.
-        places: (m,3) at rest, m.
+        places: (m,3) rest places, m.
 
     Raises:
-        UserError: the markers are not in metres, or not z up, or do not fit their rest places.
+        UserError: the markers are not in metres, not z up, mirrored, or do not fit their rest
+            places.
     """
     key = raw.key(MARKERS)
 
@@ -178,7 +180,7 @@ def check_markers(
 def check_grippers(
     raw: RawRecording, time: FloatArray, gripper: FloatArray, start: Start | None, mesh: GarmentMesh
 ) -> None:
-    """Raises UserError where grippers (T,2,3), m, are not where the garment is held, or jump."""
+    """Raises UserError if grippers (T,2,3), m, are not where the garment is held, or jump."""
     if start is not None and start.fits:
         _check_sides(raw, time, gripper, start, mesh)
     for k, side in enumerate(SIDES):
@@ -221,7 +223,7 @@ def check_grippers(
 def _check_sides(
     raw: RawRecording, time: FloatArray, gripper: FloatArray, start: Start, mesh: GarmentMesh
 ) -> None:
-    """Raises UserError where each gripper is where the other one should be."""
+    """Raises UserError if left and right grippers are exchanged."""
     grasp = np.stack([mesh.rest_position[mesh.grasp[side]].mean(axis=0) for side in SIDES])
     held = grasp @ start.rotation.T + start.translation
     at = at_start(time, gripper)
@@ -236,7 +238,7 @@ def _check_sides(
 
 
 def check_joints(raw: RawRecording, time: FloatArray, joints: FloatArray) -> None:
-    """Raises UserError where joints (T,6,3), m, are not those of a person who sits or stands."""
+    """Raises UserError if joints (T,6,3), m, are not those of a sitting or standing person."""
     key = raw.key(JOINTS)
     limbs = [(0, 1, _LIMB), (1, 2, _LIMB), (3, 4, _LIMB), (4, 5, _LIMB), (0, 3, _SHOULDERS)]
     for a, b, (least, most) in limbs:
@@ -285,7 +287,7 @@ def check_joints(raw: RawRecording, time: FloatArray, joints: FloatArray) -> Non
 
 
 def at_start(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Returns (k,3) the median of values (T,k,3) at the start, of all where none is there then."""
+    """Returns (k,3) the medians of values (T,k,3) at the start, or of all if none is there."""
     first = time <= time[0] + _START
     found = np.full(values.shape[1:], np.nan)
     for k in range(values.shape[1]):
@@ -303,7 +305,7 @@ def axis_name(direction: FloatArray) -> str:
 
 
 def _fitted(places: FloatArray, seen: FloatArray) -> Start:
-    """Returns the rigid motion of places (m,3) that fits what is seen (m,3) best (Kabsch 1976)."""
+    """Returns the rigid motion of places (m,3) that best fits seen points (m,3) (Kabsch 1976)."""
     p, q = places - places.mean(axis=0), seen - seen.mean(axis=0)
     u, s, vt = np.linalg.svd(p.T @ q)
     sign = float(np.sign(np.linalg.det(u @ vt))) or 1.0
@@ -311,7 +313,7 @@ def _fitted(places: FloatArray, seen: FloatArray) -> Start:
     whole, square = float(np.sum(p * p)), float(np.sum(q * q))
 
     def misfit(trace: float) -> float:
-        # of the best scale too: a garment that is a little larger is no misfit
+        # with the best scale, too, so that a slightly larger garment is no misfit
         return float(np.sqrt(max(1.0 - trace**2 / (whole * square), 0.0)))
 
     spread = np.linalg.svd(p, compute_uv=False)
@@ -326,8 +328,8 @@ def _fitted(places: FloatArray, seen: FloatArray) -> Start:
 
 
 def _check_jumps(source: str, key: str, time: FloatArray, track: FloatArray, what: str) -> None:
-    """Raises UserError where a track (T,3), m, is at one sample where nothing can have got."""
-    # each point against the line through its neighbours
+    """Raises UserError if a track (T,3), m, jumps to a point that it cannot have reached."""
+    # each point is compared with the line through its neighbours
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
     off = np.linalg.norm(track[1:-1] - (1.0 - share) * track[:-2] - share * track[2:], axis=1)
     most = _JITTER + 0.5 * _ACCELERATION * (time[1:-1] - time[:-2]) * (time[2:] - time[1:-1])
@@ -347,7 +349,7 @@ def _size(points: FloatArray) -> float:
 
 
 def _meant(ratio: float) -> str:
-    """Returns in which unit a length would be that is `ratio` times what it should be."""
+    """Returns a hint at the unit of a length that is `ratio` times the expected one, if any."""
     for size, name in _UNITS:
         if 0.6 < ratio / size < 1.6:
             return f"; is it in {name}?"

@@ -1,4 +1,4 @@
-"""One recording as it stands in a file, before anything is believed of it."""
+"""One recording as read from a file, before any check of its content."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MARKERS, PLACES, NODES = (
 )
 MARKER_NAMES = "garment/marker_name"
 JOINTS = "human/joint_position"
-# What is read, and the unit that it is in.
+# Datasets that are read, and their units.
 UNITS: dict[str, str] = {
     "time": "s",
     **{f"gripper/{side}/position": "m" for side in SIDES},
@@ -34,30 +34,30 @@ UNITS: dict[str, str] = {
     "garment/rest_position": "m",
     JOINTS: "m",
 }
-# How each unit may be spelt.
+# Accepted spellings of each unit.
 _SPELT = {
     "s": {"s", "sec", "second", "seconds"},
     "m": {"m", "meter", "meters", "metre", "metres"},
     "N": {"N", "newton", "newtons", "Newton", "Newtons"},
     "": {"", "1"},
 }
-# A dataset is not larger than this, bytes: 600 s of 400 markers at 100 Hz are 0.6 GB.
+# Largest dataset, bytes: 600 s of 400 markers at 100 Hz are 0.6 GB.
 MOST_BYTES = 2**30
 
 
 @dataclass(frozen=True)
 class RawRecording:
-    """Datasets by the names of `UNITS`, of any shape and any numbers.
+    """Datasets by the names of `UNITS`, of any shape and with any values.
 
     Attributes:
         source: the file.
-        group: that the recording stands in; empty for the file's root.
-        title: what it is called; may be empty.
-        arrays: dataset by name.
-        noise: of datasets whose noise is given, m or N.
-        labels: what tells the points of a dataset apart, in their order, where that is given.
-        names: of all that the file holds for this recording, to find misspelt ones.
-        notes: what was not used or was read otherwise than it stands.
+        group: group of the recording; empty for the file's root.
+        title: name of the recording; may be empty.
+        arrays: datasets by name.
+        noise: standard deviation of the noise by dataset, where it is given, m or N.
+        labels: labels of the points by dataset, in their order, where they are given.
+        names: all names that the file holds for this recording, to find misspelled ones.
+        notes: what was not used, or was changed when it was read.
     """
 
     source: str
@@ -70,18 +70,18 @@ class RawRecording:
     notes: tuple[str, ...] = ()
 
     def key(self, dataset: str) -> str:
-        """Returns how a dataset is called in messages."""
+        """Returns the name of a dataset in messages."""
         return f"{self.group}/{dataset}" if self.group else dataset
 
     def missing(self, dataset: str, message: str = "is missing") -> UserError:
-        """Returns the error that a dataset is missing, with what may have been meant."""
+        """Returns the error that a dataset is missing; it suggests a similar name, if any."""
         near = misspelt(dataset, [n for n in self.names if n not in UNITS])
         hint = f"; is {near} meant?" if near else ""
         return UserError(self.source, self.key(dataset), message + hint)
 
 
 def misspelt(name: str, found: Sequence[str]) -> str | None:
-    """Returns which of the names found may stand for `name`; None where none is like it."""
+    """Returns the found name that may be a misspelled `name`, or None."""
     for other in found:
         low = other.lower()
         if low.startswith(name) or low.endswith(name) or name.endswith(f"/{low}"):
@@ -93,7 +93,7 @@ def misspelt(name: str, found: Sequence[str]) -> str | None:
 def recording_groups(names: Iterable[str]) -> list[str]:
     """Returns the prefixes of the recordings among dataset names, `recording_2` before `_10`.
 
-    A file without any holds one recording at its root: the prefix is empty.
+    A file without such groups holds one recording at its root, with an empty prefix.
     """
     found = {n.split("/")[0] for n in names if n.startswith("recording_") and "/" in n}
 
@@ -105,14 +105,14 @@ def recording_groups(names: Iterable[str]) -> list[str]:
 
 
 def check_unit(source: str, key: str, dataset: str, unit: str) -> None:
-    """Raises UserError where a dataset's unit, as the file gives it, is not the one expected."""
+    """Raises UserError if the unit that a file gives for a dataset is not the expected one."""
     expected = UNITS[dataset]
     if unit.strip() not in _SPELT[expected]:
         raise UserError(source, key, f"is in {unit!r}, expected {expected or 'no unit'}")
 
 
 def check_content(source: str, key: str, kind: np.dtype[Any], shape: tuple[int, ...]) -> None:
-    """Raises UserError where a dataset is not numbers, or is too large to be a recording."""
+    """Raises UserError if a dataset does not hold numbers, or is too large for a recording."""
     if kind.kind not in "fiu":
         raise UserError(source, key, f"does not hold numbers but {kind}, expected numbers")
     size = kind.itemsize
@@ -127,10 +127,10 @@ def check_content(source: str, key: str, kind: np.dtype[Any], shape: tuple[int, 
 
 
 def noise_std(source: str, key: str, value: Any) -> tuple[float, str | None]:
-    """Returns the standard deviation that a file gives, and a note where it gives several.
+    """Returns the standard deviation that a file gives; of several the largest, with a note.
 
     Raises:
-        UserError: it is not a number above 0, or not numbers that all are.
+        UserError: a value is not a number above 0.
     """
     try:
         given = np.asarray(value)
@@ -149,7 +149,7 @@ def noise_std(source: str, key: str, value: Any) -> tuple[float, str | None]:
 
 
 def unused_note(names: Sequence[str]) -> list[str]:
-    """Returns the note that says which names of a file are not used; none where all are."""
+    """Returns a note that lists the unused names of a file; empty if all are used."""
     if not names:
         return []
     shown, more = list(names[:12]), len(names) - 12

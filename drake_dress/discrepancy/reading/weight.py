@@ -1,4 +1,4 @@
-"""Holds gripper forces against the garment's weight: unit, sign and the direction of gravity."""
+"""Compares gripper forces with the garment's weight: unit, sign and direction of gravity."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 
 _GRAVITY = 9.81
-# Mass of any fabric, kg/m²: voile to a lined winter coat.
+# Surface density of any fabric, kg/m²: voile to a lined winter coat.
 _LIGHTEST, _HEAVIEST = 0.04, 2.5
-# By how much a garment may be lighter or heavier than the scenario has it.
+# Factor by which a garment may be lighter or heavier than the scenario's.
 _FACTOR = 3.5
-# Cosine within which the force at rest points down (or up): a world frame that is not level, and
-# wind, turn it by a few degrees.
+# Least cosine between the force at rest and the vertical: a world frame that is not level, and
+# wind, tilt the force by a few degrees.
 _DOWN = 0.7
-# Forces of a person or of arms that hold a garment stay below this, N.
+# Largest plausible force of arms that hold a garment, or of a person, N.
 _MOST = 1000.0
 # Name of both grippers' forces in messages.
 _BOTH = "gripper/*/force"
@@ -41,16 +41,16 @@ def check_forces(
     mesh: GarmentMesh,
     surface_density: float | None,
 ) -> None:
-    """Raises UserError where forces (T,2,3) are not those of the garment on the grippers, in N.
+    """Raises UserError if forces are not those of the garment on the grippers, in N.
 
     While a garment hangs, both grippers together bear its weight.
 
     Args:
         raw: the recording.
         time: (T,) s.
-        force: N, NaN where not measured.
+        force: (T,2,3) N, NaN where not measured.
         mesh: the scenario's garment.
-        surface_density: of it, kg/m²; None for any.
+        surface_density: of its fabric, kg/m²; None allows any.
     """
     begin, whole = at_start(time, force), _mean(force)
     if not np.isfinite(begin).all():
@@ -59,7 +59,7 @@ def check_forces(
     totals = [begin.sum(axis=0), whole.sum(axis=0)]
     sizes = [float(np.linalg.norm(t)) for t in totals]
     _check_signs_agree(raw, begin, sizes[0], least)
-    # a garment that begins on the person hangs from the grippers later, or the other way round
+    # a garment that starts on the person hangs from the grippers later, or the other way round
     bearing = [t for t, size in zip(totals, sizes, strict=True) if least <= size <= most]
     if not bearing:
         raise _not_the_weight(raw, sizes[0], least, most)
@@ -68,16 +68,16 @@ def check_forces(
 
 
 def _check_signs_agree(raw: RawRecording, begin: FloatArray, total: float, least: float) -> None:
-    """Raises UserError where one gripper's force has the wrong sign.
+    """Raises UserError if one gripper's force has the wrong sign.
 
     Args:
         raw: the recording.
         begin: (2,3) forces at the start, N.
-        total: size of their sum, N.
-        least: that the garment weighs, N.
+        total: magnitude of their sum, N.
+        least: smallest weight of the garment, N.
     """
     for k, other in ((0, 1), (1, 0)):
-        # one up, one down, and together no weight
+        # one force points up, one down, and their sum is less than the weight
         if begin[k, 2] > 0.25 * least and begin[other, 2] < -0.25 * least and total < least:
             raise UserError(
                 raw.source,
@@ -88,13 +88,13 @@ def _check_signs_agree(raw: RawRecording, begin: FloatArray, total: float, least
 
 
 def _not_the_weight(raw: RawRecording, total: float, least: float, most: float) -> UserError:
-    """Returns the error of forces that are too small or too large for the garment's weight.
+    """Returns the error for forces that are too small or too large for the garment's weight.
 
     Args:
         raw: the recording.
-        total: size of both grippers' force at the start, N.
-        least: that the garment weighs, N.
-        most: that it weighs, N.
+        total: magnitude of both grippers' total force at the start, N.
+        least: smallest weight of the garment, N.
+        most: largest weight of the garment, N.
     """
     unit = _unit(total, float(np.sqrt(least * most)), _FACTOR)
     hint = f"; is it in {unit}?" if unit else ""
@@ -109,7 +109,7 @@ def _not_the_weight(raw: RawRecording, total: float, least: float, most: float) 
 
 
 def _check_points_down(raw: RawRecording, bearing: list[FloatArray]) -> None:
-    """Raises UserError where none of the forces (3,) that are the weight's size points down."""
+    """Raises UserError if none of the forces (3,) of the weight's magnitude points down."""
     down = [-float(t[2] / np.linalg.norm(t)) for t in bearing]
     if max(down) < -_DOWN:
         raise UserError(
@@ -128,7 +128,7 @@ def _check_points_down(raw: RawRecording, bearing: list[FloatArray]) -> None:
 
 
 def _check_sizes(raw: RawRecording, force: FloatArray) -> None:
-    """Raises UserError where a single force (T,2,3) is larger than any that occurs."""
+    """Raises UserError if a force component (T,2,3) exceeds every plausible force."""
     for k, side in enumerate(SIDES):
         largest = float(np.nanmax(np.abs(force[:, k])))
         if largest > _MOST:
@@ -147,14 +147,14 @@ def _densities(surface_density: float | None) -> tuple[float, float]:
 
 
 def _unit(size: float, weight: float, factor: float) -> str:
-    """Returns the unit in which a force of that size is nearest to the weight; none if none is."""
+    """Returns the unit in which a force of this size is nearest to the weight; empty if none is."""
     off = {name: abs(np.log(max(size, 1e-9) / per / weight)) for per, name in _UNITS}
     name = min(off, key=lambda n: off[n])
     return name if off[name] < np.log(factor) else ""
 
 
 def _mean(force: FloatArray) -> FloatArray:
-    """Returns (2,3) the mean of what was measured, N."""
+    """Returns (2,3) the mean of the measured forces, N."""
     there = np.isfinite(force)
     total: FloatArray = np.where(there, force, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     return total
