@@ -76,7 +76,7 @@ class AnisotropicFriction(FrictionEffect):
     anisotropic and heterogeneous friction").
 
     Args:
-        contrast: a, positive if sliding along the warp meets more friction.
+        contrast: contrast a, positive if sliding along the warp meets more friction.
     """
 
     NAME = "anisotropic_friction"

@@ -37,8 +37,8 @@ class CoatParameters:
     Attributes:
         body_length: height of the shoulder tips above the hem, m.
         chest: girth at the underarm, closed over the open front, m.
-        shoulder_width: from shoulder tip to shoulder tip, m.
-        sleeve_length: from the shoulder tip to the cuff, along the top, m.
+        shoulder_width: distance between the shoulder tips, m.
+        sleeve_length: length from the shoulder tip to the cuff, along the top, m.
         armhole_girth: girth of an armhole, m.
         cuff_girth: girth of a cuff, m.
         collar_height: height of the collar, m.

@@ -33,7 +33,7 @@ def with_openings(
         position: (n,3), m, in the axes of the file.
         faces: (F,3) of a manifold.
         named: loops by their names in `LOOP_NAMES`.
-        up: the axis of the file that is up, a key of `AXES`.
+        up: the axis of the file that points up, a key of `AXES`.
         source: file put in front of messages.
 
     Raises:

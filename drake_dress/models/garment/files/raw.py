@@ -96,7 +96,7 @@ class RawMesh:
     def joined(self, root: IndexArray) -> RawMesh:
         """Returns the mesh with each node replaced by node `root[node]`.
 
-        Collapsed faces and unused nodes are dropped. A node takes the place of its root.
+        Collapsed faces and unused nodes are dropped. A merged node is at the place of its root.
 
         Raises:
             UserError: no face is left.
