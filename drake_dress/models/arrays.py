@@ -1,4 +1,4 @@
-"""Types of arrays, as annotations name them."""
+"""Array types for annotations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-# Nodes and modes, as compiled kernels take them.
+# Nodes and modes, in the type that compiled kernels take.
 IntArray = npt.NDArray[np.int32]
-# Rows of other arrays, as NumPy returns them.
+# Row indices, in the type that NumPy returns.
 IndexArray = npt.NDArray[np.int64]

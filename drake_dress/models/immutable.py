@@ -1,4 +1,4 @@
-"""Values of abstract state that nobody changes."""
+"""Immutable values of abstract state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Self
 class Immutable:
     """Is its own copy. Drake copies all abstract state at every unrestricted update.
 
-    For frozen dataclasses whose arrays nobody writes to.
+    For frozen dataclasses whose arrays are never written to.
     """
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:

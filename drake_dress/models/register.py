@@ -11,12 +11,12 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def is_name(text: Any) -> bool:
-    """Returns whether it is lower-case letters, digits and _, as a key of a scenario."""
+    """Returns whether it can be a scenario's key: lower-case letters, digits and _."""
     return isinstance(text, str) and _NAME.fullmatch(text) is not None
 
 
 def check_name(source: str, kind: type, example: str) -> None:
-    """Raises UserError, which names `source`, where the `NAME` of a class is no name."""
+    """Raises UserError, which names `source`, if the `NAME` of a class is not a valid name."""
     name = getattr(kind, "NAME", None)
     if not is_name(name):
         raise UserError(
@@ -27,7 +27,7 @@ def check_name(source: str, kind: type, example: str) -> None:
 def enter(register: dict[str, Any], source: str, kind: Any) -> None:
     """Enters a class under its `NAME`.
 
-    A class that is defined again, as in a notebook's cell, takes the place of its earlier self.
+    A class that is defined again, as in a notebook's cell, replaces its earlier version.
 
     Raises:
         UserError: another class has the name.

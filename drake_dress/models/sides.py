@@ -1,4 +1,4 @@
-"""The person's two sides, which sleeves, arms and grippers are named by; index 0 is the left."""
+"""The person's two sides, which name sleeves, arms and grippers; index 0 is the left."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Vectors of three, in compiled code: NumPy's own functions cost more than they do there."""
+"""3-vectors in compiled code: NumPy's functions take longer than the arithmetic there."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Compiles kernels whose statements, four alike in a row, are to become one vector instruction.
+"""Compiles kernels in which four similar statements in a row become one vector instruction.
 
-Numba leaves LLVM's superword-level vectorisation off for a whole process unless told otherwise, so
-these kernels are compiled when they are defined, with their signatures, and the setting is given
-back. Without it they are right, and about half as fast.
+Numba turns LLVM's superword-level vectorisation off for a whole process by default. So these
+kernels are compiled with their signatures when they are defined, and the setting is restored.
+Without it they are correct, and about half as fast.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ _CONFIG: Any = config
 
 
 def vectorised(signature: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Returns a decorator that compiles a function at once, products fused with sums.
+    """Returns a decorator that compiles a function at once, with fused multiply-adds.
 
     Args:
-        signature: of Numba.
+        signature: Numba signature of the function.
     """
 
     def compile_now(function: Callable[..., Any]) -> Any:

@@ -1,1 +1,1 @@
-"""Robot arms: kinematics, distances, and which joint velocities move a gripper as asked."""
+"""Robot arms: kinematics, distances, and joint velocities for commanded gripper motions."""

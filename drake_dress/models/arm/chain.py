@@ -1,4 +1,4 @@
-"""A serial arm of revolute joints: where its links are, and how they move with its joints."""
+"""Kinematics of a serial arm of revolute joints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drake_dress.models.vector3 import length
 
 @dataclass(frozen=True)
 class JointLimits:
-    """What the joints of an arm may do; (J,) each.
+    """Limits of an arm's joints; (J,) each.
 
     Attributes:
         lower, upper: positions, rad.
@@ -27,7 +27,7 @@ class JointLimits:
     torque: FloatArray
 
     def within(self, share: float, room: float) -> JointLimits:
-        """Returns limits within these: a share of speeds and accelerations, and rad of room."""
+        """Returns tighter limits: a share of speed and acceleration, position `room` rad inside."""
         return JointLimits(
             self.lower + room,
             self.upper - room,
@@ -42,10 +42,10 @@ class SerialArm:
     """An arm of J revolute joints, each about the z axis of its own link.
 
     Attributes:
-        base: (4,4) X_WB, where it stands.
+        base: (4,4) X_WB of the base.
         joints: (J,4,4) X_PL of each link L in its parent P at q = 0.
         tool: (4,4) X_LT of the tool in the last link.
-        limits: of the joints.
+        limits: limits of the joints.
     """
 
     base: FloatArray
@@ -55,7 +55,7 @@ class SerialArm:
 
     @property
     def count(self) -> int:
-        """J."""
+        """Number of joints J."""
         return len(self.joints)
 
     def links(self, q: FloatArray) -> FloatArray:
@@ -69,16 +69,16 @@ class SerialArm:
         return p
 
     def tool_jacobian(self, links: FloatArray) -> FloatArray:
-        """Returns (6,J) J of the tool's velocity, m/s, above its angular velocity, rad/s.
+        """Returns the Jacobian (6,J) of the tool: velocity, m/s, above angular velocity, rad/s.
 
         Args:
-            links: of `SerialArm.links`.
+            links: (J+2,4,4) of `SerialArm.links`.
         """
         jacobian: FloatArray = find_tool_jacobian(links)
         return jacobian
 
 
-# What follows is called from compiled code, too: a cycle of 5 ms has no time for small arrays.
+# The functions below are called from compiled code, too: a 5 ms cycle has no time for small arrays.
 
 
 @nb.njit(cache=True, nogil=True)
@@ -127,7 +127,7 @@ def moved_by(links, point, owner, out):  # type: ignore[no-untyped-def]
     Args:
         links: (J+2,4,4) of `SerialArm.links`.
         point: (3,) p_W, m.
-        owner: link that it is fixed to: 0 the base, J the last one.
+        owner: link that the point is fixed to: 0 the base, J the last one.
         out: (3+,J) of zeros.
     """
     for j in range(min(owner, len(links) - 2)):
@@ -144,7 +144,7 @@ def moved_by(links, point, owner, out):  # type: ignore[no-untyped-def]
 def rotation_error(now, asked):  # type: ignore[no-untyped-def]
     """Returns (3,) the rotation vector in W that turns `now` (3,3) to `asked` (3,3), rad.
 
-    At half a turn its axis is one of two; half a turn less rounding is as exact as any.
+    Within rounding of half a turn it is half a turn about one of the two possible axes.
     """
     r = np.zeros((3, 3))
     for a in range(3):

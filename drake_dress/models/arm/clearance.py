@@ -1,4 +1,4 @@
-"""How far capsules are apart, and how that changes as arms move."""
+"""Distances between capsules, and their rates as arms move."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Capsules:
 
 @dataclass(frozen=True)
 class ArmShape:
-    """K capsules that hold an arm, each fixed to one of its links.
+    """K capsules that enclose an arm, each fixed to one of its links.
 
     Attributes:
-        link: (K,) 0 the base, J the last link.
+        link: (K,) link of each capsule: 0 the base, J the last link.
         capsules: in the frames of their links.
     """
 
@@ -52,7 +52,7 @@ class Clearance:
     Attributes:
         pair: (M,2) indices.
         distance: (M,) m; negative where they overlap.
-        here, there: (M,3) on the axes of both, m.
+        here, there: (M,3) nearest points on the axes of both, m.
         away: (M,3) unit vector from there to here; along it the distance grows.
     """
 
@@ -64,7 +64,7 @@ class Clearance:
 
 
 def clearance(a: Capsules, b: Capsules, pairs: IndexArray) -> Clearance:
-    """Returns how far capsules of `a` are from those of `b`, for `pairs` (M,2) of both."""
+    """Returns the distances between capsules of `a` and of `b`, for `pairs` (M,2) of indices."""
     here, there, away = (np.empty((len(pairs), 3)) for _ in range(3))
     distance = np.empty(len(pairs))
     _find_clearance(
@@ -85,7 +85,7 @@ def _find_clearance(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
-    """Returns the distance of segments a–b and c–d, m, and writes where it is.
+    """Returns the distance of segments a–b and c–d, m, and writes their nearest points.
 
     Args:
         a: (3,) one end, m.
@@ -93,7 +93,7 @@ def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
         c: (3,) one end of the other segment, m.
         d: (3,) the other.
         here: (3,) written: the nearest point of the first, m.
-        there: (3,) written: of the other.
+        there: (3,) written: the nearest point of the other.
         away: (3,) written: unit vector from there to here.
     """
     s, t = nearest(a, b, c, d)
@@ -103,7 +103,7 @@ def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
         away[k] = here[k] - there[k]
     apart = size = length(away)
     if apart <= 1e-9:
-        # axes that cross have no direction apart; any across both will do
+        # crossing axes have no separating direction; any normal to both will do
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             away[k] = (b[i] - a[i]) * (d[j] - c[j]) - (b[j] - a[j]) * (d[i] - c[i])
@@ -117,10 +117,10 @@ def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Returns where segments a–b and c–d, ends (3,), are nearest: s, t from 0 to 1 along both.
+    """Returns the nearest points of segments a–b and c–d, ends (3,): s, t from 0 to 1 along both.
 
-    Source: Ericson, "Real-Time Collision Detection", 2005, 5.1.9. Of parallel segments, which have
-    many nearest pairs, one.
+    Source: Ericson, "Real-Time Collision Detection", 2005, 5.1.9. For parallel segments, which have
+    many nearest pairs, it returns one.
     """
     uu, ww, uw, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -143,13 +143,13 @@ def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def find_gap_rates(links, point, owner, away, sign, rates):  # type: ignore[no-untyped-def]
-    """Writes ∂(rate of a distance)/∂(joint rates), of the arm that is at one end of it.
+    """Writes ∂(rate of a distance)/∂(joint rates) for the arm at one end of the distance.
 
     Args:
-        links: (J+2,4,4) where the arm is.
-        point: (3,) of the arm, nearest to the other, m.
-        owner: link that it is fixed to.
-        away: (3,) unit vector along which the distance grows, if the point moves by `sign`.
+        links: (J+2,4,4) of `SerialArm.links`.
+        point: (3,) point of the arm that is nearest to the other capsule, m.
+        owner: link that the point is fixed to.
+        away: (3,) unit vector; the distance grows as the point moves along `sign` times it.
         sign: 1.0 or -1.0.
         rates: (J,) written.
     """
@@ -168,7 +168,7 @@ def find_gap_rates(links, point, owner, away, sign, rates):  # type: ignore[no-u
 
 @nb.njit(cache=True, nogil=True)
 def place_capsules(links, owner, first, second, placed):  # type: ignore[no-untyped-def]
-    """Writes the ends in W of capsules given in the frames of their links to `placed` (2,K,3)."""
+    """Writes the capsules' ends in W, given in the frames of their links, to `placed` (2,K,3)."""
     for k in range(len(owner)):
         x = links[owner[k]]
         for a in range(3):

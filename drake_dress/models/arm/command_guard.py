@@ -1,17 +1,18 @@
-"""What an arm's own driver does with the commands that it gets: follows them, or stops by itself.
+"""Model of an arm's own driver: it follows sound commands, and otherwise stops by itself.
 
-A driver trusts nobody. It follows a command while commands keep coming, are numbers, are within the
-joints' limits and go on from where the one before was; otherwise it brakes by itself and holds.
-It goes on once commands are sound again and begin where it holds.
+The driver checks every command. It follows commands while they keep arriving, are finite, are
+within the joints' limits and continue from where the joints are; otherwise it brakes and holds. It
+resumes once commands are sound again and begin where it holds.
 
-Commands come when they come, some late and some together, so drives are not given them as they are.
-What they are given follows the command q_c, which goes on by its own velocity v_c until the next:
+Commands arrive irregularly, some late and some together, so they are not passed to the drives as
+they are. The drives' set-point follows the command q_c, extrapolated with its own velocity v_c
+until the next command:
 
     v = v_c + sign(e) min(|e| / τ, √(2 a |e|)),     e = q_c + v_c age - q
 
-within most of the joints' speed, and their acceleration, so that drives never see a jump, and lag
-behind nothing that moves steadily. a is what is left of the acceleration by commands that use
-most of it: with more, what has been caught up could not be braked in time, and swings.
+within most of the joints' speed limit and within their acceleration limit. So drives never see a
+jump and do not lag behind a steady motion. a is the acceleration that is left by commands which use
+most of it: with a larger a, catching up could not be braked in time, and would oscillate.
 """
 
 from __future__ import annotations
@@ -34,20 +35,20 @@ class Stop(IntEnum):
     ENDED = 1  # none came for too long
     NOT_FINITE = 2
     OUTSIDE_LIMITS = 3  # of position or speed
-    JUMP = 4  # farther from the one before than the joints could have gone
+    JUMP = 4  # farther from the drives' set-point than the joints could have moved
 
 
 class GuardSettings(NamedTuple):
-    """What commands may do, as kernels take it: numbers alone.
+    """Settings of the driver: plain numbers, for compiled kernels.
 
     Attributes:
         follow_time: τ above, s.
-        spare: a above, share of the limit of acceleration.
-        jump: beyond what speed limits allow from one command to the next, rad.
-        pause: between two commands at most that belong to one motion, s.
-        resume: from where the driver holds, within which commands are followed again, rad.
-        braking: share of the limit of acceleration at which it stops.
-        speed: share of the limit of speed at which it catches up: joints overshoot.
+        spare: a above, as a fraction of the acceleration limit.
+        jump: tolerated jump of a command beyond what the speed limits allow, rad.
+        pause: longest time between two commands of one motion, s.
+        resume: distance from the held position within which commands are followed again, rad.
+        braking: fraction of the acceleration limit with which the driver stops.
+        speed: fraction of the speed limit up to which the driver follows, since joints overshoot.
     """
 
     follow_time: float = 0.02
@@ -61,13 +62,13 @@ class GuardSettings(NamedTuple):
 
 @dataclass(frozen=True)
 class DriveState:
-    """What drives are asked for, and what a driver remembers.
+    """Set-point of the drives, and the memory of the driver.
 
     Attributes:
         position: (J,) rad. velocity: (J,) rad/s.
-        stop: why not what was commanded.
-        command: (J,) the last one that was followed, rad.
-        age: since it came, s.
+        stop: why commands are not followed.
+        command: (J,) the last command that was followed, rad.
+        age: time since it arrived, s.
     """
 
     position: FloatArray
@@ -84,7 +85,7 @@ class DriveState:
 
     @staticmethod
     def unpacked(values: FloatArray) -> DriveState:
-        """Returns the state of (3J+2,) numbers."""
+        """Returns the state from (3J+2,) numbers."""
         n = (len(values) - 2) // 3
         position, velocity = values[:n].copy(), values[n : 2 * n].copy()
         command = values[2 * n + 1 : 3 * n + 1].copy()
@@ -92,7 +93,7 @@ class DriveState:
 
     @staticmethod
     def at_rest(position: FloatArray) -> DriveState:
-        """Returns drives that are at (J,) `position`, rad, and have not been commanded yet."""
+        """Returns drives at rest at (J,) `position`, rad, before their first command."""
         return DriveState(position, np.zeros(len(position)), Stop.NONE, position)
 
 
@@ -105,16 +106,16 @@ def follow(
     dt: float,
     settings: GuardSettings | None = None,
 ) -> DriveState:
-    """Returns what the drives are asked for after `dt`: within speed and acceleration always.
+    """Returns the drives' set-point after `dt`, always within speed and acceleration limits.
 
     Args:
-        state: of the step before.
+        state: state of the previous step.
         position: (J,) commanded, rad; None in velocity mode.
         velocity: (J,) commanded, rad/s; None in position mode.
-        fresh: whether commands still come.
-        limits: of the joints, never exceeded.
-        dt: s.
-        settings: what commands may do.
+        fresh: whether commands still arrive.
+        limits: limits of the joints, never exceeded.
+        dt: time step, s.
+        settings: settings of the driver.
     """
     after = np.empty(3 * len(state.position) + 2)
     _follow(
@@ -137,10 +138,10 @@ _NONE, _ENDED, _NOT_FINITE, _OUTSIDE_LIMITS, _JUMP = (int(v) for v in Stop)
 
 @nb.njit(cache=True, nogil=True)
 def _follow(state, placed, position, moving, velocity, fresh, limits, dt, s, after):  # type: ignore[no-untyped-def]
-    """Writes the packed state `after`; the rest as of `follow`.
+    """Writes the packed state `after`; other arguments as in `follow`.
 
-    `placed` and `moving` tell whether position and velocity are commanded; without, position is
-    that of the drives, and velocity 0. limits: lower, upper, speed, acceleration.
+    `placed` and `moving` say whether position and velocity are commanded; if not, position is that
+    of the drives, and velocity is 0. limits: lower, upper, speed, acceleration.
     """
     n = len(position)
     lower, upper, top, acceleration = limits
@@ -153,7 +154,7 @@ def _follow(state, placed, position, moving, velocity, fresh, limits, dt, s, aft
     )
     found = _fault(state, placed, position, moving, velocity, fresh, limits, s)
     follows = found == _NONE
-    # why it stopped stays told, and not what was wrong later
+    # keep the reason of the stop, not what was wrong later
     after[2 * n] = found if follows or stop == _NONE else stop
     if follows and placed and (position == command).all():
         age = state[-1] + dt
@@ -195,9 +196,9 @@ def _fault(state, placed, position, moving, velocity, fresh, limits, s):  # type
         resting = resting and abs(rate[j]) < 1e-9
         near = near and off <= s.resume
         begins = begins and abs(velocity[j]) <= s.resume / s.pause
-        # what it lags behind at full speed, and what may have been missed
+        # the lag at full speed, and what may have been missed
         reached = reached and off <= top[j] * (s.follow_time + s.pause) + s.jump
     if stop != _NONE:
-        # at rest, and commanded to go on from there
+        # at rest, and commanded to continue from there
         return _NONE if resting and (near or not placed) and begins else int(stop)
     return _NONE if reached or not placed else _JUMP

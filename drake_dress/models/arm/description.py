@@ -1,9 +1,9 @@
-"""The Panda's URDF and meshes, from the package that keeps them, in a form that Drake reads.
+"""Converts the Panda's URDF and meshes of `example-robot-data` to a form that Drake reads.
 
-The package's visual meshes are COLLADA, its collision meshes STL; Drake reads neither. So they are
-converted once, to glTF, and kept in the user's cache. Distances are kept by capsules (`SHAPE`)
-before anything touches, so the description has no collision geometry; fingers are fixed, closed on
-cloth.
+The package's visual meshes are COLLADA, its collision meshes STL; Drake reads neither. The visual
+meshes are converted to glTF once and kept in the user's cache. The control keeps distances by
+capsules (`SHAPE`) before anything touches, so the description has no collision geometry. The
+fingers are fixed, closed on cloth.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from drake_dress.models.arrays import FloatArray
 
 PACKAGE = "example-robot-data"
 _FOLDER = "robots/panda_description"
-# Version of what is made of the package's files.
+# Version of the converted files.
 _FORM = 2
-# glTF has y up, and is turned back by whoever reads it.
+# glTF has y up; programs that read it rotate it back.
 _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
-# Of each finger, m: two layers of cloth.
+# Opening of each finger, m; both together hold two layers of cloth.
 _OPENING = 0.001
-# Of the fingers' joints from the hand's frame along its z, m.
+# Offset of the fingers' joints from the hand's frame along its z, m.
 _FINGERS = 0.0584
 
 
@@ -48,13 +48,13 @@ HAND_PARTS = _hand_parts()
 
 
 def panda_urdf(cache: Path | None = None) -> Path:
-    """Returns the Panda's URDF, its meshes beside it; makes both the first time.
+    """Returns the Panda's URDF, with its meshes next to it; converts both on first use.
 
     Args:
         cache: folder to keep them in; the user's cache by default.
 
     Raises:
-        FileNotFoundError: the package is not there, or has no Panda.
+        FileNotFoundError: the package is not installed, or has no Panda.
     """
     try:
         version = metadata.version(PACKAGE)
@@ -70,7 +70,7 @@ def panda_urdf(cache: Path | None = None) -> Path:
             try:
                 made.rename(folder)
             except OSError:
-                if not urdf.exists():  # another process was no faster: it is a real error
+                if not urdf.exists():  # a real error: no other process has made the folder
                     raise
         finally:
             shutil.rmtree(made, ignore_errors=True)
@@ -78,12 +78,12 @@ def panda_urdf(cache: Path | None = None) -> Path:
 
 
 def link_meshes() -> tuple[tuple[tuple[Path, FloatArray], ...], ...]:
-    """Returns of the base and of links 1 to 7 their glTF files, each with its pose X_LM (4,4).
+    """Returns the glTF files of the base and of links 1 to 7, each with its pose X_LM (4,4).
 
     The hand and its fingers are part of the last link.
 
     Raises:
-        FileNotFoundError: the package is not there, or has no Panda.
+        FileNotFoundError: the package is not installed, or has no Panda.
     """
     folder = panda_urdf().parent
     files: list[tuple[tuple[Path, FloatArray], ...]] = []
@@ -94,10 +94,10 @@ def link_meshes() -> tuple[tuple[tuple[Path, FloatArray], ...], ...]:
 
 
 def panda_source() -> Path:
-    """Returns the package's own folder of the Panda.
+    """Returns the Panda's folder in the package.
 
     Raises:
-        FileNotFoundError: it has none.
+        FileNotFoundError: the package has no Panda.
     """
     for file in metadata.files(PACKAGE) or []:
         if file.as_posix().endswith(f"{_FOLDER}/urdf/panda.urdf"):
@@ -132,7 +132,7 @@ def _convert(source: Path, out: Path) -> None:
 
 
 def _fix(joint: ElementTree.Element) -> None:
-    """Makes a finger's joint a fixed one, a little open."""
+    """Makes a finger's joint fixed, slightly open."""
     axis, origin = joint.find("axis"), joint.find("origin")
     if axis is None or origin is None:
         raise ValueError(f"joint {joint.attrib['name']} has no axis or no origin")

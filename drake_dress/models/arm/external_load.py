@@ -1,4 +1,4 @@
-"""What pulls at an arm's tool, from the torques that it feels at its joints."""
+"""Force on an arm's tool, from the external torques on its joints."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ import numpy as np
 from drake_dress.models.arm.chain import SerialArm, find_tool_jacobian, place_links
 from drake_dress.models.arrays import FloatArray
 
-# Of the damping of the least squares, m: directions in which an arm near a singular pose feels
-# nothing are given no force.
+# Damping of the least squares, m: near a singular pose, directions that the joints cannot sense get
+# no force.
 _DAMPING = 0.01
 
 
 def tool_force(jacobian: FloatArray, torque: FloatArray) -> FloatArray:
     """Returns the force (3,) on the tool's origin, N, in the frame of the jacobian.
 
-    The force f whose torques J'f are nearest to those felt, by damped least squares; a moment on
-    the tool is taken to be none, since cloth that hangs from fingertips exerts next to none.
+    It is the force f whose torques J'f are nearest to the given ones, by damped least squares. The
+    moment on the tool is assumed to be zero, since cloth that hangs from fingertips exerts almost
+    none.
 
     Args:
         jacobian: (3,J) ∂(tool's velocity)/∂(joint rates), m.
-        torque: (J,) of the surroundings on the joints, N·m.
+        torque: (J,) external torques on the joints, N·m.
     """
     force: FloatArray = _find_force(np.ascontiguousarray(jacobian, dtype=np.float64), torque)
     return force
@@ -33,10 +34,10 @@ def gripper_motion(
     """Returns (3,3) rows p_WT, m, v_WT, m/s, and the force on the tool, N, in W (`tool_force`).
 
     Args:
-        arm: whose.
-        q: (J,) rad.
-        rate: (J,) rad/s.
-        torque: (J,) of the surroundings on the joints, N·m.
+        arm: the arm.
+        q: (J,) joint positions, rad.
+        rate: (J,) joint rates, rad/s.
+        torque: (J,) external torques on the joints, N·m.
     """
     rows: FloatArray = _find_motion(arm.base, arm.joints, arm.tool, q, rate, torque)
     return rows

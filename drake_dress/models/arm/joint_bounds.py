@@ -1,4 +1,4 @@
-"""Joint speeds that stay within limits of position, speed and acceleration, now and later."""
+"""Bounds on joint speeds that keep limits of position, speed and acceleration, now and later."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def rate_bounds(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns lowest and highest joint speeds (J,), rad/s, for the next step.
 
-    Within them a joint can always still be stopped before its limit, so that there always are
-    some: who starts within limits and stays within these bounds never exceeds any. Where `rate`
-    leaves no such choice the joint brakes as hard as it may.
+    Within these bounds a joint can always stop before its limit, so the next step has bounds, too:
+    a joint that starts within its limits and stays within the bounds never exceeds any limit. If
+    `rate` leaves no such choice, the joint brakes as hard as it may.
 
     Args:
-        q: (J,) rad, now.
-        rate: (J,) rad/s, of the step before.
-        step: s.
-        limits: of the joints.
+        q: (J,) current positions, rad.
+        rate: (J,) rates of the previous step, rad/s.
+        step: time step, s.
+        limits: limits of the joints.
     """
     low, high = np.empty(len(q)), np.empty(len(q))
     find_rate_bounds(
@@ -41,7 +41,7 @@ def find_rate_bounds(q, rate, step, lower, upper, speed, acceleration, low, high
         low[j] = max(-speed[j], -down, rate[j] - a * step)
         high[j] = min(speed[j], up, rate[j] + a * step)
         if low[j] > high[j]:
-            # never reached from within; from without the way back comes first
+            # cannot happen from within the limits; from outside, the joint brakes first
             low[j] = high[j] = min(max(0.0, rate[j] - a * step), rate[j] + a * step)
 
 
@@ -49,9 +49,9 @@ def find_rate_bounds(q, rate, step, lower, upper, speed, acceleration, low, high
 def _stoppable(room, a, step):  # type: ignore[no-untyped-def]
     """Returns the greatest speed, rad/s, from which a joint stops within `room`, rad.
 
-    A joint that moves at v = k a h for a step h, and a h slower in each step after it, goes
-    a h² (m + 1) (k − m/2), m the whole part of k. For a whole k that is a h² k (k + 1) / 2, which
-    tells m of a way.
+    A joint that moves at v = k a h for a step h, and a h slower in each step after it, travels
+    a h² (m + 1) (k − m/2), with m the integer part of k. For an integer k that is
+    a h² k (k + 1) / 2, which gives m for a known distance.
     """
     steps = max(room, 0.0) / (a * step**2)
     m = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0))

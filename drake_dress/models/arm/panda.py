@@ -1,4 +1,4 @@
-"""The Panda by Franka Emika: geometry and limits as its maker gives them.
+"""The Panda by Franka Emika: geometry and limits from its manufacturer.
 
 Source: Franka Control Interface documentation, "Robot and interface specifications": modified
 Denavit-Hartenberg parameters (Craig) and the limits of the joints.
@@ -31,13 +31,13 @@ _GEOMETRY = np.array(
         [0.088, 0.0, 0.5 * np.pi],
     ]
 )
-# From the last joint to the flange, from there to between the fingertips of its hand, m, and how
-# far the hand is turned about the flange's axis, rad.
+# Distance from the last joint to the flange, from there to the midpoint of the hand's fingertips,
+# m, and rotation of the hand about the flange's axis, rad.
 FLANGE, FINGERTIPS, HAND_TURN = 0.107, 0.1034, -0.25 * np.pi
 
 
 def panda(base: FloatArray) -> SerialArm:
-    """Returns a Panda whose base frame is at X_WB (4,4), its hand's fingertips as the tool."""
+    """Returns a Panda with its base at X_WB (4,4); the tool is between its hand's fingertips."""
     joints = np.stack([_link(*row) for row in _GEOMETRY])
     tool = np.eye(4)
     c, s = np.cos(HAND_TURN), np.sin(HAND_TURN)
@@ -54,8 +54,8 @@ def _link(a: float, d: float, alpha: float) -> FloatArray:
     )
 
 
-# One capsule each that holds the collision mesh of a link, of the least volume: ends of its axis
-# and radius, m. The last is the hand, in its own frame.
+# The capsule of least volume that encloses each link's collision mesh: ends of its axis and radius,
+# m. The last one is the hand's, in its own frame.
 _CAPSULES = np.array(
     [
         [-0.0567, -0.0001, 0.0154, -0.0001, 0.0, 0.0514, 0.1045],

@@ -1,12 +1,12 @@
-"""Joint rates of two arms whose grippers shall move as asked (the paper's arm law).
+"""Joint rates of two arms for commanded gripper motions (the paper's arm law).
 
-The paper takes J⁺ v of a gripper's velocity and adds, in the null space of J, a motion of link 3
+The paper uses J⁺ v for a gripper's velocity v and adds, in the null space of J, a motion of link 3
 outward, away from the other arm. Here a quadratic programme does both, since a pseudoinverse knows
-no limits: grippers go exactly in the direction that is asked, as fast as asked unless a limit is in
-the way, and the joints' freedom that is left turns the hands as asked, goes outward and
-home, at explicit gains. Limits of the joints hold in any case, distances between arms and to the
-person unless joints could not stop in time. Near a singular pose grippers get slower instead
-of joints faster.
+no limits. Grippers move exactly in the commanded direction, at the commanded speed unless a limit
+prevents it. The remaining freedom of the joints turns the hands as commanded and moves the arms
+outward and home, with explicit gains. Joint limits always hold. Distances between arms and to the
+person hold unless joints cannot stop in time. Near a singular pose, grippers slow down instead of
+joints speeding up.
 """
 
 from __future__ import annotations
@@ -42,19 +42,19 @@ _NOBODY = Capsules(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
 class RateParameters(NamedTuple):
-    """Settings of the arms' control, as kernels take them: numbers alone.
+    """Settings of the arms' control: plain numbers, for compiled kernels.
 
     Attributes:
-        position_gain: of a gripper's error, 1/s. rotation_gain: of a hand's, 1/s.
-        outward_gain: of link 3 away from the other arm, 1/s (the paper has none, that is 1/s).
-        outward_distance: beyond which there is no need to, m.
-        home_gain: of joints toward those of home, 1/s.
-        max_turning: of a hand, rad/s.
-        rotation_weight: of a hand's turning beside the joints' own motion, s²/rad² · rad²/s².
-        slowdown_weight: of a gripper slower than asked, as a share.
-        least_distance: between the arms, and from arm to person, m.
-        seen_distance: from which on distances are bounded, m.
-        approach_acceleration: with which an approach ends before the least distance, m/s².
+        position_gain: gain on a gripper's position error, 1/s. rotation_gain: on a hand's, 1/s.
+        outward_gain: gain of link 3 away from the other arm, 1/s (implicitly 1/s in the paper).
+        outward_distance: distance of both links 3 beyond which they are not moved outward, m.
+        home_gain: gain of the joints toward home, 1/s.
+        max_turning: largest turning speed of a hand, rad/s.
+        rotation_weight: of a hand's turning rate, relative to joint rates, s²/rad² · rad²/s².
+        slowdown_weight: weight of a gripper's relative slowdown.
+        least_distance: least distance between the arms, and from arm to person, m.
+        seen_distance: distance below which a pair is constrained, m.
+        approach_acceleration: deceleration that ends an approach at the least distance, m/s².
     """
 
     position_gain: float = 10.0
@@ -72,7 +72,7 @@ class RateParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class GripperGoal:
-    """Where a gripper shall be.
+    """Commanded pose and velocity of a gripper.
 
     Attributes:
         position: (3,) p_WT, m. velocity: (3,) m/s. rotation: (3,3) R_WT.
@@ -85,14 +85,14 @@ class GripperGoal:
 
 @dataclass(frozen=True)
 class Rates:
-    """What the joints of both arms shall do in the next step.
+    """Joint rates of both arms for the next step.
 
     Attributes:
         rate: (2,J) rad/s, left, then right.
-        share: (2,) of the speed asked for that the grippers have.
-        between_arms: least distance of the arms, m; to_person: of each arm (2,), m; infinite where
-            nothing is near.
-        kept: whether all was kept; if not, joints brake (limits hold all the same).
+        share: (2,) fraction of the commanded speed that each gripper has.
+        between_arms: least distance of the arms, m; to_person: of each arm (2,), m; infinite if
+            there is no person.
+        kept: whether the programme was solved; if not, joints brake (their limits still hold).
     """
 
     rate: FloatArray
@@ -108,9 +108,9 @@ class ArmPair:
 
     Attributes:
         arms: left, then right. shapes: of both, hands included.
-        home: (2,J) rad, joints that they like.
-        free_links: links of an arm, from its tool back, that may touch the person: they hold the
-            garment on it.
+        home: (2,J) preferred joint positions, rad.
+        free_links: number of links, from the tool back, that may touch the person, since they hold
+            the garment on it.
         parameters: settings.
     """
 
@@ -133,14 +133,14 @@ class ArmPair:
         step: float,
         person: Capsules | None = None,
     ) -> Rates:
-        """Returns the joints' rates for the next step.
+        """Returns the joint rates for the next step.
 
         Args:
-            q: (2,J) commanded now, rad.
-            rate: (2,J) commanded in the step before, rad/s.
-            goals: of left and right gripper.
-            step: s.
-            person: where it is.
+            q: (2,J) currently commanded positions, rad.
+            rate: (2,J) rates commanded in the previous step, rad/s.
+            goals: goals of the left and the right gripper.
+            step: time step, s.
+            person: capsules of the person, if there is one.
         """
         seen = _NOBODY if person is None else person
         cost, slope, rows, upper, lower, kinds, between, to_person = _programme(
@@ -160,7 +160,7 @@ class ArmPair:
         joints = q.size
         low, high = lower[:joints], upper[:joints]
         if flag < 1 or not np.isfinite(solution).all():
-            # straight on, slower: always within the bounds
+            # brake: the rates nearest to 0 within the bounds
             still = np.clip(0.0, low, high).reshape(q.shape)
             return Rates(still, np.zeros(2), between, to_person, False)
         found = np.clip(solution[:joints], low, high).reshape(q.shape)
@@ -168,7 +168,7 @@ class ArmPair:
 
 
 class _Arm(NamedTuple):
-    """An arm as kernels take it: of `SerialArm`, its limits, and `ArmShape`."""
+    """An arm for compiled kernels: fields of `SerialArm`, its limits, and `ArmShape`."""
 
     base: FloatArray
     joints: FloatArray
@@ -198,11 +198,11 @@ def _compiled(arm: SerialArm, shape: ArmShape) -> _Arm:
 def _programme(arms, home, p, q, rate, position, velocity, rotation, step, person, free_links):  # type: ignore[no-untyped-def]
     """Returns the quadratic programme as DAQP takes it, and the least distances.
 
-    Its unknowns are the joints of left and right, and by how much each gripper is slower than
-    asked, as a share. Rows: the grippers' velocities (6), then the rates of distances.
+    Its unknowns are the joint rates of the left and the right arm, and the relative slowdown of
+    each gripper. Rows: the grippers' velocities (6), then the rates of distances.
 
-    position, velocity (2,3) and rotation (2,3,3) are of the goals; person is first (K,3), second
-    (K,3), radius (K,) of its capsules; the rest is of `ArmPair` and of `ArmPair.rates`.
+    position, velocity (2,3) and rotation (2,3,3) are the goals'; person is first (K,3), second
+    (K,3), radius (K,) of its capsules; other arguments as in `ArmPair` and `ArmPair.rates`.
     """
     n = q.shape[1]
     size = 2 * n + 2
@@ -262,7 +262,7 @@ def _programme(arms, home, p, q, rate, position, velocity, rotation, step, perso
 
 @nb.njit(cache=True, nogil=True)
 def _add_outward(links, other, p, slope):  # type: ignore[no-untyped-def]
-    """Takes from `slope` (J,) the rates that move link 3 away from that of the other arm."""
+    """Subtracts from `slope` (J,) the rates that move link 3 away from that of the other arm."""
     way = links[3, :3, 3] - other[3, :3, 3]
     apart = length(way)
     if apart >= p.outward_distance:
@@ -270,7 +270,7 @@ def _add_outward(links, other, p, slope):  # type: ignore[no-untyped-def]
     way *= p.outward_gain * (p.outward_distance - apart) / max(apart, 1e-9)
     jacobian = np.zeros((3, len(slope)))
     moved_by(links, links[3, :3, 3], 3, jacobian)
-    # damped: a stretched arm has directions in which its link 3 does not go
+    # damped: link 3 of a stretched arm cannot move in some directions
     force = np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(3), way)
     for j in range(len(slope)):
         for k in range(3):
@@ -279,10 +279,10 @@ def _add_outward(links, other, p, slope):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _keep_apart(arms, links, person, free_links, p, step, rows, least):  # type: ignore[no-untyped-def]
-    """Writes rows of distances that are seen; returns how many, and the least distances.
+    """Writes a row for each pair within `seen_distance`; returns their count, the least distances.
 
-    To rows (M,2J+2) go the rates of distances, to least (M,) the least rates, m/s, from which an
-    approach still stops; links (2,J+2,4,4); the rest is of `_programme`.
+    rows (M,2J+2) receives the rates of distances, least (M,) the lowest rates, m/s, from which an
+    approach still stops; links (2,J+2,4,4); other arguments as in `_programme`.
     """
     n = links.shape[1] - 2
     count, between = 0, np.inf
@@ -323,7 +323,7 @@ def _keep_apart(arms, links, person, free_links, p, step, rows, least):  # type:
 
 @nb.njit(cache=True, nogil=True)
 def _approach(distance, p, step):  # type: ignore[no-untyped-def]
-    """Returns the least rate of a distance, m/s: from it an approach still stops."""
+    """Returns the lowest rate of a distance, m/s, from which an approach still stops."""
     room = distance - p.least_distance
     stops = np.sqrt(2.0 * p.approach_acceleration * max(room, 0.0))
     inside = min(room, 0.0) / (10.0 * step)

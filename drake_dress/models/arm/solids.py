@@ -1,7 +1,7 @@
 """The Panda's links as solids of a few hundred triangles each, for pictures and replays.
 
-They are the collision meshes that come with the package `example-robot-data`. The hand and its
-fingers are part of the last link.
+They are the collision meshes of the package `example-robot-data`. The hand and its fingers are part
+of the last link.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import trimesh
 from drake_dress.models.arm.description import HAND_PARTS, panda_source
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# Triangles that meet at less than this are shaded as one smooth surface, rad.
+# Triangles that meet at a smaller angle are shaded as one smooth surface, rad.
 _SMOOTH = 0.6
 _LINKS = 8
 
 
 @dataclass(frozen=True)
 class LinkSolid:
-    """A link; a vertex at a crease stands once for each side of it.
+    """Mesh of a link; a vertex at a crease is repeated for each side of the crease.
 
     Attributes:
         vertices: (k,3) in the link's frame, m.
@@ -42,7 +42,7 @@ def panda_solids() -> tuple[LinkSolid, ...]:
     """Returns the base and links 1 to 7, in the frames of `SerialArm.links`.
 
     Raises:
-        FileNotFoundError: the package that has the meshes is not there.
+        FileNotFoundError: the package with the meshes has no Panda.
     """
     folder = panda_source() / "meshes" / "collision"
 

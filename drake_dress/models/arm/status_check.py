@@ -1,4 +1,4 @@
-"""Whether what an arm reports can be."""
+"""Checks whether an arm's joint reports are plausible."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from drake_dress.models.arm.chain import JointLimits
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 
-# What sensors may be beyond a limit that is kept, rad, and share of speed.
+# Tolerance of measurements: rad beyond a position limit, and multiple of a speed limit.
 _ROOM, _SHARE = 0.005, 1.05
 
 
 @dataclass(frozen=True)
 class JointReport:
-    """Joints as an arm reports them: (J,) each.
+    """Joint measurements that an arm reports: (J,) each.
 
     Attributes:
-        position: rad. velocity: rad/s. torque: of the surroundings, N·m.
-        stamp: of the report, s.
+        position: rad. velocity: rad/s. torque: external torque, N·m.
+        stamp: time stamp of the report, s.
     """
 
     position: npt.ArrayLike
@@ -32,12 +32,12 @@ class JointReport:
 
 @dataclass(frozen=True)
 class JointBounds:
-    """What a report may say.
+    """Bounds of plausible reports.
 
     Attributes:
-        limits: of the joints, (J,).
-        leap: of a joint between reports beyond what its speed limit allows, rad.
-        torque_share: of its torque limit that the surroundings may exert on a joint.
+        limits: limits of the joints, (J,).
+        leap: largest motion between reports beyond what a joint's speed limit allows, rad.
+        torque_share: largest external torque on a joint, as a multiple of its torque limit.
     """
 
     limits: JointLimits
@@ -49,9 +49,9 @@ def judge_joints(report: JointReport, before: JointReport | None, bounds: JointB
     """Returns what is wrong with a report.
 
     Args:
-        report: the new one.
-        before: the last sound one; None if there was none.
-        bounds: of what is believed.
+        report: the new report.
+        before: the last sound report; None if there was none.
+        bounds: bounds of plausible reports.
     """
     limits = bounds.limits
     q, v, t = (

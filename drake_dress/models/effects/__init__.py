@@ -1,1 +1,1 @@
-"""Physical effects that extend the model: one small object each, listed in `registry.py`."""
+"""Physical effects that extend the model; each is one small object, listed in `registry.py`."""

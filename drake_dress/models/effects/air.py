@@ -1,8 +1,8 @@
-"""Air: what it does to cloth that moves through it, and cloth that it moves past.
+"""Effects of the air: drag and wind.
 
 A triangle of area A and unit normal n that moves at velocity u relative to the air feels the
-pressure of a flat plate, f = −½ ρ C A ‖u·n‖ (u·n) n, a third at each corner (C ≈ 1.2 for a plate
-across the flow: Hoerner, "Fluid-Dynamic Drag", 1965, ch. 3). Flow along the cloth does nothing.
+pressure on a flat plate, f = −½ ρ C A ‖u·n‖ (u·n) n, a third at each corner (C ≈ 1.2 for a plate
+across the flow: Hoerner, "Fluid-Dynamic Drag", 1965, ch. 3). Flow along the cloth has no effect.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class AirDrag(ForceEffect):
 
 @dataclass(frozen=True)
 class Wind(ForceEffect):
-    """A steady wind w: the drag of a plate (C = 1.2) in it, less that in still air.
+    """A steady wind w: the drag of a plate (C = 1.2) in the wind minus that in still air.
 
-    f(v − w) − f(v) with f of the module, so that no wind is no change.
+    The force is f(v − w) − f(v) with the module's f, so that zero wind changes nothing.
 
     Args:
         x: forward component of the wind's velocity in the world frame, m/s.
@@ -59,7 +59,7 @@ class Wind(ForceEffect):
 
     @classmethod
     def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
-        """Returns 1 m/s in each direction, whose square is 1, since its pressure grows so."""
+        """Returns 1 m/s in each direction: pressure grows with the square, which is also 1."""
         return (cls(x=1.0, y=1.0, z=1.0),)
 
     def apply(self, sheet: Sheet, x: FloatArray, v: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A garment with effects, as an integrator, and the person with them."""
+"""Applies effects: to a garment, as an integrator, and to the person and the sensors."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ Kind = TypeVar("Kind", bound=Effect)
 
 
 def of_kind(effects: Sequence[Effect], kind: type[Kind]) -> list[Kind]:
-    """Returns those effects of a kind that are not off."""
+    """Returns the effects of a kind that are not off."""
     return [e for e in effects if isinstance(e, kind) and not e.is_off]
 
 
 class GarmentWithEffects:
     """An integrator of a garment on which effects act.
 
-    Effects on grippers, cameras and the person's sizes do not concern it and are passed over.
-    Friction, adhesion and strain are those of the start of the step.
+    Effects on grippers, cameras and the person's sizes are ignored here. Friction, adhesion and
+    strain are evaluated at the start of the step.
 
     Args:
         rest_position: (n,3) without effects, m.
         faces: (F,3).
         grain: (F,3) direction of the warp in the frame of `rest_position`.
-        material: without effects.
-        effects: any.
-        make: makes the integrator inside.
+        material: material without effects.
+        effects: effects of any kind.
+        make: makes the inner integrator.
     """
 
     def __init__(
@@ -155,31 +155,31 @@ def body_with_effects(measures: BodyMeasures, effects: Sequence[Effect]) -> Body
 
 
 def seen_points(position: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-    """Returns where cameras with these effects report points (…,3), m."""
+    """Returns the positions that cameras with these effects report for world points (…,3), m."""
     for effect in of_kind(effects, CameraEffect):
         position = effect.apply(position)
     return position
 
 
 def world_points(position: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-    """Returns where points (…,3), m, that cameras with these effects report are."""
+    """Returns the world points of positions (…,3), m, that cameras with these effects report."""
     for effect in reversed(of_kind(effects, CameraEffect)):
         position = effect.inverse(position)
     return position
 
 
 def seen_rates(rate: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-    """Returns what cameras with these effects report of velocities (…,3), m/s."""
+    """Returns the velocities that cameras with these effects report for true ones (…,3), m/s."""
     return seen_points(rate, effects) - seen_points(np.zeros(3), effects)
 
 
 def world_rates(rate: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-    """Returns the velocities (…,3), m/s, that cameras with these effects report as `rate`."""
+    """Returns the true velocities (…,3), m/s, that cameras with these effects report as `rate`."""
     return world_points(rate, effects) - world_points(np.zeros(3), effects)
 
 
 def true_times(time: FloatArray, effects: Sequence[Effect], name: str) -> FloatArray:
-    """Returns what the clock effect called `name` makes of times, s."""
+    """Returns times, s, after the clock effect called `name`."""
     for effect in of_kind(effects, ClockEffect):
         if name == effect.NAME:
             time = effect.apply(time)
@@ -215,10 +215,10 @@ def _tangential(vector: FloatArray, normal: FloatArray) -> FloatArray:
 
 
 def _warp_map(sheet: Sheet) -> sp.csr_array:
-    """Returns W (n,n): W x is along the warp at the nodes, weighted by the triangles' areas.
+    """Returns W (n,n) such that W x is along the warp at the nodes, weighted by triangle areas.
 
-    A triangle's warp is F u, where u, its warp in its own frame, does not change, and F is linear
-    in its corners.
+    A triangle's warp is F u. Its warp u in its own frame is constant, and F is linear in its
+    corners.
     """
     e = sheet.elements
     frame = np.einsum("eia,eic->eac", e.triangle_gradient, sheet.rest_position[e.triangle])

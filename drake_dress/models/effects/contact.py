@@ -1,4 +1,4 @@
-"""Contact between garment and person: how it rubs and how it clings."""
+"""Effects on contact between garment and person: friction and adhesion."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from drake_dress.models.effects.effect import (
     parameter,
 )
 
-# Below this speed, m/s, the direction of sliding is that in which friction holds.
+# Below this speed, m/s, the direction of sliding is taken from the friction force.
 _CREEP = 2e-3
 
 
 @dataclass(frozen=True)
 class Friction(MaterialEffect):
-    """Another Coulomb coefficient: μ' = μ + added.
+    """A different Coulomb coefficient: μ' = μ + added.
 
     Args:
         added: change of the coefficient of friction.
@@ -58,7 +58,7 @@ class VelocityDependentFriction(FrictionEffect):
     rate: float = parameter("s/m", -5.0, 20.0, 2.0)
 
     def apply(self, friction: float, sliding: Sliding) -> FloatArray:
-        """Returns what is added to μ, (c,)."""
+        """Returns the change of μ, (c,)."""
         return np.maximum(self.rate * norms(sliding.velocity), -friction)
 
     def derivative(self, name: str, friction: float, sliding: Sliding) -> FloatArray:
@@ -71,19 +71,19 @@ class VelocityDependentFriction(FrictionEffect):
 class AnisotropicFriction(FrictionEffect):
     """Friction depends on the direction in which the cloth slides: μ(φ) = μ (1 + a cos 2φ).
 
-    φ is the angle from the warp to the velocity, or to the force where the node hardly moves; the
-    cone is an orthotropic one to first order (Zmitrowicz 2006, "Models of kinematics dependent
+    φ is the angle from the warp to the velocity, or to the force if the node hardly moves. The
+    friction cone is orthotropic to first order (Zmitrowicz 2006, "Models of kinematics dependent
     anisotropic and heterogeneous friction").
 
     Args:
-        contrast: a, positive where sliding along the warp meets more friction.
+        contrast: contrast a, positive if sliding along the warp meets more friction.
     """
 
     NAME = "anisotropic_friction"
     contrast: float = parameter("1", -1.0, 1.0, 0.75)
 
     def apply(self, friction: float, sliding: Sliding) -> FloatArray:
-        """Returns what is added to μ, (c,)."""
+        """Returns the change of μ, (c,)."""
         return self.contrast * self.derivative("contrast", friction, sliding)
 
     def derivative(self, name: str, friction: float, sliding: Sliding) -> FloatArray:

@@ -1,13 +1,13 @@
-"""What an effect has to be, and whether one is.
+"""The contract of an effect, and its checks.
 
 `check_class` looks at the class alone and is quick: registration calls it. `check_effect` also
-calls the effect on a sample of what its kind acts on:
+calls the effect on sample arguments of its kind:
 
     off          with all sizes 0 it changes nothing
-    pure         the same arguments give the same, finite result, and are left as they are
+    pure         the same arguments give the same, finite result, and are not modified
     derivative   agrees with central differences, for every parameter
-    bounds       values beyond them are refused
-    search       what is tried and what is drawn for generated data is within them, and not off
+    bounds       values outside them are refused
+    search       the effects of `starts` and `draw` are within the bounds, and not off
 """
 
 from __future__ import annotations
@@ -64,25 +64,25 @@ KINDS: tuple[type[Effect], ...] = (
     MountEffect,
 )
 
-# Kinds whose `apply` gives what it is given, changed.
+# Kinds whose `apply` returns its argument, changed.
 _CHANGING = (MaterialEffect, ShapeEffect, GravityEffect, BodyEffect, ClockEffect, CameraEffect)
 
-# Parameters are checked at this share of their typical size.
+# Parameters are checked at this fraction of their typical size.
 _SHARE = 0.8
-# Step of the differences, in typical sizes, and how far derivatives may be off, relative to the
+# Step of the differences, in typical sizes, and largest error of derivatives, relative to the
 # largest of them.
 _STEP, _AGREEMENT = 1e-5, 1e-4
-# Rounding of a result this large, relative, is no derivative.
+# Differences below this times the result are rounding errors, not derivatives.
 _ROUNDING = 1e-6
-# What turning there and back may change, m.
+# Largest change by `apply` followed by `inverse`, m.
 _THERE_AND_BACK = 1e-9
 
 
 def check_class(kind: type[Effect]) -> None:
-    """Holds a class against what an effect is, without calling it.
+    """Checks a class against the contract without calling it.
 
     Raises:
-        UserError: says what is wrong with it.
+        UserError: it breaks the contract; the message says how.
     """
     if not (isinstance(kind, type) and issubclass(kind, KINDS)):
         listed = ", ".join(k.__name__ for k in KINDS[:-2])
@@ -115,10 +115,10 @@ def check_class(kind: type[Effect]) -> None:
 
 
 def check_effect(kind: type[Effect]) -> None:
-    """Holds an effect against all that it has to be; for a test of its author's.
+    """Checks an effect against the whole contract; for the tests of its author.
 
     Raises:
-        UserError: says what is wrong with it.
+        UserError: it breaks the contract; the message says how.
     """
     check_class(kind)
     source, given = f"effect {kind.__name__}", sample_of(kind)
@@ -136,12 +136,12 @@ def check_effect(kind: type[Effect]) -> None:
 
 
 def sample_of(kind: type[Effect]) -> tuple[Any, ...]:
-    """Returns arguments of `apply` for an effect of this kind, the same each time."""
+    """Returns arguments of `apply` for an effect of this kind, the same for each call."""
     return next(make for base, make in _SAMPLES.items() if issubclass(kind, base))()
 
 
 def _check_parameter(source: str, p: Parameter) -> None:
-    """Holds one parameter's name, unit and bounds against each other."""
+    """Checks a parameter's name, unit, bounds, default and typical size."""
     if not is_name(p.name) or p.name.endswith("_std"):
         raise UserError(
             source, p.name, "is no name of a parameter, expected lower case, not ending in _std"
@@ -176,7 +176,7 @@ def _check_bounds(source: str, kind: type[Effect]) -> None:
 
 
 def _check_off(source: str, kind: type[Effect], given: tuple[Any, ...]) -> None:
-    """Holds an effect against its kind: with sizes 0, `apply` gives what changes nothing."""
+    """Checks that `apply` changes nothing with all sizes 0."""
     off: Any = kind()
     if not off.is_off:
         raise UserError(source, "is_off", "is False with all sizes 0, expected True")
@@ -191,7 +191,7 @@ def _check_off(source: str, kind: type[Effect], given: tuple[Any, ...]) -> None:
 
 
 def _check_purity(source: str, effect: Any, given: tuple[Any, ...]) -> None:
-    """Calls `apply` twice on copies: results are alike, and the copies as they were."""
+    """Checks that two calls of `apply` agree and do not modify their arguments."""
     lent = copy.deepcopy(given)
     first, second = (_numbers(effect.apply(*lent)) for _ in range(2))
     expected = _shape(effect, given)
@@ -212,7 +212,7 @@ def _check_purity(source: str, effect: Any, given: tuple[Any, ...]) -> None:
 
 
 def _check_derivative(source: str, effect: Any, p: Parameter, given: tuple[Any, ...]) -> None:
-    """Holds the derivative by one parameter against central differences."""
+    """Checks the derivative by one parameter against central differences."""
     h, value = _STEP * p.typical, getattr(effect, p.name)
     above, below = (
         dataclasses.replace(effect, **{p.name: value + step}).apply(*given) for step in (h, -h)
@@ -254,7 +254,7 @@ def _check_search(source: str, kind: type[Effect]) -> None:
 
 
 def _shape(effect: Effect, given: tuple[Any, ...]) -> tuple[int, ...]:
-    """Returns the shape of what `apply` of this kind gives, as numbers."""
+    """Returns the shape of the result of `apply`, as an array of numbers."""
     if isinstance(effect, MassEffect | AdhesionEffect):
         return (given[0].elements.node_count,)
     if isinstance(effect, FibreEffect):
@@ -265,14 +265,14 @@ def _shape(effect: Effect, given: tuple[Any, ...]) -> tuple[int, ...]:
 
 
 def _numbers(value: Any) -> FloatArray:
-    """Returns what `apply` gives as an array; fields of settings in their order."""
+    """Returns a result of `apply` as an array; the fields of a dataclass in their order."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = [float(v) for v in dataclasses.asdict(value).values()]
     return np.asarray(value, dtype=np.float64)
 
 
 def _slope_numbers(slope: Any, value: Any) -> FloatArray:
-    """Returns a derivative as an array; of settings it names the fields that change."""
+    """Returns a derivative as an array; that of a dataclass maps changed fields to slopes."""
     if isinstance(slope, Mapping):
         slope = [slope.get(f.name, 0.0) for f in dataclasses.fields(value)]
     return np.asarray(slope, dtype=np.float64)
@@ -292,7 +292,7 @@ def _name(kind: Any) -> str:
 
 
 def _sheet() -> Sheet:
-    """Returns a vertical sheet of 20 by 28 cm whose warp runs down."""
+    """Returns a vertical sheet of 20 by 28 cm with the warp running down."""
     columns, rows, spacing = 6, 8, 0.04
     i, k = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
     rest = np.stack([i * spacing, np.zeros(i.shape), -k * spacing], axis=2).reshape(-1, 3)

@@ -1,8 +1,8 @@
-"""What a physical effect is: a few numbers in SI units that change one thing about the model.
+"""Interface of physical effects: a few parameters in SI units that change one part of the model.
 
-An effect whose sizes are all 0 changes nothing. Each kind below enters at one place;
-`composition.py` puts them together. `apply` gives the effect itself, `derivative` the derivative of
-what `apply` returns by one parameter, given the same arguments. `contract.py` checks all that.
+An effect whose sizes are all 0 changes nothing. Each kind below enters the model at one place;
+`composition.py` combines them. `apply` returns the effect itself. `derivative` returns the
+derivative of that result by one parameter, for the same arguments. `contract.py` checks all this.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from drake_dress.models.human.body import BodyMeasures
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect.
+    """A parameter of an effect.
 
     Attributes:
-        name: of the effect's field.
-        unit: SI.
-        low, high: bounds, both allowed.
+        name: name of the effect's field.
+        unit: SI unit.
+        low, high: bounds, inclusive.
         typical: a size that matters in a lab, for steps and plots.
-        off: its value where none is given. With all parameters at it, the effect does nothing.
-        shapes: whether it only says where or how the other parameters act, such as a place or a
-            threshold. It neither switches the effect on nor is screened by itself.
+        off: default value. With all parameters at their defaults the effect does nothing.
+        shapes: whether it only sets where or how the other parameters act, such as a place or a
+            threshold. Such a parameter does not switch the effect on and is not screened alone.
     """
 
     name: str
@@ -48,12 +48,12 @@ def parameter(
     """Returns a dataclass field for a parameter; see `Parameter`.
 
     Args:
-        unit: SI; "1" for a pure number.
-        low: least value.
+        unit: SI unit; "1" for a pure number.
+        low: smallest value.
         high: largest value.
         typical: a size that matters in a lab.
         shape: default of a parameter that only shapes the effect. Without it the parameter is a
-            size, whose default is 0, and 0 switches the effect off.
+            size: its default is 0, which switches the effect off.
     """
     shapes = shape is not None
     off = 0.0 if shape is None else float(shape)
@@ -66,12 +66,12 @@ class Effect:
     """A physical effect; its fields are its parameters.
 
     Class attributes:
-        NAME: in scenarios and explanations.
-        IN_WORDS: of the effect in a report; by default its name.
-        NEEDS_CONTACT: whether it shows only where the garment touches the person.
+        NAME: name in scenarios and explanations.
+        IN_WORDS: description of the effect in a report; by default its name.
+        NEEDS_CONTACT: whether it acts only where the garment touches the person.
 
     Raises:
-        ValueError: a parameter is not finite or outside its bounds.
+        ValueError: a parameter is not finite or is outside its bounds.
     """
 
     NAME: ClassVar[str]
@@ -88,17 +88,17 @@ class Effect:
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
-        """Returns what its fields mean, in their order."""
+        """Returns the descriptions of its fields, in order."""
         return tuple(Parameter(f.name, **f.metadata) for f in fields(cls) if f.metadata)
 
     @classmethod
     def sizes(cls) -> tuple[Parameter, ...]:
-        """Returns the parameters that say how strong it is."""
+        """Returns the parameters that set its strength."""
         return tuple(p for p in cls.parameters() if not p.shapes)
 
     @classmethod
     def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
-        """Returns the effects that a search tries; each differs in what shapes it.
+        """Returns the effects that a search starts from, which differ in their shape parameters.
 
         By default there is one, of typical size.
 
@@ -109,10 +109,10 @@ class Effect:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, size: float) -> dict[str, float]:
-        """Returns parameters at `size` times what matters, for data in which it is hidden.
+        """Returns random parameters, scaled by `size`, for generated data with a hidden effect.
 
-        By default each size is 1 to 2 times its typical value, of either sign, as the bounds allow,
-        and what shapes the effect has its default.
+        By default each size is 1 to 2 times its typical value, of either sign, as the bounds allow.
+        Shape parameters keep their defaults.
         """
         drawn = {}
         for p in cls.sizes():
@@ -128,16 +128,16 @@ class Effect:
 
     @property
     def is_off(self) -> bool:
-        """Whether it changes nothing."""
+        """Whether the effect changes nothing."""
         return all(getattr(self, p.name) == p.off for p in self.sizes())
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The garment as effects see it.
+    """The garment's data for effects.
 
     Attributes:
-        elements: of the rest shape.
+        elements: elements of the rest shape.
         rest_position: (n,3) in the garment's frame, m.
         grain: (F,3) direction of the warp in the garment's frame, of any length.
     """
@@ -153,9 +153,9 @@ class Sliding:
 
     Attributes:
         nodes: (c,) indices.
-        velocity: (c,3) tangential, relative to the surface, m/s.
-        force: (c,3) tangential, of the surface on the node in the last step, N.
-        grain: (c,3) unit, along the warp as the garment lies.
+        velocity: (c,3) tangential velocity relative to the surface, m/s.
+        force: (c,3) tangential force of the surface on the node in the last step, N.
+        grain: (c,3) unit vector along the warp in the current configuration.
     """
 
     nodes: IntArray
@@ -165,7 +165,7 @@ class Sliding:
 
 
 class MaterialEffect(Effect):
-    """Changes a value of the fabric."""
+    """Changes a material value of the fabric."""
 
     def apply(self, material: Material) -> Material:
         """Returns the fabric with the effect."""
@@ -225,10 +225,10 @@ class FibreEffect(Effect):
 
 
 class StretchEffect(Effect):
-    """Makes stretch stiffness depend on strain."""
+    """Makes the stretch stiffness depend on strain."""
 
     def apply(self, strain: FloatArray) -> FloatArray:
-        """Returns the factor (F,) on the stiffness of triangles whose largest strain is given."""
+        """Returns the factor (F,) on the stiffness of triangles with largest strain `strain`."""
         raise NotImplementedError
 
     def derivative(self, name: str, strain: FloatArray) -> FloatArray:
@@ -237,7 +237,7 @@ class StretchEffect(Effect):
 
 
 class ForceEffect(Effect):
-    """Acts on the nodes."""
+    """Adds a force on the nodes."""
 
     def apply(self, sheet: Sheet, x: FloatArray, v: FloatArray) -> FloatArray:
         """Returns the force (n,3), N, at positions and velocities (n,3), m, m/s."""
@@ -254,7 +254,7 @@ class FrictionEffect(Effect):
     NEEDS_CONTACT = True
 
     def apply(self, friction: float, sliding: Sliding) -> FloatArray:
-        """Returns what is added to the fabric's coefficient `friction`, (c,)."""
+        """Returns the change of the fabric's coefficient `friction`, (c,)."""
         raise NotImplementedError
 
     def derivative(self, name: str, friction: float, sliding: Sliding) -> FloatArray:
@@ -263,12 +263,12 @@ class FrictionEffect(Effect):
 
 
 class AdhesionEffect(Effect):
-    """Makes nodes in contact stick to it."""
+    """Makes nodes in contact adhere."""
 
     NEEDS_CONTACT = True
 
     def apply(self, sheet: Sheet) -> FloatArray:
-        """Returns the pull (n,) that each node's contact bears, N."""
+        """Returns the pull (n,) that the contact of each node bears, N."""
         raise NotImplementedError
 
     def derivative(self, name: str, sheet: Sheet) -> FloatArray:
@@ -282,7 +282,7 @@ class BodyEffect(Effect):
     NEEDS_CONTACT = True
 
     def apply(self, measures: BodyMeasures) -> BodyMeasures:
-        """Returns the sizes."""
+        """Returns the sizes with the effect."""
         raise NotImplementedError
 
     def derivative(self, name: str, measures: BodyMeasures) -> dict[str, float]:
@@ -291,26 +291,26 @@ class BodyEffect(Effect):
 
 
 class ClockEffect(Effect):
-    """Lets what happens at a recorded time have happened earlier."""
+    """Shifts recorded time stamps."""
 
     def apply(self, time: FloatArray) -> FloatArray:
-        """Returns the true times, s, of recorded ones."""
+        """Returns the true times, s, of recorded time stamps."""
         raise NotImplementedError
 
     def derivative(self, name: str, time: FloatArray) -> FloatArray:
-        """Returns as `time`."""
+        """Returns an array of the shape of `time`."""
         raise NotImplementedError
 
 
 class CameraEffect(Effect):
-    """Lets cameras see points elsewhere."""
+    """Displaces the points that cameras report."""
 
     def apply(self, position: FloatArray) -> FloatArray:
-        """Returns where cameras report points (…,3), m, of the world."""
+        """Returns the positions that cameras report for world points (…,3), m."""
         raise NotImplementedError
 
     def inverse(self, position: FloatArray) -> FloatArray:
-        """Returns where points (…,3), m, that cameras report are in the world."""
+        """Returns the world points of positions (…,3), m, that cameras report."""
         raise NotImplementedError
 
     def derivative(self, name: str, position: FloatArray) -> FloatArray:
@@ -319,10 +319,10 @@ class CameraEffect(Effect):
 
 
 class MountEffect(Effect):
-    """Lets what the garment pulls at give way: `apply` is its speed or its rest deflection."""
+    """Makes grippers or limbs yield to the garment's pull."""
 
     def apply(self, force: FloatArray) -> FloatArray:
-        """Returns (…,3) for forces (…,3) of the garment, N."""
+        """Returns the speed or the rest deflection (…,3) under forces (…,3) of the garment, N."""
         raise NotImplementedError
 
     def derivative(self, name: str, force: FloatArray) -> FloatArray:

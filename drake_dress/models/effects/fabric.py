@@ -1,4 +1,4 @@
-"""The fabric: other values than the model's, and laws that one stiffness cannot express."""
+"""Effects on the fabric: changed material values, and laws beyond a single stiffness."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from drake_dress.models.effects.effect import (
 
 @dataclass(frozen=True)
 class StretchStiffness(MaterialEffect):
-    """The cloth is stiffer against stretch: k' = k + added.
+    """The cloth is stiffer in stretch: k' = k + added.
 
     Args:
         added: change of the stretch stiffness, N/m.
@@ -42,7 +42,7 @@ class StretchStiffness(MaterialEffect):
 
 @dataclass(frozen=True)
 class BendingStiffness(MaterialEffect):
-    """The cloth is stiffer against bending: B' = B + added.
+    """The cloth is stiffer in bending: B' = B + added.
 
     Args:
         added: change of the bending stiffness, N·m.
@@ -64,7 +64,7 @@ class BendingStiffness(MaterialEffect):
 
 @dataclass(frozen=True)
 class InternalDamping(MaterialEffect):
-    """Deformation costs energy: β' = β + added, damping forces β K₊ v (Rayleigh).
+    """Deformation dissipates energy: β' = β + added, damping forces β K₊ v (Rayleigh).
 
     Args:
         added: change of the damping time, s.
@@ -104,7 +104,7 @@ class RestSize(ShapeEffect):
 
 @dataclass(frozen=True)
 class AnisotropicStiffness(FibreEffect):
-    """The warp is stiffer than the weft: ½ k_a A (‖F d‖ − 1)² more a triangle, d along the grain.
+    """The warp is stiffer than the weft: adds ½ k_a A (‖F d‖ − 1)² per triangle, d along the grain.
 
     Fabrics are orthotropic (Kawabata, "The standardization and analysis of hand evaluation", 1980).
 
@@ -128,7 +128,7 @@ class AnisotropicStiffness(FibreEffect):
 class StrainStiffening(StretchEffect):
     """Yarns straighten before they stretch: k(ε) = k (1 + c ε), ε the larger principal strain.
 
-    In compression (ε ≤ 0) k stays. (The tensile curve of Kawabata 1980 to first order.)
+    In compression (ε ≤ 0) k is unchanged. (The tensile curve of Kawabata 1980 to first order.)
 
     Args:
         rate: c, relative increase of stiffness per unit strain.

@@ -1,4 +1,4 @@
-"""The grippers: late, yielding, or not holding fast."""
+"""Effects on the grippers: latency, compliance and slip."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drake_dress.models.effects.effect import ClockEffect, MountEffect, norms, p
 
 @dataclass(frozen=True)
 class GripperLatency(ClockEffect):
-    """Grippers are later than they report: at time t they are where they say to be at t − delay.
+    """Grippers lag their reports: at time t they are at the position reported for t − delay.
 
     Args:
         delay: delay of the grippers behind their report, s.
@@ -22,17 +22,17 @@ class GripperLatency(ClockEffect):
     delay: float = parameter("s", -0.1, 0.5, 0.04)
 
     def apply(self, time: FloatArray) -> FloatArray:
-        """Returns the times, s, whose reported positions hold at `time`."""
+        """Returns the times, s, whose reported positions are the true ones at `time`."""
         return time - self.delay
 
     def derivative(self, name: str, time: FloatArray) -> FloatArray:
-        """Returns −1 a time."""
+        """Returns −1 for each time."""
         return np.full_like(time, -1.0)
 
 
 @dataclass(frozen=True)
 class GripperCompliance(MountEffect):
-    """A gripper gives way by c times the force on it, on a critically damped mount; see `mounts`.
+    """A gripper yields by c times the force on it, on a critically damped mount; see `mounts`.
 
     Args:
         compliance: c, displacement of a gripper per force, m/N.
@@ -42,7 +42,7 @@ class GripperCompliance(MountEffect):
     compliance: float = parameter("m/N", 0.0, 0.1, 0.006)
 
     def apply(self, force: FloatArray) -> FloatArray:
-        """Returns where the gripper rests, (…,3) m, under forces (…,3), N."""
+        """Returns the gripper's rest deflection (…,3), m, under forces (…,3), N."""
         return self.compliance * force
 
     def derivative(self, name: str, force: FloatArray) -> FloatArray:
@@ -52,7 +52,7 @@ class GripperCompliance(MountEffect):
 
 @dataclass(frozen=True)
 class GripperSlip(MountEffect):
-    """Cloth creeps out of a gripper: it slides along the pull at speed c (‖f‖ − f₀), if positive.
+    """Cloth creeps out of a gripper: it slides along the pull at speed max(0, c (‖f‖ − f₀)).
 
     Args:
         rate: c, sliding speed per force beyond the threshold, m/(N·s).
@@ -64,7 +64,7 @@ class GripperSlip(MountEffect):
     threshold: float = parameter("N", 0.0, 50.0, 0.5, shape=0.0)
 
     def apply(self, force: FloatArray) -> FloatArray:
-        """Returns the speed (…,3), m/s, under forces (…,3), N."""
+        """Returns the sliding velocity (…,3), m/s, under forces (…,3), N."""
         return self.rate * self.derivative("rate", force)
 
     def derivative(self, name: str, force: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Mass and weight: a heavier cloth, a thing in a pocket, a floor that is not level."""
+"""Effects on mass and weight: a heavier cloth, an object in a pocket, a floor that is not level."""
 
 from __future__ import annotations
 
@@ -46,10 +46,11 @@ class SurfaceDensity(MaterialEffect):
 
 @dataclass(frozen=True)
 class LocalMass(MassEffect):
-    """A mass somewhere on the garment, such as a pocket with something in it.
+    """A mass at a place on the garment, such as an object in a pocket.
 
-    It is spread over the nodes by the weight exp(−d² / 2σ²) times their area, d the distance in the
-    rest shape from the given point, σ = 5 cm; the sum is the mass, the centre of it near the point.
+    It is spread over the nodes in proportion to exp(−d² / 2σ²) times their area, with d the
+    distance from the given point in the rest shape and σ = 5 cm. The sum is the mass, and its
+    centre lies near the point.
 
     Args:
         mass: additional mass, kg.
@@ -66,7 +67,7 @@ class LocalMass(MassEffect):
 
     @classmethod
     def starts(cls, rest_position: FloatArray) -> tuple[Self, ...]:
-        """Returns it at places all over the garment."""
+        """Returns the effect at places all over the garment."""
         lowest = int(np.argmin(rest_position[:, 2]))
         places = rest_position[spread_out(rest_position, _PLACES, lowest)].tolist()
         return tuple(cls(mass=_TRIED, x=x, y=y, z=z) for x, y, z in places)
@@ -90,7 +91,7 @@ class LocalMass(MassEffect):
 
     def _share(self, sheet: Sheet) -> FloatArray:
         distance2 = np.sum((sheet.rest_position - self._point) ** 2, axis=1)
-        # relative to the nearest node, so that a point off the garment still has one
+        # relative to the nearest node, so that weights do not underflow for a point far away
         weight = sheet.elements.node_area * np.exp(
             -0.5 * (distance2 - distance2.min()) / _SPREAD**2
         )
@@ -118,7 +119,7 @@ class GravityTilt(GravityEffect):
 
     def derivative(self, name: str, gravity: FloatArray) -> FloatArray:
         """Returns (3,)."""
-        # the derivative of a rotation about an axis is a quarter turn further, less what lies on it
+        # the derivative of a rotation is a quarter turn further, minus the part along the axis
         quarter = 0.5 * np.pi
         if name == "about_x":
             off = np.diag([1.0, 0.0, 0.0])

@@ -1,11 +1,12 @@
-"""Grippers and limbs that give way under the garment's pull.
+"""Grippers and limbs that yield to the garment's pull.
 
 A yielding mount follows u'' = (c f − u) / τ² − 2 u' / τ: critically damped about its rest
-deflection c f, with a time constant τ that stands for its mass and damping. Integrated implicitly
-in u, and in the force as far as that is known: the garment that a gripper moves within a step, of
-mass S, pulls by S times less the more the gripper gives way to it. With the force of the step
-before alone a garment heavier than the mount, τ² / c, would swing up however short the steps are.
-Cloth that slips in a gripper is displaced further, at a speed that depends on the pull.
+deflection c f, with a time constant τ that stands for its mass and damping. It is integrated
+implicitly in u, and in the force as far as that is known: with S the garment mass that a gripper
+moves within a step, the pull falls by S times the gripper's acceleration in excess of the previous
+one. With the force of the previous step alone, a garment heavier than the mount, τ² / c, would be
+unstable for any time step. Cloth that slips in a gripper is displaced further, at a speed that
+depends on the pull.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ GRIPPER_TIME, LIMB_TIME = 0.03, 0.05
 
 @dataclass(frozen=True)
 class MountState:
-    """Where mounts are relative to where they should be.
+    """Deflections of the mounts.
 
     Attributes:
-        gripper, gripper_rate: (2,3) of the left and the right gripper, m, m/s.
-        gripper_change: (2,3) of that rate in the last step, m/s.
-        slip: (2,3) of the cloth in them, m.
-        limb, limb_rate: (b,3) of the limbs, m, m/s.
+        gripper, gripper_rate: (2,3) deflections of the left and the right gripper, m, m/s.
+        gripper_change: (2,3) change of that rate in the last step, m/s.
+        slip: (2,3) displacement of the cloth in the grippers, m.
+        limb, limb_rate: (b,3) deflections of the limbs, m, m/s.
     """
 
     gripper: FloatArray
@@ -49,28 +50,28 @@ class MountState:
 
     @staticmethod
     def at_rest(limbs: int) -> MountState:
-        """Returns mounts of `limbs` limbs without load."""
+        """Returns unloaded mounts with `limbs` limbs."""
         z, b = np.zeros((2, 3)), np.zeros((limbs, 3))
         return MountState(z, z, z, z, b, b)
 
     def flat(self) -> FloatArray:
-        """Returns all as one vector (24 + 6b,)."""
+        """Returns the state as one vector (24 + 6b,)."""
         grippers = (self.gripper, self.gripper_rate, self.gripper_change, self.slip)
         return np.concatenate([p.ravel() for p in (*grippers, self.limb, self.limb_rate)])
 
     @staticmethod
     def of(flat: FloatArray) -> MountState:
-        """Returns what `flat` gave."""
+        """Returns the state from the vector that `flat` returned."""
         return MountState(*flat[:24].reshape(4, 2, 3), *flat[24:].reshape(2, -1, 3))
 
     @property
     def held(self) -> FloatArray:
-        """Displacement (2,3) of what grippers hold from where the grippers report to be, m."""
+        """Displacement (2,3) of the held cloth from the reported gripper positions, m."""
         return self.gripper + self.slip
 
 
 class Mounts:
-    """What of grippers and limbs gives way, by the effects given; all others are passed over."""
+    """Yielding grippers and limbs, from the given effects; other effects are ignored."""
 
     def __init__(self, effects: Sequence[Effect]) -> None:
         self._gripper: GripperCompliance | None = None
@@ -88,25 +89,28 @@ class Mounts:
 
     @property
     def rigid(self) -> bool:
-        """Whether nothing gives way."""
+        """Whether nothing yields."""
         return self._gripper is None and self._limb is None and self._slip is None
 
     def loaded(self, displacement: FloatArray, limbs: int) -> MountState:
-        """Returns mounts at rest whose grippers hold the garment (2,3) m from where they report."""
+        """Returns mounts at rest whose held cloth is displaced from the reported grippers (2,3), m.
+
+        The displacement counts as deflection if the grippers yield, else as slip if there is slip.
+        """
         state = MountState.at_rest(limbs)
         if self._gripper is not None:
             return replace(state, gripper=displacement)
         return state if self._slip is None else replace(state, slip=displacement)
 
     def moved_mass(self, cloth: Integrator, side: IntArray) -> FloatArray:
-        """Returns (2,) what each gripper moves of a garment within a step, kg, at most.
+        """Returns (2,) upper bounds of the garment's mass that each gripper moves in a step, kg.
 
         That is 1ᵀ(P_hh − P_hf P_ff⁻¹ P_fh) 1 with P ≥ M + h² K, h held and f free nodes; zeros
-        where no gripper gives way.
+        if the grippers do not yield.
 
         Args:
             cloth: the garment.
-            side: (k,) gripper of its held nodes.
+            side: (k,) gripper of each held node.
         """
         moved = np.zeros(2)
         if self._gripper is None:
@@ -135,11 +139,11 @@ class Mounts:
         """Returns the state `h` s later.
 
         Args:
-            state: now.
-            gripper_force: (2,3) of the garment on the grippers, N.
-            limb_force: (b,3) of the garment on the limbs, N.
-            h: s.
-            moved_mass: (2,) of the garment by each gripper, kg; none by default.
+            state: current state.
+            gripper_force: (2,3) force of the garment on the grippers, N.
+            limb_force: (b,3) force of the garment on the limbs, N.
+            h: time step, s.
+            moved_mass: (2,) garment mass that each gripper moves, kg; none by default.
         """
         gripper, gripper_rate = state.gripper, state.gripper_rate
         if self._gripper is not None:
@@ -165,10 +169,10 @@ def limb_forces(limb: IntArray, count: int, owner: IntArray, reaction: FloatArra
     """Returns (count,3) the force of the garment on each limb, N.
 
     Args:
-        limb: (c,) which limb a body is of, −1 for none.
-        count: of limbs.
-        owner: (n,) body that a node touches, −1 without.
-        reaction: (n,3) of the bodies on the nodes, N.
+        limb: (c,) limb that each body belongs to, −1 for none.
+        count: number of limbs.
+        owner: (n,) body that each node touches, −1 for none.
+        reaction: (n,3) force of the bodies on the nodes, N.
     """
     force = np.zeros((count, 3))
     rows = np.flatnonzero(owner >= 0)
@@ -180,7 +184,7 @@ def limb_forces(limb: IntArray, count: int, owner: IntArray, reaction: FloatArra
 def displaced(
     bodies: Obstacles, limb: IntArray, displacement: FloatArray, rate: FloatArray
 ) -> Obstacles:
-    """Returns bodies with those of limb k displaced by row k of (b,3), m, at (b,3), m/s."""
+    """Returns the bodies, those of limb k displaced by row k of (b,3), m, with rate (b,3), m/s."""
     rows = limb >= 0
     u, w = np.zeros_like(bodies.a), np.zeros_like(bodies.a)
     u[rows], w[rows] = displacement[limb[rows]], rate[limb[rows]]
@@ -196,16 +200,16 @@ def _settle(
     inertia: FloatArray | float = 0.0,
     ahead: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns displacement and rate a step on.
+    """Returns displacement and rate one step later.
 
     Args:
         u: displacement, m.
-        rate: of it, m/s.
-        rest: displacement at rest under the force of the step before, m.
-        tau: s.
-        h: s.
-        inertia: of what is moved over that of the mount.
-        ahead: rate with which the force of the step before goes on, m/s.
+        rate: rate of the displacement, m/s.
+        rest: displacement at rest under the force of the previous step, m.
+        tau: time constant, s.
+        h: time step, s.
+        inertia: moved mass over the mass of the mount.
+        ahead: rate at the end of this step for which the previous force would hold, m/s.
     """
     a = h / tau
     after = (rate + inertia * ahead + a / tau * (rest - u)) / (1.0 + inertia + 2.0 * a + a * a)

@@ -1,4 +1,4 @@
-"""The person: limbs that are thicker than thought, or that give way."""
+"""Effects on the person: thicker limbs, and limbs that yield."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class LimbRadius(BodyEffect):
 
 @dataclass(frozen=True)
 class LimbCompliance(MountEffect):
-    """A limb gives way by c times the force on it, on a critically damped mount; see `mounts`.
+    """A limb yields by c times the force on it, on a critically damped mount; see `mounts`.
 
     Args:
         compliance: c, displacement of each upper arm and forearm per force, m/N.
@@ -45,7 +45,7 @@ class LimbCompliance(MountEffect):
     compliance: float = parameter("m/N", 0.0, 0.2, 0.025)
 
     def apply(self, force: FloatArray) -> FloatArray:
-        """Returns where the limb rests, (…,3) m, under forces (…,3), N."""
+        """Returns the limb's rest deflection (…,3), m, under forces (…,3), N."""
         return self.compliance * force
 
     def derivative(self, name: str, force: FloatArray) -> FloatArray:

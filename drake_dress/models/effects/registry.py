@@ -1,7 +1,7 @@
 """All effects by name: those of the package, then those that a user registers.
 
 A registered effect is a candidate of `explain`, may be hidden in generated data, and is a key below
-`effects:` in scenarios. Processes that are started later import the class anew, from its module.
+`effects:` in scenarios. Worker processes that start later import the class from its module.
 """
 
 from __future__ import annotations
@@ -68,23 +68,23 @@ BUILT_IN = frozenset(_effects)
 EFFECTS: Mapping[str, type[Effect]] = MappingProxyType(_effects)
 """A live view: it grows with `register_effect`."""
 
-# For messages about names that are not known.
+# For messages about unknown names.
 HOW_TO_LOAD = "load your own with --plugin FILE.py, or register_effect in Python"
 # Words that stand in place of an effect's name.
 _RESERVED = ("nothing", "random", "discretisation")
 
 
 def register_effect(kind: Kind) -> Kind:
-    """Makes an effect of a user's own known by its name; returns it, so it can be a decorator.
+    """Registers a user's effect by its name; returns the class, so it can be a decorator.
 
-    A class that is defined again, as in a notebook's cell, takes the place of its earlier self.
-    `check_effect` holds its derivatives against finite differences, which this does not.
+    A class that is defined again, as in a notebook's cell, replaces its earlier version. Unlike
+    `check_effect`, this does not check derivatives against finite differences.
 
     Args:
         kind: a frozen dataclass that is one of the kinds of effect.
 
     Raises:
-        UserError: it does not keep to what an effect is, or its name is taken.
+        UserError: the class breaks the contract of effects, or its name is taken.
     """
     check_class(kind)
     source = f"effect {kind.__name__}"
@@ -103,7 +103,7 @@ def register_effect(kind: Kind) -> Kind:
 
 
 def unregister_effect(name: str) -> None:
-    """Forgets an effect that was registered.
+    """Removes a registered effect.
 
     Raises:
         UserError: there is none of that name.
@@ -114,5 +114,5 @@ def unregister_effect(name: str) -> None:
 
 
 def own_effects() -> tuple[str, ...]:
-    """Returns the names of registered effects, in the order in which they came."""
+    """Returns the names of registered effects, in order of registration."""
     return tuple(name for name in _effects if name not in BUILT_IN)

@@ -1,4 +1,4 @@
-"""The cameras: their clock and where they stand."""
+"""Effects on the cameras: their clock and their pose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drake_dress.models.effects.effect import CameraEffect, ClockEffect, paramet
 
 @dataclass(frozen=True)
 class TimeOffset(ClockEffect):
-    """The cameras' clock is ahead of the robot's: what they stamp t was seen at t − offset.
+    """The cameras' clock is ahead of the robot's: a time stamp t means robot time t − offset.
 
     Args:
         offset: lead of the cameras' clock, s.
@@ -23,17 +23,17 @@ class TimeOffset(ClockEffect):
     offset: float = parameter("s", -0.5, 0.5, 0.04)
 
     def apply(self, time: FloatArray) -> FloatArray:
-        """Returns the times, s, at which frames stamped `time` were seen."""
+        """Returns the times, s, at which frames with time stamp `time` were taken."""
         return time - self.offset
 
     def derivative(self, name: str, time: FloatArray) -> FloatArray:
-        """Returns −1 a time."""
+        """Returns −1 for each time."""
         return np.full_like(time, -1.0)
 
 
 @dataclass(frozen=True)
 class CameraTranslation(CameraEffect):
-    """The cameras' world is displaced: p_measured = p + t.
+    """The cameras' world frame is displaced: p_measured = p + t.
 
     Args:
         x: x of the displacement t, m.
@@ -47,11 +47,11 @@ class CameraTranslation(CameraEffect):
     z: float = parameter("m", -0.3, 0.3, 0.01)
 
     def apply(self, position: FloatArray) -> FloatArray:
-        """Returns where cameras report points (…,3), m."""
+        """Returns the positions that cameras report for world points (…,3), m."""
         return position + np.array([self.x, self.y, self.z])
 
     def inverse(self, position: FloatArray) -> FloatArray:
-        """Returns where points (…,3), m, that cameras report are."""
+        """Returns the world points of positions (…,3), m, that cameras report."""
         return position - np.array([self.x, self.y, self.z])
 
     def derivative(self, name: str, position: FloatArray) -> FloatArray:
@@ -61,7 +61,9 @@ class CameraTranslation(CameraEffect):
 
 @dataclass(frozen=True)
 class CameraRotation(CameraEffect):
-    """The cameras' world is turned about its origin: p_measured = R p, R of a rotation vector.
+    """The cameras' world frame is rotated about its origin: p_measured = R p.
+
+    R is the rotation of the vector (x, y, z).
 
     Args:
         x: x of the rotation vector, rad.
@@ -75,12 +77,12 @@ class CameraRotation(CameraEffect):
     z: float = parameter("rad", -0.5, 0.5, 0.015)
 
     def apply(self, position: FloatArray) -> FloatArray:
-        """Returns where cameras report points (…,3), m."""
+        """Returns the positions that cameras report for world points (…,3), m."""
         turned: FloatArray = position @ self._rotation.T
         return turned
 
     def inverse(self, position: FloatArray) -> FloatArray:
-        """Returns where points (…,3), m, that cameras report are."""
+        """Returns the world points of positions (…,3), m, that cameras report."""
         turned: FloatArray = position @ self._rotation
         return turned
 

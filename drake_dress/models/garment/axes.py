@@ -1,4 +1,4 @@
-"""Axes of a garment's file, and of the garment."""
+"""Axis conventions of garment files."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 
-# Rows are forward, left and up of the garment in the file's axes. A garment with z up faces +x, one
-# with y up faces +z (as garment programs write it), one with x up faces +y; a minus sign turns it
-# upside down about the way it faces.
+# Rows are the garment's forward, left and up directions in the file's axes. A garment with z up
+# faces +x; with y up it faces +z (as garment programs export it); with x up it faces +y. A minus
+# sign turns the garment upside down about its forward direction.
 AXES: dict[str, FloatArray] = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
     "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),

@@ -1,8 +1,8 @@
-"""Merges the nodes of a mesh that are too near to each other.
+"""Merges the nodes of a mesh that are too close to each other.
 
-Nodes are merged edge by edge, the shortest first, and only where the mesh stays manifold (the
-nodes' common neighbours are just those of the edge's faces) and no face turns over. Clustering
-nodes by cells of a grid would be simpler, and tears or pinches sleeves and seams.
+Edges are collapsed shortest first, and only where the mesh stays manifold (the nodes' common
+neighbours are exactly those of the edge's faces) and no face flips. Clustering nodes by grid cells
+would be simpler, but it tears or pinches sleeves and seams.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import face_areas
 
-LONGEST = 1.5  # no merging makes an edge longer than this by the spacing
-_SHORTEST = 0.75  # edges are merged up to this part of the spacing: the mean comes near 1
-_LEAST_LOOP = 8  # nodes that are left of a loop
-# Cosine of the angle by which a face may turn, and the least shape of a face: twice its area by
-# its longest side squared, 0.87 for an equilateral triangle, 0 for a needle.
+LONGEST = 1.5  # longest edge that a merge may make, over the spacing
+_SHORTEST = 0.75  # edges below this times the spacing merge: the mean comes near the spacing
+_LEAST_LOOP = 8  # nodes that a loop keeps at least
+# Cosine of the largest angle by which a face may turn, and the lowest shape quality of a face:
+# twice its area over its longest side squared, 0.87 for an equilateral triangle, 0 for a needle.
 _LEAST_COSINE = 0.3
 _LEAST_SHAPE = 0.15
-_TOLD_EVERY = 2000  # steps between words of progress
+_TOLD_EVERY = 2000  # steps between reports of progress
 
 Point = tuple[float, float, float]
 
@@ -36,26 +36,26 @@ def coarsen(
     spacing: float,
     progress: Callable[[float], None] = lambda _: None,
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Returns positions, faces, and for each old node the new one that it has become.
+    """Returns positions, faces, and the new index of each old node.
 
-    Nodes of a loop or of a boundary only merge with their neighbours along it. The mean edge of
-    the result is near `spacing` where the mesh was finer; nothing else happens where it was not.
+    Two nodes of a loop or boundary merge only if they are neighbours along it. Where the mesh was
+    finer, its mean edge comes near `spacing`; elsewhere the mesh stays as it is.
 
     Args:
         position: (n,3), m.
         faces: (F,3) of an oriented manifold.
         loops: closed chains of edges to keep, as node indices.
         spacing: wanted mean edge length, m.
-        progress: is told the share that is done, now and then.
+        progress: called from time to time with the fraction that is done.
     """
     return _Merging(position, faces, loops, spacing).run(progress)
 
 
 class _Merging:
-    """The state of a run of edge merging.
+    """State of a run of edge collapses.
 
-    All is plain Python: a step looks at some ten faces, for which calls of numpy cost more than
-    their arithmetic.
+    It is plain Python: a step touches some ten faces, for which calls of numpy cost more than the
+    arithmetic.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class _Merging:
         for f, triangle in enumerate(faces.tolist()):
             for node in triangle:
                 self.around[node].add(f)
-        # each kept chain is a graph of its own: who is next to whom along it
+        # each kept chain is a graph of its own: the neighbours of each node along it
         self.chain: list[dict[int, set[int]]] = []
         for loop in [*boundary_loops(faces), *loops]:
             order = loop.tolist()
@@ -84,7 +84,7 @@ class _Merging:
     def run(self, progress: Callable[[float], None]) -> tuple[FloatArray, IntArray, IntArray]:
         heapq.heapify(self.queue)
         steps, merged = 0, 0
-        # nodes that go: about all beyond one for each cell of a lattice at the spacing
+        # about all nodes beyond one per cell of a lattice at the spacing are merged
         expected = len(self.x) - self.area / (sqrt(0.75) * self.spacing**2)
         while self.queue:
             steps += 1
@@ -110,7 +110,7 @@ class _Merging:
                 self.queue.append((length, a, b))
 
     def _merge(self, a: int, b: int) -> bool:
-        """Merges b into a where that is allowed."""
+        """Merges b into a if that is allowed, and returns whether it did."""
         target = self._target(a, b)
         if target is None:
             return False
@@ -140,7 +140,7 @@ class _Merging:
         return True
 
     def _target(self, a: int, b: int) -> Point | None:
-        """Where the two become one: on the chain, if one lies on it; None if that breaks it."""
+        """Returns the merged node's place, on a chain if one lies on it; None if not allowed."""
         on_a = [chain for chain in self.chain if a in chain]
         on_b = [chain for chain in self.chain if b in chain]
         for chain in on_a:
@@ -155,20 +155,20 @@ class _Merging:
             return self.x[b]
         if any(p is not q for p, q in zip(on_a, on_b, strict=False)) or len(on_a) != len(on_b):
             return None  # different chains, or a crossing of two
-        # a chain's nodes stay where they are, its corners first: midpoints would shrink every girth
+        # keep the sharper corner of the chain in place: midpoints would shrink every girth
         keep_a = all(self._loss(chain, a) >= self._loss(chain, b) for chain in on_a)
         return self.x[a if keep_a else b]
 
     def _loss(self, chain: dict[int, set[int]], node: int) -> float:
-        """By how much a chain becomes shorter without a node, m."""
+        """Returns the length that a chain loses without a node, m."""
         before, after = (self.x[q] for q in chain[node])
         return dist(self.x[node], before) + dist(after, self.x[node]) - dist(after, before)
 
     def _stays_sound(self, f: int, a: int, b: int, target: Point) -> bool:
-        """Whether face f, with its corner a or b moved to the target, keeps its side and shape."""
+        """Returns whether face f keeps its side, shape and edge bound with a or b at the target."""
         corners = self._corners(f)
         k = 0 if corners[0] in (a, b) else 1 if corners[1] in (a, b) else 2
-        # the corner that moves comes first, the two others follow as the face turns
+        # the corner that moves comes first, then the two others in the face's orientation
         old, p, q = (self.x[corners[(k + j) % 3]] for j in range(3))
         to_p, to_q, side = dist(target, p), dist(target, q), dist(p, q)
         if max(to_p, to_q) > LONGEST * self.spacing:

@@ -1,16 +1,16 @@
 """A parametric open-front coat.
 
-The idea: the left half is a few structured grids that name each other's border nodes, so that every
-seam is shared by construction, and the right half is its mirror image. The grids are
+The left half is a few structured grids that share their border nodes, so that every seam is closed
+by construction. The right half is its mirror image. The grids are
 
     lower    columns around the left half of the chest ellipse × rows from hem to underarm,
     front    from the underarm level up to the shoulder seam; its inner edge is the lapel,
-    back     the same behind; its outer top nodes are those of the front: the shoulder seam,
-    sleeve   a tube from the armhole loop (the columns under the arm that neither front nor
-             back takes up, and the outer edges of both) to the cuff circle,
+    back     the same behind; it shares the nodes of the shoulder seam with the front,
+    sleeve   a tube from the armhole loop (the columns under the arm between front and back,
+             and the outer edges of both) to the cuff circle,
     collar   a strip that stands on the neckline of the back.
 
-Numbers of columns and rows follow from the spacing; then the sizes are solved on the polygons, so
+The spacing gives the numbers of columns and rows. The sizes are then solved on the polygons, so
 that girths are met at any spacing and not only in the limit.
 """
 
@@ -37,15 +37,15 @@ class CoatParameters:
     Attributes:
         body_length: height of the shoulder tips above the hem, m.
         chest: girth at the underarm, closed over the open front, m.
-        shoulder_width: from shoulder tip to shoulder tip, m.
-        sleeve_length: from the shoulder tip to the cuff, along the top, m.
+        shoulder_width: distance between the shoulder tips, m.
+        sleeve_length: length from the shoulder tip to the cuff, along the top, m.
         armhole_girth: girth of an armhole, m.
         cuff_girth: girth of a cuff, m.
         collar_height: height of the collar, m.
         neck_width: distance between the inner ends of the shoulder seams, m.
         front_opening: gap between the front edges at the underarm, part of the chest girth, m.
         shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
-        grasp_fraction: where a gripper holds the shoulder seam, from neck (0) to shoulder tip (1).
+        grasp_fraction: place of the grasp along the shoulder seam, neck (0) to shoulder tip (1).
         grasp_radius: radius within which a gripper holds the cloth, m. With 0 it holds the whole
             seam.
     """
@@ -97,16 +97,17 @@ def make_coat(
 
     The mesh is manifold, symmetric about y = 0 (except for the order of nodes), and oriented
     outward. Its boundaries are the two cuffs and the rim: hem, front edges and collar. Armhole and
-    cuff loops begin at the shoulder tip and go round by the front; column k of both is the same.
+    cuff loops begin at the shoulder tip and run along the front first; entry k of both is the same
+    column of the sleeve.
 
     Args:
         parameters: measures of the coat.
         spacing: desired mean edge length, m; met to 25 %.
         source: file or name at the beginning of error messages.
-        like: measures of another coat. The mesh then has the nodes and loops that the other coat's
-            mesh has at this spacing, each at the same place of the pattern, so that arrays of
-            nodes of both can be compared. The spacing is met for the other coat only. Which nodes
-            a gripper holds, and the diagonals of the grids, follow the coat's own measures.
+        like: measures of another coat. The mesh then has the same nodes and loops as the other
+            coat's mesh at this spacing, each at the same place of the pattern, so that nodal
+            arrays of both can be compared. Only the other coat meets the spacing. The held nodes
+            and the diagonals of the grids follow the coat's own measures.
 
     Raises:
         UserError: a measure or the spacing is out of range, or measures contradict each other.
@@ -144,14 +145,14 @@ _RANGES = {
     "grasp_fraction": (0.0, 1.0),
     "grasp_radius": (0.0, 0.12),
 }
-_DEPTH_RATIO = 0.55  # depth of the chest ellipse by its width, from body measures
-_GAP_RATIO = 0.24  # part of the armhole that runs below the arm, across the side of the body
-_DIP_RATIO = 0.04  # by how much the middle of that part lies lower than its ends
+_DEPTH_RATIO = 0.55  # depth over width of the chest ellipse, from body measures
+_GAP_RATIO = 0.24  # fraction of the armhole girth below the arm, across the side of the body
+_DIP_RATIO = 0.04  # dip of the middle of that part below its ends, over the armhole girth
 _SLEEVE_SLOPE = np.deg2rad(58.0)  # of the sleeves below the horizontal
-_FEWEST_HELD = 4  # nodes that a gripper holds: three may lie on a line, about which cloth turns
+_FEWEST_HELD = 4  # nodes of a gripper: three may lie on a line, about which the cloth could turn
 _COLLAR_LEAN = np.deg2rad(8.0)  # of the collar outward from the vertical
-_FILLS = (1.0, 0.95, 0.9, 0.85, 0.8)  # grid step by spacing, tried in order
-_LONGEST = 1.6  # longest edge by spacing
+_FILLS = (1.0, 0.95, 0.9, 0.85, 0.8)  # grid step over spacing, tried in order
+_LONGEST = 1.6  # longest edge over spacing
 _MIRROR = np.array([1.0, -1.0, 1.0])
 
 
@@ -170,7 +171,7 @@ class _Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class _Shape:
-    """Curves of the left half: ring from front to back middle, panels' borders from below up."""
+    """Curves of the left half: ring from front edge to mid-back, panel borders from below up."""
 
     depth: float  # of the underarm below the shoulder tip, m
     ring: FloatArray  # at underarm level
@@ -225,10 +226,10 @@ def _count(p: CoatParameters, shape: _Shape, step: float) -> _Counts:
     seam = count(_length(shape.seam), least=2)
     gap = _GAP_RATIO * p.armhole_girth
     quarter = 0.25 * p.chest - 0.5 * gap
-    # the collar leans outward from the neckline, which is shortest of all rows
+    # the collar leans outward from the neckline, which is its shortest row
     back_neck = ceil(_length(shape.back_neck) / (1.05 * step))
     return _Counts(
-        front=seam,  # the front panel ends in the shoulder seam, its inner edge is the lapel
+        front=seam,  # the front panel ends at the shoulder seam; its inner edge is the lapel
         gap=count(gap, least=2),
         back=max(seam + back_neck, count(quarter, least=3)),
         seam=seam,
@@ -240,7 +241,7 @@ def _count(p: CoatParameters, shape: _Shape, step: float) -> _Counts:
 
 
 def _shape(p: CoatParameters, counts: _Counts | None, source: str) -> _Shape:
-    """Solves the depth of the armhole for its girth; without counts for smooth curves."""
+    """Solves the armhole's depth for its girth; without counts, on smooth curves."""
     low, high = 0.25 * p.armhole_girth, 0.45 * p.armhole_girth
     if _armhole_girth(_shape_at(p, counts, low)) > p.armhole_girth:
         low = 0.1 * p.armhole_girth
@@ -314,9 +315,9 @@ _U = np.linspace(0.0, 0.5, 200)
 
 
 def _unit_ellipse(u: FloatArray) -> tuple[FloatArray, float]:
-    """Points at arc fractions u of an ellipse of half width 1, and the girth of their polygon.
+    """Returns points at arc fractions u of an ellipse of half width 1, and their polygon's girth.
 
-    The polygon has its mirror image as other half.
+    The mirror image is the polygon's other half.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, 2001)
     curve = np.column_stack([_DEPTH_RATIO * np.cos(angle), np.sin(angle)])
@@ -330,21 +331,24 @@ _SIN, _COS = np.sin(0.5 * np.pi * _T), np.cos(0.5 * np.pi * _T)
 
 
 def _arch(corner: FloatArray, tip: FloatArray) -> FloatArray:
-    """The armhole's edge: a quarter ellipse that leaves the corner upward and meets its mirror."""
+    """Returns the armhole's edge: a quarter ellipse that starts upward and ends level."""
     curve = corner + (tip - corner) * _SIN
     curve[:, 0] = corner[0] * _COS[:, 0]
     return curve
 
 
 def _scoop(middle: FloatArray, neck: FloatArray) -> FloatArray:
-    """The neckline: between a quarter ellipse, which would squeeze the panel's columns, and a V."""
+    """Returns the neckline: a blend of a V and a quarter ellipse.
+
+    The ellipse alone would squeeze the columns of the panel.
+    """
     bow = (neck - middle) * (1.0 - _COS)
     bow[:, 1] = (neck[1] - middle[1]) * _SIN[:, 0]
     return middle + 0.35 * bow + 0.65 * (neck - middle) * _T
 
 
 def _bend(low: FloatArray, high: FloatArray) -> FloatArray:
-    """A curve of the middle that leaves upward and then leans toward the neck."""
+    """Returns the inner edge of a panel: it starts upward and then leans toward the neck."""
     control = np.array([low[0], low[1], 0.5 * (low[2] + high[2])])
     return (1 - _T) ** 2 * low + 2 * _T * (1 - _T) * control + _T**2 * high
 
@@ -364,7 +368,7 @@ def _resample(curve: FloatArray, count: int) -> FloatArray:
 
 
 def _coons(bottom: FloatArray, top: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Returns (rows + 1, columns + 1, 3): the patch between four border curves."""
+    """Returns the Coons patch (rows + 1, columns + 1, 3) between four border curves."""
     v = np.linspace(0.0, 1.0, len(start))[:, None, None]
     u = np.linspace(0.0, 1.0, len(bottom))[None, :, None]
     between_rows = (1 - v) * bottom[None] + v * top[None]
@@ -377,7 +381,7 @@ def _coons(bottom: FloatArray, top: FloatArray, start: FloatArray, end: FloatArr
 
 @dataclass
 class _Builder:
-    """Nodes and faces as they are added; grids join where they name the same nodes."""
+    """Collects nodes and faces; grids are joined where they use the same nodes."""
 
     points: list[FloatArray] = field(default_factory=list)
     faces: list[IntArray] = field(default_factory=list)
@@ -395,14 +399,14 @@ class _Builder:
         return np.concatenate(self.points)
 
     def grid(self, nodes: IntArray) -> None:
-        """Adds the triangles of a grid, oriented outward where rows go up and columns left."""
+        """Adds the triangles of a grid, oriented outward if rows go up and columns go left."""
         a, b = nodes[:-1, :-1].ravel(), nodes[:-1, 1:].ravel()
         d, c = nodes[1:, :-1].ravel(), nodes[1:, 1:].ravel()
         x = self.position
         first = np.linalg.norm(x[a] - x[c], axis=1)
         second = np.linalg.norm(x[b] - x[d], axis=1)
         odd = (np.indices((nodes.shape[0] - 1, nodes.shape[1] - 1)).sum(axis=0) % 2).ravel() == 1
-        # the shorter diagonal; alternating where they are alike, so that cloth has no favoured bias
+        # the shorter diagonal; alternating if both are alike, so that the cloth prefers no bias
         along = np.where(np.abs(first - second) < 0.05 * (first + second), odd, first < second)
         self.faces.append(
             np.concatenate(

@@ -1,4 +1,4 @@
-"""Edges of a triangle mesh, its boundaries and its connected parts."""
+"""Edges, boundaries and connected components of a triangle mesh."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def unique_edges(faces: npt.NDArray[np.integer]) -> IntArray:
 
 
 def border_edges(faces: npt.NDArray[np.integer], n: int) -> IndexArray:
-    """Returns (b,2) half-edges of faces that no half-edge of another face runs against.
+    """Returns (b,2) boundary half-edges: those without an opposite half-edge.
 
     Args:
         faces: (F,3) node indices.
@@ -32,12 +32,12 @@ def border_edges(faces: npt.NDArray[np.integer], n: int) -> IndexArray:
 
 
 def half_edges(faces: npt.NDArray[np.integer]) -> npt.NDArray[np.integer]:
-    """Returns (3F,2) the sides of all faces, each from node to node as its face turns."""
+    """Returns (3F,2) half-edges of all faces, in the orientation of their faces."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def components(faces: npt.NDArray[np.integer], n: int) -> IntArray:
-    """Returns (n,) the number of the connected part that each node belongs to, from 0."""
+    """Returns (n,) the index of each node's connected component, from 0."""
     half = half_edges(faces)
     graph = coo_array((np.ones(len(half)), (half[:, 0], half[:, 1])), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)
@@ -46,14 +46,14 @@ def components(faces: npt.NDArray[np.integer], n: int) -> IntArray:
 def boundary_loops(faces: npt.NDArray[np.integer]) -> list[IntArray]:
     """Returns each boundary as node indices in order, the longest first.
 
-    The order is that of the faces' own half-edges: the garment lies to the left of the walk.
-    Each loop begins at its smallest index.
+    The order follows the faces' half-edges: the garment lies to the left of the walk. Each loop
+    begins at its smallest index.
 
     Args:
         faces: (F,3) node indices of a manifold.
 
     Raises:
-        UserError: boundaries meet in a node, so that they cannot be told apart.
+        UserError: boundaries meet at a node and cannot be separated, or a boundary is not closed.
     """
     border = border_edges(faces, int(faces.max()) + 1)
     if len(np.unique(border[:, 0])) < len(border):

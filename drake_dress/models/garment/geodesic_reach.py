@@ -1,4 +1,4 @@
-"""How far points of a garment can be from each other: the way along the cloth."""
+"""Bounds on the distances between points of a garment: path lengths along the cloth."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from drake_dress.models.garment.mesh import GarmentMesh
 
 
 def reach_between(mesh: GarmentMesh, places: FloatArray) -> FloatArray:
-    """Returns (m,m) the length of the way along the mesh's edges between points, m.
+    """Returns (m,m) path lengths along the mesh's edges between points, m.
 
-    A way along edges is no shorter than the shortest one on the surface, so cloth that does not
-    stretch never parts two points farther.
+    A path along edges is at least as long as the geodesic, so points of inextensible cloth are
+    never farther apart.
 
     Args:
         mesh: the garment.
-        places: (m,3) of its rest shape, m; each is taken to the nearest node.
+        places: (m,3) points of its rest shape, m; a path includes the straight lines from both
+            points to their nearest nodes.
     """
     x, faces = mesh.rest_position, mesh.faces
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])

@@ -1,10 +1,10 @@
-"""How far parts of a garment can get from each other: φ_c and φ_f of the paper, on the mesh.
+"""Largest distances between parts of a garment: φ_c and φ_f of the paper, on the mesh.
 
-Cloth that does not stretch keeps no two points further apart than the shortest way between them on
-its surface. The centre of an armhole is a weighted mean of its nodes, and so is what a gripper
-holds. For any pairing of their weights, the distance of two means is at most the mean of the paired
-distances; the tightest of these bounds is an optimal transport with geodesic distances as its cost.
-It holds however the garment is folded, and is reached where it is drawn taut.
+In inextensible cloth, the distance of two points is at most their geodesic distance on the surface.
+The centre of an armhole is a weighted mean of its nodes, and so is the centre of a grasp patch. For
+any pairing of their weights, the distance of two means is at most the mean of the paired distances.
+The tightest of these bounds is an optimal transport problem with geodesic distances as its cost. It
+holds however the garment is folded, and is attained where the cloth is taut.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from drake_dress.models.sides import SIDES
 
 @dataclass(frozen=True)
 class Reach:
-    """Largest distances within a garment that does not stretch, m.
+    """Largest distances within an inextensible garment, m.
 
     Attributes:
-        between_sleeves: of the centres of both armholes (φ_c).
-        to_far_gripper: of the centre of the left armhole from what the right gripper holds, and of
-            the right one from what the left gripper holds (φ_f; one number in the paper).
-        to_near_gripper: likewise from the gripper of its own side.
-        between_grippers: of what both grippers hold.
+        between_sleeves: between the centres of both armholes (φ_c).
+        to_far_gripper: from the centre of the left armhole to that of the right grasp patch, and
+            from the right armhole to the left grasp patch (φ_f; one number in the paper).
+        to_near_gripper: likewise, to the grasp patch on the armhole's own side.
+        between_grippers: between the centres of both grasp patches.
     """
 
     between_sleeves: float
@@ -40,7 +40,7 @@ class Reach:
 
 
 def reach(mesh: GarmentMesh) -> Reach:
-    """Returns how far armholes and grippers of a garment can be apart."""
+    """Returns the largest distances between armholes and grippers of a garment."""
     armhole = [np.asarray(mesh.loops[f"{side}_armhole"]) for side in SIDES]
     grasp = [np.asarray(mesh.grasp[side]) for side in SIDES]
     weights = [_curve_weights(mesh.rest_position[loop]) for loop in armhole]
@@ -66,7 +66,7 @@ def reach(mesh: GarmentMesh) -> Reach:
 def geodesic_distances(
     position: FloatArray, faces: IntArray, sources: IntArray, targets: IntArray
 ) -> FloatArray:
-    """Returns (s,t) the lengths of the shortest ways on a mesh between nodes, m.
+    """Returns (s,t) geodesic distances between nodes of a mesh, m.
 
     Exact on the triangles (Mitchell, Mount and Papadimitriou, "The discrete geodesic problem",
     1987). A target that cannot be reached is infinitely far.
@@ -84,14 +84,14 @@ def geodesic_distances(
 
 
 def mean_distance(distance: FloatArray, of_rows: FloatArray, of_columns: FloatArray) -> float:
-    """Returns the least mean of distances (s,t) over all pairings of weights (s,) and (t,).
+    """Returns the optimal transport cost of distances (s,t) between weights (s,) and (t,).
 
     Both sets of weights are positive and sum to one.
     """
     s, t = distance.shape
     rows = kron(np.eye(s), np.ones((1, t)))
     columns = kron(np.ones((1, s)), np.eye(t))
-    # the last row follows from the others
+    # the last constraint follows from the others
     found = linprog(
         distance.ravel(),
         A_eq=vstack([rows, columns]).tocsr()[:-1],
@@ -110,7 +110,7 @@ def _distances(exact: PyGeodesicAlgorithmExact, sources: IntArray, targets: IntA
 
 
 def _curve_weights(loop: FloatArray) -> FloatArray:
-    """Returns (k,) the weights of a closed polygon's corners in its centre as a curve."""
+    """Returns (k,) weights of a closed polygon's corners in the centroid of its outline."""
     edge = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     weight: FloatArray = 0.5 * (edge + np.roll(edge, 1)) / edge.sum()
     return weight

@@ -1,4 +1,4 @@
-"""The grain of a garment: how its cloth was laid when it was cut."""
+"""The grain of a garment: the warp direction of its cloth."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from drake_dress.models.sides import SIDES
 
 
 def grain(mesh: GarmentMesh) -> FloatArray:
-    """Returns (F,3) the direction of the warp at each face, rest pose, unit.
+    """Returns (F,3) unit warp directions of the faces in the rest pose.
 
-    Down the body, and along each sleeve from armhole to cuff, as tailors cut.
+    The warp runs down the body, and along each sleeve from armhole to cuff, as tailors cut.
     """
     face_region = np.median(mesh.region[mesh.faces], axis=1).astype(int)
     warp = np.tile([0.0, 0.0, -1.0], (len(mesh.faces), 1))

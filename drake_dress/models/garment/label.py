@@ -1,4 +1,4 @@
-"""Names the parts of a garment: openings, sleeves, and what the grippers hold."""
+"""Labels the parts of a garment: openings, sleeves and grasp patches."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from drake_dress.models.garment.mesh import LOOP_NAMES, REGION_NAMES, GarmentMes
 from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
 from drake_dress.models.sides import SIDES
 
-_GRASP_COUNT = 10  # nodes per gripper, where none are named
+_GRASP_COUNT = 10  # nodes per gripper if none are given
 _GRASP_INSET = 0.035  # from the shoulder tip toward the neck, m
-# Where the body's middle lies from that of the armholes, m: less tells nothing of what is up. A
-# coat's lies 0.2 m below or more.
+# Least distance of the body's centroid from the armholes at which the up axis is judged, m. A
+# coat's centroid lies 0.2 m below them or more.
 _TELLING = 0.06
 
 
@@ -27,17 +27,17 @@ def with_openings(
     up: str,
     source: str,
 ) -> dict[str, IntArray]:
-    """Returns the loops that are named, and those that are not, found.
+    """Returns the named loops, and finds the others.
 
     Args:
         position: (n,3), m, in the axes of the file.
         faces: (F,3) of a manifold.
         named: loops by their names in `LOOP_NAMES`.
-        up: the axis of the file that is up, a key of `AXES`.
+        up: the axis of the file that points up, a key of `AXES`.
         source: file put in front of messages.
 
     Raises:
-        UserError: a loop is not found, or another axis than `up` is up.
+        UserError: a loop is not found, or `up` is the wrong axis.
     """
     try:
         return _hanging(turned(position, up), faces, named, source)
@@ -61,13 +61,13 @@ def labelled(
     loops: Mapping[str, IntArray],
     grasp: Mapping[str, IntArray],
 ) -> GarmentMesh:
-    """Returns the mesh with its regions named and its origin between the shoulder tips.
+    """Returns the mesh with its regions labelled and its origin between the shoulder tips.
 
     Args:
-        position: (n,3), m, in the canonical rest pose, at any place.
+        position: (n,3), m, in the canonical rest pose, with any origin.
         faces: (F,3) of a manifold.
         loops: nodes around each opening of `LOOP_NAMES`.
-        grasp: nodes that a gripper holds; those of no gripper here are the ten nodes nearest to a
+        grasp: nodes that each gripper holds. A gripper not given holds the ten nodes nearest to a
             point 3.5 cm inward of the shoulder tip.
     """
     named = {name: ordered(position, loops[name]) for name in LOOP_NAMES}

@@ -1,4 +1,4 @@
-"""Loads a user's own garment: a file of triangles becomes a labelled mesh, or a reason why not."""
+"""Loads a user's garment file as a labelled mesh, or says why it cannot."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 DIAGONAL_RANGE = (0.5, 3.0)  # of a garment's bounding box, m
 SPACING_RANGE = (0.005, 0.1)  # m
 WELD_RANGE = (0.0, 0.02)  # m
-SCALE_RANGE = (1e-4, 1e4)  # from tenths of a millimetre to tens of metres of life size
+SCALE_RANGE = (1e-4, 1e4)  # files from a ten-thousandth of life size to 10,000 times life size
 
-# Is told what is being done, and which share of it is.
+# Called with the current task and the fraction of it that is done.
 Progress = Callable[[str, float], None]
 
 
@@ -44,19 +44,19 @@ def _silent(_stage: str, _share: float) -> None:
 
 @dataclass(frozen=True)
 class MeshOptions:
-    """How a file is to be read.
+    """Options for reading a garment file.
 
     Attributes:
-        unit: of its coordinates, `m`, `cm` or `mm`.
-        up: axis of the file that points up; see `axes.AXES` for where the garment faces then.
-        weld: distance across which edges of seams are joined, m; 0 joins equal nodes alone.
+        unit: unit of its coordinates, `m`, `cm` or `mm`.
+        up: axis of the file that points up; see `axes.AXES` for the direction the garment faces.
+        weld: distance across which edges of seams are joined, m; 0 joins only coincident nodes.
         leave_out: names of objects or groups, or sizes such as `<0.05 m` of connected parts.
         loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
-            those not named are looked for (see `openings`). In an STL, which lists a node once
+            those not named are searched for (see `openings`). In an STL, which lists a node once
             per triangle, any of the copies may be named.
         grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
             nodes nearest to a point 3.5 cm inward of the armhole's highest node.
-        scale: of all coordinates, beside the unit.
+        scale: factor on all coordinates, in addition to the unit.
     """
 
     unit: str = "m"
@@ -91,14 +91,14 @@ class MeshOptions:
 
 @dataclass(frozen=True)
 class WholeGarment:
-    """A garment as its file has it: sound, and with its openings known.
+    """A garment at the resolution of its file, checked and with its openings known.
 
     Attributes:
         source: the file, for messages.
-        position: (n,3), m, facing +x, the left at +y, z up.
+        position: (n,3), m, facing +x, with left at +y and z up.
         faces: (F,3), counter-clockwise seen from outside.
         loops: nodes around each opening of `LOOP_NAMES`.
-        grasp: nodes of those grippers whose nodes are named.
+        grasp: nodes that a gripper holds, for each gripper whose nodes the options name.
     """
 
     source: str
@@ -108,14 +108,14 @@ class WholeGarment:
     grasp: dict[str, IntArray]
 
     def mesh(self) -> GarmentMesh:
-        """Returns the labelled mesh as fine as the file has it."""
+        """Returns the labelled mesh at the resolution of the file."""
         return labelled(self.position, self.faces, self.loops, self.grasp)
 
     def at_spacing(self, spacing: float, progress: Progress = _silent) -> GarmentMesh:
         """Returns the labelled mesh with a mean edge of about `spacing`, m.
 
         Raises:
-            UserError: the spacing is out of range, or the mesh cannot be brought to it.
+            UserError: the spacing is out of range, or the mesh cannot be remeshed to it.
         """
         low, high = SPACING_RANGE
         if not low <= spacing <= high:
@@ -166,7 +166,7 @@ def load_garment(
         loops: nodes in order around each opening, by its name; those not given are searched for.
         grasp: nodes that the `left` and the `right` gripper hold.
         scale: factor on all coordinates, in addition to the unit.
-        progress: function that is called with the present task and the share of it that is done.
+        progress: function that is called with the current task and the fraction of it that is done.
 
     Raises:
         UserError: the file, an option or the mesh is unusable; see `read_garment` and
@@ -177,19 +177,19 @@ def load_garment(
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
 
-@np.errstate(all="ignore")  # damaged numbers are told by the checks, not by numpy
+@np.errstate(all="ignore")  # the checks report damaged numbers, not numpy
 def read_garment(
     path: str | Path, options: MeshOptions, progress: Progress = _silent
 ) -> WholeGarment:
     """Returns the garment of an OBJ, PLY or STL file, checked.
 
-    The file shows the garment with its sleeves sideways. Nodes at the same place are merged, nodes
-    of no face dropped, and faces turned outward if all point inward.
+    The sleeves must point sideways in the file. Nodes at the same place are merged, unused nodes
+    are dropped, and an inside-out mesh is turned outward.
 
     Raises:
-        UserError: in one line what cannot be used: the file, its format or an option, a mesh that
-            is empty, not finite, not plausible, not manifold or in parts, loops that are absent or
-            not closed, wrong indices. Nodes are named as the file counts them, from 0, with lines.
+        UserError: the file, its format or an option is unusable; the mesh is empty, not finite, not
+            plausible, not manifold or in parts; a loop is absent or not closed; an index is wrong.
+            The message is one line and names nodes as the file counts them, from 0, with lines.
     """
     source = str(path)
     options.check(source)
@@ -197,7 +197,7 @@ def read_garment(
     raw = without_named(read_mesh(Path(path)), options.leave_out)
     progress("checking the garment", 0.3)
     raw = duplicates_merged(raw.scaled(UNITS[options.unit] * options.scale))
-    # first what holds in any unit, so that a wild node is not taken for a wrong unit
+    # first check what holds in any unit, so that a stray node is not reported as a wrong unit
     check_plausible(raw)
     _check_size(raw, options.unit)
     raw = seams_sewn(raw, options.weld)
@@ -249,7 +249,7 @@ def _outward(position: FloatArray, faces: np.ndarray) -> np.ndarray:
 
 
 def _mapped(raw: RawMesh, nodes: Sequence[int], key: str) -> IntArray:
-    """Returns the nodes that nodes of the file have become."""
+    """Returns the mesh nodes that nodes of the file were merged into."""
     given = np.asarray(nodes)
     if given.ndim != 1 or given.size == 0 or not np.issubdtype(given.dtype, np.integer):
         raise UserError(raw.source, key, "expected a list of node indices (whole numbers)")

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from drake_dress.errors import UserError
 from drake_dress.models.garment.edges import components, half_edges
 
-# Gives a node or face its name in messages, such as the one it has in a file.
+# Returns the name of a node or face for messages, such as its number in a file.
 Named = Callable[[int], str]
 
 
@@ -39,13 +39,13 @@ def check_manifold(
         faces: (F,3) node indices.
         n: number of nodes.
         source: file or name put in front of the message.
-        node: names nodes in messages.
-        face: names faces in messages.
+        node: returns a node's name for messages.
+        face: returns a face's name for messages.
 
     Raises:
         UserError: no faces, an index out of range, a face that names a node twice, a face given
-            twice, an edge of more than two faces, neighbours oriented against each other, nodes
-            of no face, several components, or a node where two sheets only touch.
+            twice, an edge of more than two faces, neighbours of opposite orientation, nodes
+            without a face, several components, or a node where two sheets only touch.
     """
     if faces.size == 0:
         raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
@@ -120,7 +120,7 @@ def _check_edges(faces: npt.NDArray[np.integer], n: int, source: str, node: Name
 
 
 def _check_fans(faces: npt.NDArray[np.integer], n: int, source: str, node: Named) -> None:
-    """At each node of a manifold the faces form one fan: they hang together by their edges."""
+    """Checks that the faces at each node form one fan, connected by shared edges."""
     count = len(faces)
     half = half_edges(faces).astype(np.int64)
     corner = np.arange(3 * count).reshape(3, count)  # corner k of face f is entry (k, f)

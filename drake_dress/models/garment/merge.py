@@ -1,8 +1,9 @@
 """Merges nodes at the same place, and sews seams whose edges lie side by side.
 
-Files often hold a node once for each panel or triangle. Nodes at one place are always one node. A
-seam with a gap is sewn where two border edges run against each other and both their ends are
-within the distance: single nodes that only come close, and nodes inside the cloth, stay apart.
+Files often hold one copy of a node for each panel or triangle. Nodes at the same place are always
+merged. A seam with a gap is sewn where two border edges run in opposite directions and both pairs
+of ends are within the distance. Single nodes that only come close, and nodes inside the cloth, stay
+separate.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.edges import border_edges, half_edges
 from drake_dress.models.garment.files.raw import RawMesh
 
-# Nodes nearer than this by the size of the mesh were one before their digits were cut.
+# Nodes nearer than this, relative to the size of the mesh, were one node before rounding.
 _ROUNDING = 1e-7
-# A border edge is sewn to another only across less than this part of its own length.
+# Widest gap across which a border edge is sewn, as a fraction of its own length.
 _NARROW = 0.5
-_CANDIDATES = 8  # border edges that are looked at for each
+_CANDIDATES = 8  # partners that are tried for each border edge
 
 
 def duplicates_merged(mesh: RawMesh) -> RawMesh:
-    """Returns the mesh with nodes at the same place merged, and without nodes of no face."""
+    """Returns the mesh with nodes at the same place merged and unused nodes dropped."""
     place = mesh.position + 0.0  # turns -0 into 0
     _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
     exact = first[which.reshape(-1)]
-    # the median is not moved by a single wild coordinate
+    # the median is robust against a single wild coordinate
     spread = np.linalg.norm(place - np.median(place, axis=0), axis=1)
     radius = _ROUNDING * 2.0 * float(np.median(spread))
     pairs = first[KDTree(place[first]).query_pairs(radius, output_type="ndarray")]
@@ -36,11 +37,11 @@ def duplicates_merged(mesh: RawMesh) -> RawMesh:
 
 
 def seams_sewn(mesh: RawMesh, distance: float) -> RawMesh:
-    """Returns the mesh with border edges joined that lie side by side.
+    """Returns the mesh with border edges that lie side by side joined.
 
     Args:
         mesh: without duplicate nodes.
-        distance: between the ends of two edges, at most.
+        distance: largest distance between the ends of two edges.
     """
     x, n = mesh.position, len(mesh.position)
     border = border_edges(mesh.faces, n)
@@ -62,7 +63,7 @@ def seams_sewn(mesh: RawMesh, distance: float) -> RawMesh:
             np.linalg.norm(tail[e] - head[f], axis=1), np.linalg.norm(head[e] - tail[f], axis=1)
         )
         good = (e != f) & (gap <= np.minimum(reach[e], reach[f]))
-        # a ribbon's two sides are no seam: its own edges join them
+        # the two sides of a ribbon are not a seam: its own edges already join them
         for a, b in ((border[e, 0], border[f, 1]), (border[e, 1], border[f, 0])):
             good &= ~np.isin(_keys(a, b, n), adjacent)
         partner[e[good]] = f[good]
@@ -80,7 +81,7 @@ def seams_sewn(mesh: RawMesh, distance: float) -> RawMesh:
 
 
 def _groups(pairs: IndexArray, n: int) -> IndexArray:
-    """Returns (n,) the smallest node that each is joined with."""
+    """Returns (n,) the smallest node of the group that each node is joined to."""
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     count, label = connected_components(graph, directed=False)
     smallest = np.full(count, n, dtype=np.int64)

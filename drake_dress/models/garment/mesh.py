@@ -1,4 +1,4 @@
-"""A garment as a labelled triangle mesh, and what every such mesh must obey."""
+"""A garment as a labelled triangle mesh, and checks that it is valid."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ class GarmentMesh:
             source: file or name at the beginning of the message.
 
         Raises:
-            UserError: the mesh is empty, holds NaN or infinity, a face has no area, it is not a
-                connected oriented manifold (see `check_manifold`), a loop is missing or is not a
-                closed chain of edges, or a grasp patch or region is unusable.
+            UserError: the mesh is empty, holds NaN or infinity, has a face without area, or is not
+                a connected oriented manifold (see `check_manifold`); a loop is missing or is not a
+                closed chain of edges; a grasp patch or the region is invalid.
         """
         check_positions(self.rest_position, source)
         n = len(self.rest_position)
@@ -89,11 +89,11 @@ def check_positions(position: FloatArray, source: str = "mesh") -> None:
     """Checks that there are nodes and that all are finite.
 
     Args:
-        position: what should be (n,3), m.
+        position: array to check, expected (n,3), m.
         source: file or name put in front of the message.
 
     Raises:
-        UserError: no nodes, another shape, NaN or infinity.
+        UserError: the array has no nodes, another shape, NaN or infinity.
     """
     if position.size == 0:
         raise UserError(source, "nodes", "the mesh is empty, expected at least one triangle")
@@ -123,11 +123,12 @@ def check_loop(
         faces: (F,3) node indices.
         n: number of nodes.
         source: file or name put in front of the message.
-        key: of the loop in the source, for the message.
-        node: names nodes in messages.
+        key: key of the loop in the source, for the message.
+        node: returns a node's name for messages.
 
     Raises:
-        UserError: indices out of range or repeated, fewer than three, or no edge joins neighbours.
+        UserError: an index is out of range or repeated, there are fewer than three, or no edge
+            joins two neighbours.
     """
     _check_indices(loop, n, source, key)
     if len(loop) < 3:
@@ -152,7 +153,7 @@ def face_areas(position: FloatArray, faces: npt.NDArray[np.integer]) -> FloatArr
 
 
 def loop_length(position: FloatArray, loop: npt.NDArray[np.integer]) -> float:
-    """Returns the length of a closed loop of nodes, m: a girth."""
+    """Returns the length of a closed loop of nodes (a girth), m."""
     points = position[loop]
     return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
 

@@ -1,13 +1,13 @@
-"""Finds the cuffs and armholes of a garment that came without names.
+"""Finds the cuffs and armholes of an unlabelled garment.
 
 Cuffs are the boundary loops farthest to either side. The armhole is where the sleeve stops being a
-tube: a vertical plane y = const is moved inward from the cuff, and as long as it cuts the sleeve
-alone, the girth of its cut grows slowly; at the underarm the cut opens along the side of the body.
-The armhole is the shortest pair of edge paths, one by the front and one by the back, that joins the
-lowest and the highest node of the last good cut and stays close to it.
+tube. A vertical plane y = const is moved inward from the cuff. While it cuts the sleeve alone, the
+girth of the cut grows slowly; at the underarm the cut opens along the side of the body. The
+armhole is the shortest pair of edge paths, one along the front and one along the back, that joins
+the lowest and the highest node of the last tube cut and stays close to it.
 
-This needs sleeves that stand away from the body, as in the canonical pose. Where it fails the
-loops have to be named.
+This needs sleeves that stand away from the body, as in the canonical pose. Otherwise the loops
+must be named.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from drake_dress.models.garment.mesh import loop_length
 
 _CUFF_GIRTH = (0.1, 0.8)  # m
 _STEP = 0.005  # between cuts, m
-_GROWTH = 0.12  # of a tube's girth from one cut to the next; the side of a body gives more
-_SEARCH = 0.45  # part of the way from cuff to cuff that may be searched for an armhole
+_GROWTH = 0.12  # largest growth of a tube's girth between cuts; the side of a body gives more
+_SEARCH = 0.45  # fraction of the distance between the cuffs that is searched for an armhole
 
 _NAME_THEM = "expected loops named by node indices (left_armhole, left_cuff, right_…)"
 
@@ -69,10 +69,10 @@ def find_armhole(
         faces: (F,3) of a manifold.
         cuff: nodes of the cuff.
         source: file put in front of the message.
-        name: of the armhole, for the message.
+        name: name of the armhole, for the message.
 
     Raises:
-        UserError: no such place is found.
+        UserError: no armhole is found.
     """
     y = position[:, 1] - 0.5 * float(position[:, 1].min() + position[:, 1].max())
     out = y if float(y[cuff].mean()) > 0.0 else -y
@@ -89,7 +89,7 @@ def find_armhole(
 
 
 def ordered(position: FloatArray, loop: npt.NDArray[np.integer]) -> IntArray:
-    """Returns the loop begun at its highest node and walked by the front (+x)."""
+    """Returns the loop, starting at its highest node and running along the front (+x) first."""
     loop = np.roll(loop, -int(np.argmax(position[loop, 2])))
     quarter = max(1, len(loop) // 4)
     if position[loop[quarter], 0] < position[loop[-quarter], 0]:
@@ -100,7 +100,7 @@ def ordered(position: FloatArray, loop: npt.NDArray[np.integer]) -> IntArray:
 def beyond(
     faces: IntArray, n: int, loop: npt.NDArray[np.integer], cuff: npt.NDArray[np.integer]
 ) -> BoolArray:
-    """Returns (n,) which nodes a loop cuts off on the side of a cuff, without the loop itself."""
+    """Returns (n,) which nodes lie on the cuff's side of a loop, without the loop itself."""
     return _reached(unique_edges(faces), n, loop, cuff)
 
 
@@ -111,7 +111,7 @@ def _last_tube_cut(
     edges: IntArray,
     cuff: npt.NDArray[np.integer],
 ) -> tuple[float, IndexArray] | None:
-    """The innermost plane that cuts the sleeve alone, and the nodes beside its cut."""
+    """Returns the innermost plane that cuts the sleeve alone, and the nodes next to the cut."""
     border = np.unique(np.concatenate(boundary_loops(faces)))
     foreign = np.setdiff1d(border, cuff)
     last, before = None, 0.0
@@ -121,7 +121,7 @@ def _last_tube_cut(
         part = _component(inner, len(x), cuff[0])
         if not part[cuff].all() or part[foreign].any():
             break
-        # the sleeve's part of the cut: edges that leave it
+        # edges that leave the sleeve at the cut
         leaving = edges[part[edges].any(axis=1) & ~outside[edges].all(axis=1)]
         if len(leaving) < 6:
             continue
@@ -170,7 +170,7 @@ def _loop_near(
         allowed = side * ahead > 0.0 if side > 0 else ahead <= 0.0
         allowed[[low, high]] = True
         keep = allowed[edges].all(axis=1) & (away < 6.0)
-        # the edge between the two ends themselves would make a loop of nothing
+        # an edge that joins the two ends directly would make an empty loop
         keep &= ~(np.isin(edges, [low, high]).all(axis=1))
         graph = csr_array((weight[keep], (edges[keep, 0], edges[keep, 1])), shape=(len(x), len(x)))
         _, previous = dijkstra(graph, directed=False, indices=high, return_predecessors=True)
@@ -184,7 +184,7 @@ def _loop_near(
 
 
 def _cuts_off(edges: IntArray, n: int, loop: IntArray, cuff: npt.NDArray[np.integer]) -> bool:
-    """Whether the loop parts the sleeve from the rest."""
+    """Returns whether the loop separates the sleeve from the rest."""
     part = _reached(edges, n, loop, cuff)
     return bool(part[cuff[~np.isin(cuff, loop)]].all() and part.sum() < 0.4 * n)
 

@@ -1,4 +1,4 @@
-"""Parts of a file: which are left out, and what is told of a garment that is in pieces."""
+"""Leaves out parts of a file, and reports a garment that is in several parts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SIZE = re.compile(r"<\s*(\d+\.?\d*|\.\d+)\s*(m|cm|mm)?")
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, None: 1.0}
 _TOLD = 3  # parts that a message describes one by one
 _NAMES_TOLD = 12
-# What is tried before a message advises it, m.
+# Seam gaps and part sizes that are tried before a message advises one, m.
 _GAPS = (1e-6, 1e-5, 1e-4, 1e-3, 5e-3)
 _SIZES = (0.01, 0.02, 0.05, 0.1)
 
@@ -27,7 +27,7 @@ def sizes_of(leave_out: Sequence[str], source: str) -> list[float]:
     """Returns the sizes among entries of `leave_out`, such as `<0.05 m`, in m.
 
     Raises:
-        UserError: an entry begins with "<" and tells no size.
+        UserError: an entry begins with "<" and is not a size.
     """
     sizes = []
     for k, entry in enumerate(leave_out):
@@ -84,7 +84,8 @@ def check_one_part(mesh: RawMesh) -> None:
     """Checks that the mesh is connected.
 
     Raises:
-        UserError: it is in parts: their sizes and places, and which key would make them one.
+        UserError: it is in several parts. The message gives their sizes and places, and the keys
+            that would leave one part.
     """
     label = components(mesh.faces, len(mesh.position))
     count = int(label.max()) + 1
@@ -128,7 +129,7 @@ def _offer(entry: str, names: Sequence[str]) -> str:
 
 
 def _advice(mesh: RawMesh) -> str:
-    """Returns which keys would make the mesh one part, tried on it."""
+    """Returns the keys that would leave one part; each is first tried on the mesh."""
     advice = []
     for gap in _GAPS:
         sewn = seams_sewn(mesh, gap)

@@ -1,10 +1,10 @@
-"""Refuses meshes that are well formed and cannot be a garment.
+"""Refuses well-formed meshes that cannot be a garment.
 
-One missing or damaged line shifts all node numbers behind it, or moves a node: the file still
-reads as a mesh. Such meshes show by edges that cross the garment, by more surface than a garment
-of that size has, and by nodes far from all their neighbours. All measures are ratios, so that the
-unit of the file does not matter. Of sound garments (coats at 2 to 6 cm, five files of other
-people's) the longest edge reaches 0.15 of the diagonal, and the area 0.8 of its square.
+One missing or damaged line shifts all later node numbers, or moves a node, but the file still
+reads as a mesh. Such damage shows in edges that cross the garment, in more surface than a garment
+of that size has, and in nodes far from all their neighbours. All measures are ratios, so the unit
+of the file does not matter. In sound garments (coats at 2 to 6 cm, five third-party files) the
+longest edge reaches 0.15 of the diagonal, and the area 0.8 of its square.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from drake_dress.models.garment.edges import border_edges, unique_edges
 from drake_dress.models.garment.files.raw import RawMesh
 from drake_dress.models.garment.mesh import face_areas
 
-# An edge crosses the garment if it is longer than this part of the diagonal of the bounding box,
-# and than most edges by this factor: a mesh that is coarse throughout is not a damaged one.
+# An edge crosses the garment if it is longer than this fraction of the bounding box's diagonal, and
+# than the median edge times this factor: a mesh that is coarse throughout is not damaged.
 _LONGEST, _LONGER = 0.35, 3.0
-_LARGEST_AREA = 2.5  # area by the square of the diagonal: three layers of a garment
-# A node is off its surface if its shortest edge is this part of the diagonal, and if the faces
-# around it close up to a spike: the sum of their angles there, rad, or, for a node of the border,
-# the ratio of its edges to those that its neighbours share.
+_LARGEST_AREA = 2.5  # area over the square of the diagonal: three layers of a garment
+# A node is off its surface if its shortest edge is longer than `_FAR` times the diagonal, and if
+# the faces around it form a spike. Inside the mesh, their angles at the node then sum to less than
+# `_SPIKE_ANGLE`, rad; on the border, its shortest edge is longer than `_SPIKE_RATIO` times the mean
+# edge opposite to it.
 _FAR = 0.03
 _SPIKE_ANGLE = 2.5
 _SPIKE_RATIO = 4.0
@@ -32,14 +33,14 @@ _CAUSES = "are node numbers shifted by a missing line, or a coordinate damaged?"
 
 
 def check_plausible(mesh: RawMesh) -> None:
-    """Checks that edges, nodes and area can be those of a garment.
+    """Checks that edges, nodes and area are plausible for a garment.
 
     Args:
         mesh: in m, without duplicate nodes.
 
     Raises:
-        UserError: nodes far off their neighbours, edges across the garment, too much surface, or
-            faces without area.
+        UserError: nodes are far from their neighbours, edges cross the garment, there is too much
+            surface, or faces have no area.
     """
     x, faces = mesh.position, mesh.faces
     diagonal = float(np.linalg.norm(np.ptp(x, axis=0)))

@@ -1,10 +1,11 @@
 """Halves the edges of a mesh that are too long, and no others.
 
-Every edge above the bound gets a node in its middle, and each face is cut by the nodes on its
-sides: with one or two of them from the middle of its longest side, with three into four alike.
-Neighbours agree because they share the nodes. Cutting the longest side first keeps angles from
-shrinking pass by pass (Rosenberg and Stenger 1975, "A lower bound on the angles of triangles
-constructed by bisecting the longest side"). Passes repeat until no edge is too long.
+Every edge above the bound gets a node at its midpoint, and each face is cut at the nodes on its
+sides. A face with one or two of them is cut from the midpoint of its longest side; a face with
+three is cut into four similar triangles. Neighbours agree because they share the nodes. Cutting
+the longest side first keeps angles from shrinking pass by pass (Rosenberg and Stenger 1975, "A
+lower bound on the angles of triangles constructed by bisecting the longest side"). Passes repeat
+until no edge is too long.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ def refine(
         position: (n,3), m.
         faces: (F,3) of an oriented manifold.
         loops: closed chains of edges, as node indices.
-        longest: wanted bound of edges, m.
-        most_nodes: bound of the result's size.
+        longest: largest edge length, m.
+        most_nodes: largest number of nodes of the result.
 
     Raises:
         UserError: the result would have more than `most_nodes` nodes.
@@ -68,9 +69,9 @@ def refine(
 
 
 def _cut(faces: IntArray, middle: IndexArray, length: FloatArray) -> IntArray:
-    """Returns faces cut by the nodes on their sides, -1 for none; in the order of the old ones."""
+    """Returns faces cut at the midpoints of their sides (-1: none), in the old faces' order."""
     rows = np.arange(len(faces))
-    first = np.argmax(length, axis=1)  # each face is turned so that its longest side comes first
+    first = np.argmax(length, axis=1)  # rotate each face so that its longest side comes first
     a, b, c = (faces[rows, (first + k) % 3] for k in range(3))
     m, p, q = (middle[rows, (first + k) % 3] for k in range(3))
     on_ab, on_bc, on_ca = m >= 0, p >= 0, q >= 0

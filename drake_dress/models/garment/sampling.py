@@ -1,4 +1,4 @@
-"""Points of a garment that are far from each other."""
+"""Farthest-point sampling of a garment."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from drake_dress.models.arrays import FloatArray, IndexArray
 
 
 def spread_out(points: FloatArray, count: int, first: int) -> IndexArray:
-    """Returns indices of `count` points (n,3), all if fewer: each the farthest from those before.
+    """Returns indices of `count` points (all if there are fewer) by farthest-point sampling.
 
     Args:
         points: (n,3) m.
-        count: wanted.
-        first: index to begin with.
+        count: number of points to select.
+        first: index of the first point.
     """
     chosen = [first]
     distance = np.linalg.norm(points - points[first], axis=1)

@@ -1,4 +1,4 @@
-"""A triangle mesh as a thin shell of tetrahedra, for programs that show volumes alone."""
+"""A triangle mesh as a thin shell of tetrahedra, for programs that only show volumes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 
-# Of a face's normal along that of its corners, below which it gets corners of its own.
+# Cosine between the normals of a face and its nodes, below which the face gets nodes of its own.
 _LEAST_COSINE = 0.1
 
 
@@ -17,10 +17,10 @@ class Shell:
     """A shell about a triangle mesh: two layers of m nodes each, the lower layer first.
 
     Attributes:
-        owner: (m,) node of the mesh that each lies about.
-        faces: (F,3) the mesh's triangles with these nodes.
-        tetrahedra: (3F,4) with the nodes of both layers.
-        thickness: m.
+        owner: (m,) mesh node that each node of a layer belongs to.
+        faces: (F,3) the mesh's triangles, as indices into `owner`.
+        tetrahedra: (3F,4) indices into the nodes of both layers.
+        thickness: distance between the layers, m.
     """
 
     owner: IntArray
@@ -37,21 +37,21 @@ class Shell:
 
 
 def make_shell(position: FloatArray, faces: IntArray, thickness: float) -> Shell:
-    """Returns a shell none of whose tetrahedra is inside out.
+    """Returns a shell without inverted tetrahedra.
 
-    Where a mesh folds back on itself no normal is good for all faces of a node; faces there get
-    corners of their own.
+    Where a mesh folds back on itself, no normal suits all faces of a node. Faces there get nodes
+    of their own.
 
     Args:
         position: (n,3) of the mesh, m.
         faces: (F,3) its triangles.
-        thickness: of the shell, m.
+        thickness: thickness of the shell, m.
     """
     area = _areas(position, faces)
     own = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
     alone = np.zeros(len(faces), dtype=bool)
     while True:
-        # faces that left change the normals of those that stay
+        # removing faces changes the normals of those that stay
         normals = _node_normals(position, faces[~alone])
         lean = np.einsum("fki,fi->fk", normals[faces], own).min(axis=1) < _LEAST_COSINE
         if not np.any(lean & ~alone):
@@ -61,7 +61,7 @@ def make_shell(position: FloatArray, faces: IntArray, thickness: float) -> Shell
     split = faces.astype(np.int64).copy()
     split[alone] = count + np.arange(3 * int(alone.sum())).reshape(-1, 3)
     owner = np.concatenate([np.arange(count), faces[alone].ravel()])
-    # nodes that lost all their faces stay, and are of no tetrahedron
+    # nodes that lost all their faces stay, without tetrahedra
     return Shell(
         owner.astype(np.int32),
         split.astype(np.int32),
@@ -89,10 +89,10 @@ def _node_normals(position: FloatArray, faces: IntArray) -> FloatArray:
 def _tetrahedra(faces: IndexArray, count: int) -> IntArray:
     """Returns three tetrahedra of each triangle's prism.
 
-    A prism's sides are cut from the lower end of its edges with the smaller index, so that
-    neighbours cut the side they share alike.
+    Each side of a prism is cut from the lower node with the smaller index, so that neighbours cut
+    their common side alike.
     """
-    # each triangle from its smallest index on, the way round as it was
+    # rotate each triangle so that its smallest index comes first
     first = np.argmin(faces, axis=1)
     a, b, c = (faces[np.arange(len(faces)), (first + k) % 3] for k in range(3))
     up_a, up_b, up_c = a + count, b + count, c + count

@@ -1,4 +1,4 @@
-"""Brings a mesh to a spacing: halves edges that are too long, then merges nodes too near."""
+"""Remeshes to a spacing: halves edges that are too long, then merges nodes that are too close."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def to_spacing(
     spacing: float,
     progress: Callable[[float], None] = lambda _: None,
 ) -> tuple[FloatArray, IntArray, list[IntArray], IntArray]:
-    """Returns positions, faces, loops, and for each old node the new one, at about `spacing`.
+    """Returns positions, faces, loops, and the new index of each old node, at about `spacing`.
 
     Args:
         position: (n,3), m.
         faces: (F,3) of an oriented manifold.
         loops: closed chains of edges to keep, as node indices.
         spacing: wanted mean edge length, m.
-        progress: is told the share that is done, now and then.
+        progress: called from time to time with the fraction that is done.
 
     Raises:
         UserError: the mesh would become too large (see `refine`).

@@ -1,4 +1,4 @@
-"""Positions of one mesh of a garment told at the nodes of another: fine to coarse and back."""
+"""Transfers positions between two meshes of a garment: fine to coarse and back."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from drake_dress.models.garment.mesh import GarmentMesh
 def barycentric_transfer(source: GarmentMesh, target: GarmentMesh) -> csr_array:
     """Returns W (n_target, n_source) such that `W @ x_source` are positions of the target's nodes.
 
-    Each row holds the barycentric weights, none negative, sum 1, of the closest point of the
-    source's rest surface; a node on a loop of the target takes the closest point on the edges of
-    the source's loop of that name, so that an opening stays that opening.
+    Each row holds the barycentric weights, non-negative with sum 1, of the closest point of the
+    source's rest surface. A node on a loop of the target takes the closest point on the edges of
+    the source's loop of the same name, so that openings map to openings.
 
     Args:
         source: the mesh whose positions are known.
-        target: a mesh of the same garment in the same rest pose, in general not as fine.
+        target: a mesh of the same garment in the same rest pose, usually coarser.
     """
     triangles = source.rest_position[source.faces]
     face, closest = _closest_on_triangles(triangles, target.rest_position)
@@ -44,7 +44,7 @@ def barycentric_transfer(source: GarmentMesh, target: GarmentMesh) -> csr_array:
 
 
 def attach(mesh: GarmentMesh, points: FloatArray) -> csr_array:
-    """Returns W (m, n) such that `W @ x` are `points` (m,3) of the rest surface, wherever it is.
+    """Returns W (m, n) such that `W @ x` moves `points` (m,3) of the rest surface with the cloth.
 
     Each row holds the barycentric weights of the closest point of the rest surface.
     """
@@ -62,7 +62,10 @@ def attach(mesh: GarmentMesh, points: FloatArray) -> csr_array:
 def _closest_on_triangles(
     triangles: FloatArray, points: FloatArray
 ) -> tuple[IndexArray, FloatArray]:
-    """Exact: candidates are the nearest centroids, more until none farther can be closer."""
+    """Returns the closest face and the closest point on it, exactly.
+
+    The nearest centroids are the candidates. More are added until no other face can be closer.
+    """
     centroid = triangles.mean(axis=1)
     reach = float(np.linalg.norm(triangles - centroid[:, None], axis=2).max())
     tree = cKDTree(centroid)
@@ -88,7 +91,7 @@ def _closest_on_triangles(
 
 
 def _closest_on_edges(edges: FloatArray, points: FloatArray) -> tuple[IndexArray, FloatArray]:
-    """Returns for (m,3) points the closest of (k,2,3) segments and the fraction along it."""
+    """Returns the closest of (k,2,3) segments to (m,3) points, and the fraction along it."""
     start, chord = edges[:, 0], edges[:, 1] - edges[:, 0]
     offset = points[:, None] - start[None]
     along = np.clip((offset * chord).sum(axis=2) / (chord**2).sum(axis=1), 0.0, 1.0)

@@ -1,1 +1,1 @@
-"""The body as capsules on articulated arms."""
+"""The person: a body of capsules on articulated arms, its motions and their prediction."""

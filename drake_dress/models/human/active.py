@@ -1,13 +1,13 @@
-"""An arm with a will: what it wants next, and its set-point on the way there.
+"""An active arm: its next goal, and its set-point on the way there.
 
-An arm that wants nothing follows the garment (`following.py`). What it wants moves its hand along a
-smooth path (`hand_tracking.py`), in the torso's frame, so that it goes on while the body turns:
+An arm without a goal follows the garment (`following.py`). A goal moves the hand along a smooth
+path (`hand_tracking.py`) in the torso's frame, so that the motion continues while the body turns:
 
     follow ──armhole near──▶ reach ──hand through it──▶ follow
                                └──armhole gone──▶ return ──▶ follow
-    any ──its time──▶ withdraw ──time over──▶ return;   a wave is added to wherever the hand is
+    any ──its time──▶ withdraw ──time over──▶ return;   a wave is added to the hand's path
 
-While it reaches, a hand that the garment holds off its path pushes a little harder, within limits.
+While reaching, a hand that the garment holds off its path pushes a little harder, within limits.
 """
 
 from __future__ import annotations
@@ -31,22 +31,23 @@ from drake_dress.models.human.hand_tracking import (
 )
 from drake_dress.models.human.motions import Motion, Reach, Wave, Withdraw
 
-# A reach is given up with the armhole this much further from where the hand was than it began.
+# A reach is given up once the armhole is farther from the hand's anchor than this times `within`.
 _LOST = 1.4
-_REACHABLE = 1.1  # times the arm's length from the shoulder
-# A hand this far beside the armhole's axis goes for a point before the opening, one nearer goes in.
+_REACHABLE = 1.1  # largest distance of the armhole from the shoulder, over the arm's length
+# A hand `_BESIDE` off the armhole's axis aims at a point before the opening. A hand within
+# `_IN_LINE` aims through the opening; the targets are blended in between.
 _BESIDE, _IN_LINE = 0.10, 0.05  # m
 _BEFORE = 0.08  # that point's distance before the opening, m
-_ENTERED = 0.6  # share of the push after which the hand is in
-_HARDER = 1.0  # 1/s, growth of the target's shift with how far the hand is off its path
-_HARDEST = 0.10  # m, of that shift
+_ENTERED = 0.6  # fraction of the push beyond which the hand has entered
+_HARDER = 1.0  # 1/s, gain from the hand's path error to the rate of the target's shift
+_HARDEST = 0.10  # m, largest shift
 _ARRIVED, _STILL, _STUCK = 0.003, 0.01, 0.02  # m, m/s, rad/s
 _UNPLANNED = -1.0
 _LEFTWARD = np.array([0.0, 1.0, 0.0])
 
 
 class Want(IntEnum):
-    """What an arm wants."""
+    """Goal of an arm."""
 
     FOLLOW = 0
     REACH = 1
@@ -59,9 +60,10 @@ class ActiveParameters:
     """Limits of an active person's arms.
 
     Attributes:
-        following: when nothing is wanted.
-        max_hand_speed: m/s; people reach at 0.5 to 1 m/s at most when not in a hurry.
-        max_joint_speed: rad/s.
+        following: parameters of an arm without a goal.
+        max_hand_speed: largest hand speed, m/s; people reach at 0.5 to 1 m/s at most when not in a
+            hurry.
+        max_joint_speed: largest joint speed, rad/s.
     """
 
     following: FollowingParameters = field(default_factory=FollowingParameters)
@@ -71,15 +73,15 @@ class ActiveParameters:
 
 @dataclass(frozen=True)
 class ArmState:
-    """Where an arm is with what it wants.
+    """State of an active arm.
 
     Attributes:
         set_point: (4,), rad. rate: (4,), rad/s.
-        path: of the hand.
-        shift: (3,) of the target, to push harder, m.
-        anchor: (3,) where the hand goes back to, m.
-        want: what it does.
-        through: whether a reach has been through the armhole.
+        path: reference path of the hand.
+        shift: (3,) offset of the target that makes the hand push harder, m.
+        anchor: (3,) point that the hand returns to, m.
+        want: current goal.
+        through: whether a reach has passed through the armhole.
     """
 
     set_point: FloatArray
@@ -124,14 +126,14 @@ class ArmState:
 
 
 class ActiveArm:
-    """Steps one arm.
+    """Steps the set-point of one arm.
 
     Args:
         arm: its kinematics.
         comfort: rest pose (4,), rad.
-        limits: (2,4) least and greatest angles, rad.
-        stiffness: of its joints (4,), N·m/rad.
-        motions: of the person; those of the other arm are ignored.
+        limits: (2,4) lower and upper joint limits, rad.
+        stiffness: stiffness of its joints (4,), N·m/rad.
+        motions: motions of the person; those of the other arm are ignored.
         parameters: limits.
     """
 
@@ -164,11 +166,11 @@ class ActiveArm:
         """Returns the state one step later.
 
         Args:
-            state: now.
-            angles: of the true arm (4,), rad.
-            armhole: of this side as it is now.
-            time: now, s.
-            step: s.
+            state: current state.
+            angles: true joint angles (4,), rad.
+            armhole: current armhole of this side.
+            time: current time, s.
+            step: time step, s.
         """
         state = self._decide(state, armhole, time)
         waving = sum((np.array(w.offset(time)) for w in self._waves), np.zeros(2))
@@ -227,9 +229,9 @@ class ActiveArm:
         return state
 
     def _begin(self, state: ArmState, want: Want) -> ArmState:
-        """Returns the state with a new want; its path goes on from where the set-point is.
+        """Returns the state with a new goal; the hand's path continues without a jump.
 
-        A hand that leaves where it followed will come back there, whatever it does meanwhile.
+        A hand that stops following will return to that place, whatever it does meanwhile.
         """
         path, anchor = state.path, state.anchor
         if state.want is Want.FOLLOW:
@@ -240,7 +242,7 @@ class ActiveArm:
         return replace(state, want=want, anchor=anchor, path=path, shift=np.zeros(3))
 
     def _has_returned(self, state: ArmState) -> bool:
-        """Returns whether the hand is back, or as near as the joints let it come."""
+        """Returns whether the hand is back, or as close as the joints allow."""
 
         def near(point: FloatArray) -> bool:
             return float(np.linalg.norm(state.anchor - point)) < _ARRIVED

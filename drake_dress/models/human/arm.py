@@ -1,8 +1,8 @@
-"""An arm's four hinges: where the hand goes with them, and what gravity asks of them.
+"""Kinematics and gravity torques of an arm with four hinges.
 
 Angles (4,) are abduction, extension, rotation, elbow flexion, rad, as in `body.py`; all vectors are
-in the torso's frame, z up. An upright torso may stand and be turned anywhere: gravity's torques on
-the arms do not change with it.
+in the torso's frame, z up. The place and yaw of an upright torso do not change the gravity torques
+on the arms.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from drake_dress.models.human.body import (
 from drake_dress.models.sides import Side
 
 JOINT_NAMES = ("abduction", "extension", "rotation", "elbow")
-GRAVITY = 9.81  # m/s², as the plant's
+GRAVITY = 9.81  # m/s², as in the plant
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Kinematics and gravity of one arm: two limbs of even mass on a fixed shoulder.
+    """Kinematics and gravity of one arm: two limbs of uniform mass on a fixed shoulder.
 
     Attributes:
         measures: sizes and masses.
@@ -47,7 +47,7 @@ class Arm:
 
     @property
     def length(self) -> float:
-        """Returns how far the hand reaches from the shoulder, m."""
+        """Returns the reach of the hand from the shoulder, m."""
         return self.measures.upper_arm_length + self.measures.forearm_length
 
     def points(self, angles: FloatArray) -> FloatArray:
@@ -63,24 +63,24 @@ class Arm:
         return hand
 
     def jacobian(self, angles: FloatArray) -> FloatArray:
-        """Returns (3,4) the derivative of the hand by the angles, m/rad: axis × lever."""
+        """Returns the Jacobian (3,4) of the hand, m/rad: axis × lever."""
         axes, upper, fore = self._chain(angles)
         levers = np.stack([upper + fore] * 3 + [fore])
         return np.cross(axes, levers).T
 
     def gravity_torque(self, angles: FloatArray) -> FloatArray:
-        """Returns (4,) −∂U/∂q, what gravity does to each hinge, N·m.
+        """Returns (4,) −∂U/∂q, the gravity torque on each hinge, N·m.
 
-        U = Σ m g z over both limbs' middles.
+        U = Σ m g z over the centres of both limbs.
         """
         axes, carried = self._weights(angles)
         torque: FloatArray = axes[:, 1] * carried[:, 0] - axes[:, 0] * carried[:, 1]
         return torque
 
     def gravity_stiffness(self, angles: FloatArray) -> FloatArray:
-        """Returns (4,4) ∂²U/∂q², N·m/rad: positive where gravity draws the arm back.
+        """Returns (4,4) ∂²U/∂q², N·m/rad: positive where gravity pulls the arm back.
 
-        A vector d that hinges i ≤ j both carry, i the nearer to the torso, has
+        A vector d that is carried by hinges i ≤ j, with i the nearer to the torso, has
         ∂²d/∂q_i∂q_j = a_i × (a_j × d) = a_j (a_i·d) − d (a_i·a_j).
         """
         axes, carried = self._weights(angles)
@@ -89,9 +89,9 @@ class Arm:
         return stiffness
 
     def _weights(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Returns axes (4,3), and what each hinge carries (4,3): weight times lever, N·m.
+        """Returns axes (4,3), and the load of each hinge (4,3): weight times lever, N·m.
 
-        U changes as the height of what is carried.
+        U changes with the height of the load.
         """
         m = self.measures
         axes, upper, fore = self._chain(angles)
@@ -105,7 +105,7 @@ class Arm:
         upper, fore = arm_rotations(self.side, pose)
         sign = 1.0 if self.side == "left" else -1.0
         c, s = np.cos(pose.abduction), np.sin(sign * pose.abduction)
-        # abduction is about the torso's x; what it turns carries the axis of extension along
+        # abduction turns about the torso's x and carries the axis of extension along
         axes = np.array([[sign, 0.0, 0.0], [0.0, c, s], sign * upper[:, 2], -upper[:, 1]])
         return (
             axes,
@@ -121,9 +121,9 @@ class Arms:
     Attributes:
         arms: kinematics and masses.
         rest: (2,4) angles about which the plant's springs act, rad.
-        limits: (2,2,4) least and greatest angles of each arm, rad.
+        limits: (2,2,4) lower and upper joint limits of each arm, rad.
         stiffness: (4,) of an arm's joints, N·m/rad.
-        damping: (4,) N·m·s/rad.
+        damping: (4,) of an arm's joints, N·m·s/rad.
     """
 
     arms: tuple[Arm, Arm]

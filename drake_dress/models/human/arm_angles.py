@@ -1,4 +1,4 @@
-"""The angles of an arm's hinges from where its limbs point: the inverse of `body.arm_rotations`.
+"""Joint angles of an arm from the directions of its limbs: the inverse of `body.arm_rotations`.
 
 With the upper arm along u and the forearm along f, unit vectors in the torso's frame, and s = 1 on
 the left, −1 on the right:
@@ -6,8 +6,8 @@ the left, −1 on the right:
     u = Rx(s a) Ry(e) (0, 0, −1) = (−sin e, sin(s a) cos e, −cos(s a) cos e)
     f = Rx(s a) Ry(e) Rz(s r) (sin k, 0, −cos k)
 
-with abduction a, extension e, rotation r, elbow flexion k. Two sets of angles point a limb alike:
-(a, e) and (a + π, π − e).
+with abduction a, extension e, rotation r, elbow flexion k. Two sets of angles give the same
+direction of a limb: (a, e) and (a + π, π − e).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def arm_angles(side: Side, upper: FloatArray, fore: FloatArray) -> FloatArray:
     Args:
         side: left or right.
         upper: (3,) unit vector from shoulder to elbow, in the torso's frame.
-        fore: (3,) from elbow to hand.
+        fore: (3,) unit vector from elbow to hand.
     """
     sign = 1.0 if side == "left" else -1.0
     x, y, z = (float(v) for v in upper)

@@ -1,4 +1,4 @@
-"""An armhole as the person whose hand goes into it has it: relative to the torso."""
+"""An armhole in the frame of the person's torso."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drake_dress.models.dressing.linking import arm_linking_number, torso_interi
 from drake_dress.models.dressing.sleeve import sleeve_state
 from drake_dress.models.human.arm import Arm
 
-# From a point to its mirror image across the torso's middle plane.
+# Mirrors a point across the torso's mid-sagittal plane.
 _MIRROR = np.array([1.0, -1.0, 1.0])
 
 
@@ -33,19 +33,19 @@ class Armhole:
 
     @property
     def is_entered(self) -> bool:
-        """Returns whether the arm is through it (linking number ±1)."""
+        """Returns whether the arm is through the armhole (linking number ±1)."""
         shoulder, elbow, hand = self.joints
         interior = torso_interior(shoulder, _MIRROR * shoulder)
         return abs(arm_linking_number(self.loop, shoulder, elbow, hand, interior)) == 1
 
     @property
     def depth(self) -> float:
-        """Returns how far the hand is beyond its plane, m."""
+        """Returns the distance of the hand beyond the armhole's plane, m."""
         return float((self.joints[2] - self.center) @ self.into)
 
     @property
     def beside(self) -> float:
-        """Returns how far the hand is from its axis, m."""
+        """Returns the distance of the hand from the armhole's axis, m."""
         offset = self.joints[2] - self.center
         return float(np.linalg.norm(offset - self.depth * self.into))
 
@@ -53,15 +53,15 @@ class Armhole:
 def find_armhole(
     loop: FloatArray, sign: float, arm: Arm, angles: FloatArray, yaw: float, origin: FloatArray
 ) -> Armhole:
-    """Returns the armhole that the nodes `loop` (k,3), m, world, go round.
+    """Returns the armhole along the nodes `loop` (k,3), m, in the world frame.
 
     Args:
         loop: nodes in order.
-        sign: of the loop, see `loop_orientation`.
+        sign: orientation of the loop, see `loop_orientation`.
         arm: the arm of that side.
-        angles: of the arm (4,), rad.
-        yaw: of the torso about the vertical, rad.
-        origin: of the torso's frame (3,), m, world.
+        angles: joint angles of the arm (4,), rad.
+        yaw: yaw of the torso about the vertical, rad.
+        origin: origin of the torso's frame (3,) in the world frame, m.
     """
     c, s = np.cos(yaw), np.sin(yaw)
     in_torso = (loop - origin) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

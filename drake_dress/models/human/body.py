@@ -1,17 +1,17 @@
 """A person as capsules and spheres on articulated arms.
 
-Bodies: `torso` (with neck, head, pelvis and legs; it moves only to turn), and `{side}_upper_arm`
-and `{side}_forearm` (with the hand). In a body's frame the arm hangs along −z: the upper arm from
-its shoulder joint at the origin, the forearm from its elbow joint at the origin. The torso's frame
-has its origin on the floor below the shoulders' midpoint.
+Bodies: `torso` (with neck, head, pelvis and legs; it can only turn), and `{side}_upper_arm` and
+`{side}_forearm` (with the hand). In a body's frame the arm hangs along −z: the upper arm from its
+shoulder joint at the origin, the forearm from its elbow joint at the origin. The torso's frame has
+its origin on the floor below the shoulders' midpoint.
 
-Angles of an arm, zero when it hangs straight down: abduction opens it sideways, extension moves
-the hand backward, rotation turns it about its own axis (outward positive: the hand of a bent arm
-moves away from the body), elbow flexion brings the forearm forward. They apply in this order from
-the torso outward; both sides use the same signs, so equal angles give mirrored arms.
+The angles of an arm are zero when it hangs straight down. Abduction opens it sideways, extension
+moves the hand backward, rotation turns it about its own axis (outward positive: the hand of a bent
+arm moves away from the body), and elbow flexion brings the forearm forward. They apply in this
+order from the torso outward. Both sides use the same signs, so equal angles give mirrored arms.
 
-Limitation: at zero abduction an upper arm sinks into the side of the chest by as much as half the
-chest's width and the arm's radius exceed half the shoulder width (2.5 cm as preset).
+Limitation: at zero abduction an upper arm penetrates the side of the chest by half the chest width
+plus the arm's radius minus half the shoulder width (2.5 cm by default).
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class BodyMeasures:
 
 @dataclass(frozen=True)
 class ArmPose:
-    """Angles of an arm, rad; signs and order as in the module's text.
+    """Angles of an arm, rad; signs and order as in the module docstring.
 
     Raises:
         UserError: an angle is not a finite number.
@@ -121,7 +121,7 @@ class ArmPose:
 
 @dataclass(frozen=True)
 class Capsule:
-    """A capsule fixed in `body`; a sphere where a_B equals b_B. Ends (3,), m, radius, m."""
+    """A capsule fixed in `body`; a sphere if a_B equals b_B. Ends (3,), m, radius, m."""
 
     body: str
     a_B: FloatArray
@@ -141,7 +141,7 @@ def shoulder_height(measures: BodyMeasures, posture: Posture) -> float:
         )
     if posture == "standing":
         return measures.shoulder_height
-    # the seat is at knee height, half a leg; the trunk stays as long as it is
+    # the seat is at knee height, half a leg; the trunk keeps its length
     return measures.shoulder_height - 0.5 * measures.leg_length
 
 

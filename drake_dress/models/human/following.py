@@ -1,25 +1,25 @@
-"""A person who lets the garment lead: where the arms are held drifts to where they are drawn.
+"""A person who follows the garment: the arms' set-points drift to where they are drawn.
 
-Model: an arm is held at a set-point s by springs K about it and by tone that carries its weight
-there (equilibrium-point control: Feldman 1986, "Once more on the equilibrium-point hypothesis").
-Led to angles q, its muscles feel the torque
+Model: springs K hold an arm at a set-point s, and muscle tone carries its weight there
+(equilibrium-point control: Feldman 1986, "Once more on the equilibrium-point hypothesis"). When the
+arm is led to angles q, its muscles feel the torque
 
-    e = (K + ∂²U(s)) (q − s),
+    e = (K + ∂²U(s)) (q − s)
 
-their springs' and, to first order, what tone does not carry of the weight at q. Who cooperates with
-least effort gives way to it: the set-point yields as a dashpot T·K behind a friction element θ does
-(compliant following, as by an admittance with a dead zone),
+of the springs and, to first order, of the part of the weight at q that tone does not carry. A
+person who cooperates with least effort yields to it. The set-point moves like a dashpot T·K behind
+a friction element θ (compliant following, like an admittance with a dead zone),
 
-    ds/dt = sign(e) max(|e| − θ, 0) / (T K)           each joint by itself,
+    ds/dt = sign(e) max(|e| − θ, 0) / (T K)           for each joint separately,
 
-and tone is that of the new s, so that the weight stays carried. What is led by less than θ comes
-back. Where nobody leads (|e| < θ), a person with a comfortable pose c goes slowly back to it:
-ds/dt += (1 − |e|/θ) (c − s)/T_c.
+and tone adapts to the new s, so that it still carries the weight. An arm that is led with less than
+θ springs back. While nothing leads it (|e| < θ), the arm slowly returns to the comfortable pose c,
+if there is one: ds/dt += (1 − |e|/θ) (c − s)/T_c.
 
-The set-point never does net work on who leads. With W(q,s) = ½(q−s)ᵀK(q−s) + U(q) − U(s) −
-∂U(s)·(q−s), held in springs and weight, the leader's work is dW + e·ds and e·ds ≥ 0 for each joint
-that is led; a joint that goes back gives at most θ|ds| and was led away against at least θ|ds|. So
-over a closed cycle the leader never gains.
+The set-point never does net work on the leader. With the energy W(q,s) = ½(q−s)ᵀK(q−s) + U(q) −
+U(s) − ∂U(s)·(q−s) stored in springs and weight, the leader's work is dW + e·ds, and e·ds ≥ 0 for
+each joint that is led. A joint that returns gives back at most θ|ds|, and leading it away took at
+least θ|ds|. So the leader never gains energy over a closed cycle.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 
-# A joint without a spring would follow infinitely fast, N·m/rad.
+# Least stiffness, since a joint without a spring would follow infinitely fast, N·m/rad.
 _LEAST_STIFFNESS = 0.1
 
 
 @dataclass(frozen=True)
 class FollowingParameters:
-    """How a person follows.
+    """Parameters of a person who follows the garment.
 
     Attributes:
-        time_constant: T, with which the set-point follows a displaced joint, s.
-        threshold: θ, the torque up to which a joint keeps its set-point, N·m.
-        return_time_constant: T_c of the return to the comfortable pose, s. None: the arm stays
-            where it was led.
-        max_speed: greatest speed of a set-point, rad/s.
+        time_constant: T, time constant with which the set-point follows a displaced joint, s.
+        threshold: θ, torque up to which a joint keeps its set-point, N·m.
+        return_time_constant: T_c, time constant of the return to the comfortable pose, s. With None
+            the arm stays where it was led.
+        max_speed: largest speed of a set-point, rad/s.
 
     Raises:
-        UserError: a value is not as said here.
+        UserError: a value is out of range.
     """
 
     time_constant: float = 1.0
@@ -74,12 +74,12 @@ def following_rate(
     gravity_stiffness: FloatArray,
     p: FollowingParameters,
 ) -> FloatArray:
-    """Returns ds/dt (k,), rad/s, of one arm; all joints slow down alike for the fastest one.
+    """Returns ds/dt (k,), rad/s, of one arm, scaled so that the fastest joint keeps `max_speed`.
 
     Args:
         set_point: s (k,), rad.
         angles: q (k,) of the arm, rad.
-        comfort: c (k,), rad.
+        comfort: c (k,), comfortable pose, rad.
         stiffness: the diagonal of K (k,), N·m/rad.
         gravity_stiffness: ∂²U(s) (k,k), N·m/rad.
         p: parameters.

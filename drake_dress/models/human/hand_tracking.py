@@ -1,4 +1,4 @@
-"""How a hand is moved: a smooth path to where it shall be, and the joints that follow the path."""
+"""Moves a hand to a target: a smooth path, and the joint rates that follow it."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import Arm
 
-# Shortest time that is planned ahead, s: how fast a small correction is.
+# Shortest planned duration, s: that of a small correction.
 _SHORTEST = 0.3
 _DAMPING = 0.04  # of the inverse kinematics, m/rad
-_FEEDBACK = 8.0  # 1/s, with which a set-point off its path comes back to it
-_COMFORT = 0.5  # 1/s, with which the free fourth hinge goes to the comfortable pose
+_FEEDBACK = 8.0  # 1/s, feedback gain on the path error of the set-point
+_COMFORT = 0.5  # 1/s, gain toward the comfortable pose in the null space
 _MAX_ACCELERATION = 30.0  # of a joint's set-point, rad/s²
 
-_BRAKING = 6.0  # of that, what is counted on before a limit, rad/s²
-_SETTLING = 20.0  # 1/s, with which the last of the way to a limit is gone
+_BRAKING = 6.0  # part of that which is assumed for braking before a limit, rad/s²
+_SETTLING = 20.0  # 1/s, rate of the exponential approach to a limit at its end
 
 
 @dataclass(frozen=True)
 class HandPath:
-    """Where a hand is asked to be: position, velocity, acceleration (3,) in the torso's frame.
+    """Reference of a hand: position, velocity, acceleration (3,) in the torso's frame.
 
     Attributes:
         position: m. velocity: m/s. acceleration: m/s².
@@ -37,9 +37,10 @@ class HandPath:
     def toward(self, target: FloatArray, max_speed: float, step: float) -> HandPath:
         """Returns the path `step` s later on its way to `target` (3,), m, which may move.
 
-        The minimum-jerk law in feedback form, jerk = 60 e/T³ − 36 v/T² − 9 a/T for the time T that
-        remains (Hoff and Arbib 1993): a target at rest is reached on the minimum-jerk path.
-        T is stretched where the mean speed would exceed `max_speed`, m/s; so is the speed itself.
+        This is the minimum-jerk law in feedback form, jerk = 60 e/T³ − 36 v/T² − 9 a/T with the
+        remaining time T (Hoff and Arbib 1993): a target at rest is reached on the minimum-jerk
+        path. T is extended if the mean speed would exceed `max_speed`, m/s, and the speed itself is
+        limited to it.
         """
         error = target - self.position
         least = float(np.linalg.norm(error)) / max_speed
@@ -71,17 +72,17 @@ def tracking_rate(
 ) -> FloatArray:
     """Returns joint rates (4,), rad/s, that keep the hand on its path; damped least squares.
 
-    A hinge that would leave its bounds goes as fast as they allow, and the others do what is left.
-    The hinge that is over draws toward the comfortable pose.
+    A hinge that would exceed its bounds moves at its bound, and the others supply the rest. While
+    no hinge is at its bound, motion in the null space draws the arm toward the comfortable pose.
 
     Args:
         arm: its kinematics.
         angles: set-point (4,), rad.
-        position: of the path (3,), m.
-        velocity: of the path (3,), m/s.
-        comfort: (4,), rad.
-        bounds: (2,4) least and greatest rates, rad/s, zero among them; see `rate_bounds`.
-        max_speed: of the hand, m/s.
+        position: position on the path (3,), m.
+        velocity: velocity on the path (3,), m/s.
+        comfort: comfortable pose (4,), rad.
+        bounds: (2,4) lower and upper rates, rad/s, which include zero; see `rate_bounds`.
+        max_speed: largest speed of the hand, m/s.
     """
     wanted = velocity + _FEEDBACK * (position - arm.hand(angles))
     speed = float(np.linalg.norm(wanted))
@@ -106,19 +107,19 @@ def tracking_rate(
 
 
 def _at_no_cost(jacobian: FloatArray, rate: FloatArray) -> FloatArray:
-    """Returns the part of rates (4,) that leaves the hand where it is."""
+    """Returns the null-space part of rates (4,), which does not move the hand."""
     idle = np.linalg.svd(jacobian)[2][3]
     part: FloatArray = idle * (idle @ rate)
     return part
 
 
 def rate_bounds(angles: FloatArray, limits: FloatArray, max_joint_speed: float) -> FloatArray:
-    """Returns (2,4) least and greatest rates, rad/s, from which each joint still stops in time.
+    """Returns (2,4) lower and upper rates, rad/s, from which each joint can still stop in time.
 
     Args:
         angles: set-point (4,), rad.
-        limits: (2,4) least and greatest angles, rad.
-        max_joint_speed: rad/s.
+        limits: (2,4) lower and upper joint limits, rad.
+        max_joint_speed: largest joint speed, rad/s.
     """
     room = np.maximum([angles - limits[0], limits[1] - angles], 0.0)
     stopping = np.minimum(np.sqrt(2.0 * _BRAKING * room), _SETTLING * room)
@@ -127,9 +128,9 @@ def rate_bounds(angles: FloatArray, limits: FloatArray, max_joint_speed: float) 
 
 
 def eased(wanted: FloatArray, before: FloatArray, step: float) -> FloatArray:
-    """Returns rates (4,), rad/s, from `before` toward `wanted` within a joint's acceleration.
+    """Returns rates (4,), rad/s, from `before` toward `wanted` within the joints' acceleration.
 
-    All joints change in proportion, so that the hand is never faster than in both.
+    All joints change in proportion, so the hand is never faster than at the faster of the two.
     """
     change = wanted - before
     largest = float(np.max(np.abs(change)))

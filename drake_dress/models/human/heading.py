@@ -1,4 +1,4 @@
-"""Which way a person faces, as the line of the shoulders tells."""
+"""Heading of a person, from the line of the shoulders."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 
-# A sine up to here is rounding: a person who does not turn is taken to face +x to the last bit.
+# A sine up to this is rounding: a person who does not turn then faces +x to the last bit.
 _ROUNDING = 1e-12
 
 
@@ -17,8 +17,8 @@ class Heading:
     """Directions of a person who may have turned about the vertical.
 
     Attributes:
-        rotation: R (3,3) about z from a person who faces +x; (N,3,3) of N times, and then there are
-            as many of each direction.
+        rotation: R (3,3) about z from a person who faces +x; (N,3,3) for N times, and then each
+            direction is (N,3).
     """
 
     rotation: FloatArray
@@ -34,14 +34,14 @@ class Heading:
         return self.rotation[..., 1]
 
     def inward(self, side: int) -> FloatArray:
-        """Returns the unit vector (3,) from a side, 0 the left, to the other."""
+        """Returns the unit vector (3,) from a side (0: left) to the other."""
         return self.leftward * (-1.0 if side == 0 else 1.0)
 
 
 def heading(joints: FloatArray) -> Heading:
-    """Returns the heading of shoulder, elbow, hand of left, then right arm (6,3), m.
+    """Returns the heading of joints (6,3), m: shoulder, elbow, hand of left, then right arm.
 
-    Shoulders above each other tell nothing; the person is then taken to face +x.
+    If one shoulder is straight above the other, the person is assumed to face +x.
     """
     line = joints[0] - joints[3]
     length = float(np.hypot(line[0], line[1]))
@@ -52,5 +52,5 @@ def heading(joints: FloatArray) -> Heading:
 
 
 def headings(joints: FloatArray) -> Heading:
-    """Returns the headings at N times of joints (N,6,3), m, as one with N rows."""
+    """Returns the headings of joints (N,6,3), m, at N times, as one object with N rows."""
     return Heading(np.stack([heading(q).rotation for q in joints]))

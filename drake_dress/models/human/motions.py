@@ -1,7 +1,7 @@
-"""What an active person does of its own will: reach, withdraw, wave, turn.
+"""Voluntary motions of an active person: reach, withdraw, wave, turn.
 
-All start and end at rest, as human movements do: by the minimum-jerk profile (Flash and Hogan
-1985), whose highest speed is 15/8 of the mean.
+All start and end at rest, as human movements do. They follow the minimum-jerk profile (Flash and
+Hogan 1985), whose peak speed is 15/8 of the mean.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES, Side
 
 PEAK_OF_MEAN_SPEED = 15.0 / 8.0
-# A wave swells and fades over this share of its duration, at most for so long, s.
+# A wave fades in and out over this fraction of its duration, at most over this time, s.
 _FADE_SHARE, _FADE_TIME = 0.25, 0.5
-# Fastest turn that is a person's change of stance, rad/s.
+# Fastest turn that still is a person's change of stance, rad/s.
 FASTEST_TURN = 1.5
 
 
 def minimum_jerk(part: float) -> tuple[float, float]:
-    """Returns position and slope, 0 to 1, of the minimum-jerk profile at `part` of its time."""
+    """Returns position, 0 to 1, and slope of the minimum-jerk profile at `part` of its time."""
     u = min(1.0, max(0.0, part))
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 30.0 * u**2 * (1.0 - u) ** 2
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Anything that is done from some time on.
+    """A motion that begins at a given time.
 
     Attributes:
-        start: s; nothing happens before.
-        sides: arms that do it.
+        start: earliest time, s.
+        sides: arms that perform it.
     """
 
     start: float = 0.0
@@ -54,11 +54,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Reach(Motion):
-    """The hand goes to the armhole, once that is near, and through it into the sleeve.
+    """The hand goes to the armhole, once it is near, and through it into the sleeve.
 
     Attributes:
-        within: distance of hand and armhole at which it begins, m.
-        push: how far beyond the armhole the hand goes before it only follows, m.
+        within: distance from hand to armhole at which the reach begins, m.
+        push: distance that the hand aims beyond the armhole before it only follows, m.
     """
 
     within: float = 0.25
@@ -67,11 +67,11 @@ class Reach(Motion):
 
 @dataclass(frozen=True)
 class Withdraw(Motion):
-    """The hand is drawn to the body's side for a while, then goes back to where it was.
+    """The hand is drawn toward the body for a while, then returns to where it was.
 
     Attributes:
-        duration: s, from its start to when it begins to return.
-        distance: level, toward below the shoulder, m.
+        duration: time from the start until the hand begins to return, s.
+        distance: horizontal distance toward the shoulder, m.
     """
 
     duration: float = 4.0
@@ -84,7 +84,7 @@ class Withdraw(Motion):
 
 @dataclass(frozen=True)
 class Wave(Motion):
-    """The hand goes to and fro sideways.
+    """The hand moves to and fro sideways.
 
     Attributes:
         duration: s. amplitude: m. frequency: Hz.
@@ -109,7 +109,7 @@ class Wave(Motion):
         return self.start <= time < self.start + self.duration
 
     def offset(self, time: float) -> tuple[float, float]:
-        """Returns how far leftward the hand is, m, and how fast it goes, m/s."""
+        """Returns the leftward offset of the hand, m, and its rate, m/s."""
         t, fade = time - self.start, self._fade
         if not self.is_on(time):
             return 0.0, 0.0
@@ -127,11 +127,11 @@ class Wave(Motion):
 
 @dataclass(frozen=True)
 class Turn(Motion):
-    """The whole body turns about the vertical through the torso, and stays so.
+    """The whole body turns about the vertical through the torso, and stays turned.
 
     Attributes:
-        angle: rad, leftward (counter-clockwise seen from above) positive.
-        duration: s.
+        angle: angle of the turn, leftward (counter-clockwise seen from above) positive, rad.
+        duration: duration of the turn, s.
     """
 
     angle: float = 0.0

@@ -1,13 +1,13 @@
-"""What an arm's muscles do to go, and stay, where they are set.
+"""Muscle torques that move an arm to its set-point and hold it there.
 
 The plant's joints are springs and dampers about the rest pose r. Muscles shift them to a set-point
 s (equilibrium-point control; tone as in `following`):
 
     τ = K (s − r) + D ds/dt − G(s),
 
-with the joints together −K (q − s) − D (dq/dt − ds/dt), and gravity's torque G is carried where the
-arm is set. An arm that nothing touches follows a slow
-set-point exactly, but for its inertia.
+which gives −K (q − s) − D (dq/dt − ds/dt) − G(s) together with the joints: tone carries gravity's
+torque G at the set-point. Without contact the arm follows a slow set-point exactly, except for its
+inertia.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def muscle_torque(
     stiffness: FloatArray,
     damping: FloatArray,
 ) -> FloatArray:
-    """Returns τ (4,), N·m, to add to joints that are springs and dampers about `rest`.
+    """Returns τ (4,), N·m, to add to joints with springs and dampers about `rest`.
 
     Args:
         arm: its kinematics and masses.

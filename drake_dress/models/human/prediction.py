@@ -1,6 +1,6 @@
-"""What the arms will do next, from what they did: the interface, and predictors that learn nothing.
+"""Predicts the arms' motion from its history: the interface, and predictors without learning.
 
-A predictor sees joints, never what the person wants.
+A predictor sees joints, never the person's intent.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.register import is_name
 
-# Rows of the joints, parents first: each hangs on the one before it by a limb of fixed length.
+# Rows of the two joints of each limb, parent first; a limb has a fixed length.
 _LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))
 _SHOULDERS = (0, 3)
 
@@ -24,8 +24,8 @@ class MotionPredictor(Protocol):
     """Predicts joints from their history.
 
     Attributes:
-        history_length: T, how many samples it wants to see, the newest included.
-        sample_period: between them, s.
+        history_length: T, number of samples it needs, including the newest.
+        sample_period: time between samples, s.
     """
 
     @property
@@ -39,17 +39,17 @@ class MotionPredictor(Protocol):
 
         Args:
             history: (T,6,3) shoulder, elbow, hand of left, then right arm, m, oldest first, the
-                last row now; a joint that was not seen is NaN there. One that was never seen is
-                NaN in what is returned.
-            time_step: between the rows that are returned, s.
-            steps: how many.
+                last row now. A joint is NaN where it was not observed; if it was never observed, it
+                is NaN in the result.
+            time_step: time between the returned rows, s.
+            steps: number of time steps.
         """
         ...
 
 
 @dataclass(frozen=True)
 class StillPredictor:
-    """The arms stay where they were seen last: a dummy has no will."""
+    """Predicts that the arms stay where they were last observed, as a dummy's do."""
 
     history_length: int = 1
     sample_period: float = 0.05
@@ -61,20 +61,20 @@ class StillPredictor:
 
 @dataclass(frozen=True)
 class ConstantVelocityPredictor:
-    """The arms go on as they went, ever slower, and keep their lengths.
+    """Predicts that the arms keep their velocity, which decays, and their lengths.
 
     A joint's velocity is the median of the slopes between all pairs of samples in the window (Theil
-    1950, Sen 1968): exact where it is constant, and not moved by a few samples that are wrong. It
-    is capped and dies away with the horizon, as a movement of will does end: a joint goes on by
-    v τ (1 − exp(−t/τ)), never further than v τ, so that a wave does not throw the prediction away.
-    Then each limb is given the length it has now, from the shoulders' middle outward.
+    1950, Sen 1968): exact if it is constant, and robust against a few wrong samples. It is capped
+    and decays over the horizon, since voluntary movements end: a joint moves by
+    v τ (1 − exp(−t/τ)), never farther than v τ, so that a wave does not spoil the prediction. Then
+    each limb is reset to its current length, from the shoulders' midpoint outward.
 
     Attributes:
         history_length: T; the window is (T − 1)·sample_period.
-        sample_period: s.
-        max_speed: of a joint, m/s.
-        decay_time: τ, s; infinite: the velocity does not die away.
-        least_samples: with fewer of a joint seen, it is taken to stand still.
+        sample_period: time between samples, s.
+        max_speed: largest speed of a joint, m/s.
+        decay_time: τ, s; if infinite, the velocity does not decay.
+        least_samples: a joint with fewer observations is assumed to stand still.
     """
 
     history_length: int = 9
@@ -84,7 +84,7 @@ class ConstantVelocityPredictor:
     least_samples: int = 3
 
     def predict(self, history: FloatArray, time_step: float, steps: int) -> FloatArray:
-        """Returns joints on their way; see `MotionPredictor`."""
+        """Returns extrapolated joints; see `MotionPredictor`."""
         now = last_seen(history)
         velocity = self._velocity(history)
         ahead = time_step * np.arange(steps + 1)
@@ -94,7 +94,7 @@ class ConstantVelocityPredictor:
         return np.stack([now, *(with_lengths(q, now) for q in moved[1:])])
 
     def _velocity(self, history: FloatArray) -> FloatArray:
-        """Returns (6,3), m/s; zero for a joint that was not seen often enough."""
+        """Returns (6,3), m/s; zero for a joint that was not observed often enough."""
         first, second = np.triu_indices(len(history), 1)
         slopes = (history[second] - history[first]) / (
             self.sample_period * (second - first)[:, None, None]
@@ -106,9 +106,9 @@ class ConstantVelocityPredictor:
 
 
 def _median_of_known(rows: FloatArray) -> FloatArray:
-    """Returns the median over rows of what is no NaN, and NaN where there is nothing.
+    """Returns the median over rows without NaN, and NaN where all rows are NaN.
 
-    For a few rows numpy's own takes five times as long.
+    For a few rows numpy's own function takes five times as long.
     """
     ascending = np.sort(rows, axis=0)  # NaN goes last
     known = np.isfinite(ascending).sum(axis=0)[None]
@@ -118,7 +118,7 @@ def _median_of_known(rows: FloatArray) -> FloatArray:
 
 
 def last_seen(history: FloatArray) -> FloatArray:
-    """Returns (6,3) the newest sample of each joint that was seen; NaN for one that never was."""
+    """Returns (6,3) the newest observation of each joint; NaN if it was never observed."""
     now = history[-1].copy()
     for earlier in history[-2::-1]:
         missing = ~np.isfinite(now).all(axis=1)
@@ -131,8 +131,8 @@ def last_seen(history: FloatArray) -> FloatArray:
 def with_lengths(joints: FloatArray, like: FloatArray) -> FloatArray:
     """Returns (6,3) joints moved so that shoulder line and limbs are as long as those of `like`.
 
-    The shoulders' middle stays, and each limb keeps its direction. A limb of which an end is NaN
-    has no length; its other end is left where it is.
+    The shoulders' midpoint stays. Each limb is directed from its moved parent to the old child. If
+    one end of a limb is NaN, the other end stays.
     """
     result = joints.copy()
     known = [bool(np.all(np.isfinite(q))) for q in joints]
@@ -150,7 +150,7 @@ def with_lengths(joints: FloatArray, like: FloatArray) -> FloatArray:
 
 
 def _resized(vector: FloatArray, like: FloatArray) -> FloatArray:
-    """Returns `vector` with the length of `like`; `like` itself where it has no direction."""
+    """Returns `vector` with the length of `like`; `like` itself if `vector` is zero."""
     length = float(np.linalg.norm(vector))
     if length < 1e-9:
         return like
@@ -164,8 +164,8 @@ def resampled(samples: FloatArray, newest: FloatArray, age: float) -> FloatArray
     Args:
         samples: (T,…) taken one period apart, oldest first.
         newest: (…) taken now.
-        age: of the last of `samples`, in periods, in [0, 1]. Between samples lines are drawn; at
-            0 and 1 the samples are taken as they are.
+        age: age of the last of `samples`, in periods, in [0, 1]. Samples are interpolated linearly;
+            at 0 and 1 they are taken as they are.
     """
     older, newer = samples[:-1], samples[1:]
     if age >= 1.0 - 1e-9:
@@ -186,14 +186,14 @@ PREDICTORS: Mapping[str, Callable[[], MotionPredictor]] = MappingProxyType(_pred
 
 
 def register_predictor(name: str, make: Callable[[], MotionPredictor]) -> None:
-    """Makes a predictor known, so that `controller.predictor` may name it.
+    """Registers a predictor, so that `controller.predictor` may name it.
 
     Args:
         name: lower-case letters, digits and _.
-        make: returns a new one, such as its class.
+        make: returns a new predictor; its class will do.
 
     Raises:
-        ValueError: the name is one of the package's, or no name.
+        ValueError: the name is one of the package's, or is not a valid name.
     """
     if not is_name(name):
         raise ValueError(f"the name is {name!r}, expected lower-case letters, digits and _")

@@ -1,11 +1,11 @@
-"""Tremor: a shaking of the arms that nobody wants.
+"""Tremor: an involuntary shaking of the arms.
 
 Frequencies: Parkinsonian rest tremor 4 to 6 Hz, essential tremor 4 to 12 Hz (Deuschl, Bain, Brin,
 "Consensus statement of the Movement Disorder Society on tremor", 1998). Amplitudes at the hand:
 under 0.5 cm is slight, to 1 cm moderate, to 2 cm marked (rating scale of Fahn, Tolosa and Marín,
-1993). It is driven by torques at the elbow and about the upper arm's axis, as large as the arm's
-inertia, damping and stiffness ask for at that frequency, and is no pure sine: amplitude and
-frequency wander slowly.
+1993). Torques at the elbow and about the upper arm's axis drive the tremor. Their size follows from
+the arm's inertia, damping and stiffness at that frequency. Amplitude and frequency drift slowly, so
+the tremor is not a pure sine.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 
-# What drives: abduction, extension, rotation, elbow.
+# Relative driving torques: abduction, extension, rotation, elbow.
 _DRIVE = np.array([0.0, 0.0, 1.0, 1.0])
 _WANDERING_AMPLITUDE = 0.15  # standard deviation, relative
 _WANDERING_FREQUENCY = 0.02  # likewise
-_SLOWEST, _FASTEST = 0.1, 0.5  # of the wandering, Hz
+_SLOWEST, _FASTEST = 0.1, 0.5  # of the drift, Hz
 _TONES = 8
 
 
 @dataclass(frozen=True)
 class TremorParameters:
-    """How the hands tremble.
+    """Parameters of the hands' tremor.
 
     Attributes:
-        amplitude: half of the hand's motion to and fro in the rest pose, m.
+        amplitude: half of the hand's peak-to-peak motion in the rest pose, m.
         frequency: frequency of the tremor, Hz.
 
     Raises:
-        UserError: a value is not a finite number, the amplitude negative or the frequency not
-            positive.
+        UserError: a value is not a finite number, the amplitude is negative, or the frequency is
+            not positive.
     """
 
     amplitude: float = 0.005
@@ -55,8 +55,8 @@ class TremorParameters:
 class Wandering:
     """A smooth random function of time with mean 0 and variance 1: tones of random phase.
 
-    Source: Rice (1944), representation of Gaussian noise by tones. Its value at a time does not
-    depend on when it was asked before.
+    Source: Rice (1944), representation of Gaussian noise by tones. The value depends on the time
+    alone, not on earlier calls.
 
     Args:
         rng: draws frequencies and phases.
@@ -72,16 +72,16 @@ class Wandering:
         return float(self._size * np.sum(np.cos(self._omega * time + self._phase)))
 
     def integral(self, time: float) -> float:
-        """Returns its integral from some fixed time to `time`, s."""
+        """Returns the integral from a fixed time to `time`, s."""
         return float(self._size * np.sum(np.sin(self._omega * time + self._phase) / self._omega))
 
 
 class TremorWave:
-    """The shaking of one arm over time, of mean amplitude 1.
+    """Tremor of one arm over time, with mean amplitude 1.
 
     Args:
-        frequency: Hz, on average.
-        rng: draws phase and wandering.
+        frequency: mean frequency, Hz.
+        rng: draws phase and drift.
     """
 
     def __init__(self, frequency: float, rng: np.random.Generator) -> None:
@@ -103,9 +103,9 @@ def tremor_torque(
     stiffness: FloatArray,
     jacobian: FloatArray,
 ) -> FloatArray:
-    """Returns the amplitude (4,), N·m, of the torques that make a hand tremble as `p` says.
+    """Returns the amplitude (4,), N·m, of the joint torques that cause the tremor `p` of a hand.
 
-    x = J (K − ω²M + iωD)⁻¹ τ is the hand's ellipse; its longer half axis is the amplitude.
+    x = J (K − ω²M + iωD)⁻¹ τ describes the hand's ellipse; its semi-major axis is the amplitude.
 
     Args:
         p: amplitude and frequency.

@@ -1,1 +1,1 @@
-"""What is made of cameras' images."""
+"""Estimates from camera images."""

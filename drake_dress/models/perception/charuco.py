@@ -1,13 +1,13 @@
-"""Where a camera is, from pictures of a ChArUco board that an arm holds.
+"""Calibrates the pose of a camera from pictures of a ChArUco board that an arm holds.
 
 An arm holds the board in many poses; each picture shows the corners of the board at pixels
 
     u = π(K, d, X_CW X_WT(q) X_TB p_B)
 
 with X_WT from the arm's joints. The camera's pose X_WC and the board's pose in the tool X_TB, which
-nobody can measure well, are those for which all pixels fit best (least squares, robust against a
-corner that was taken for another). A first guess comes from each picture's own board pose and the
-closed form of Shah (2013) for two unknown transforms.
+is hard to measure, are those that fit all pixels best (least squares, robust against mismatched
+corners). The initial guess comes from the board's pose in each picture and the closed form of Shah
+(2013) for two unknown transforms.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from drake_dress.models.arrays import FloatArray
 
 Image = npt.NDArray[np.uint8]
 
-# Of corners in a picture that counts, of pictures, and of the turns between them, rad.
+# Fewest corners of a usable picture, fewest pictures, and least spread of their rotations about a
+# second axis, rad.
 LEAST_CORNERS, LEAST_PICTURES, LEAST_TURN = 6, 5, 0.15
-# Beyond which a pixel is not believed as much, px.
+# Residual beyond which a corner's influence is reduced, px.
 _ROBUST = 1.0
 
 
 class CalibrationError(ValueError):
-    """Pictures from which no pose can be found."""
+    """The board is invalid, or no pose can be found from the pictures."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Board:
             CalibrationError: there is no such dictionary, or no such board.
         """
         number = getattr(cv2.aruco, self.dictionary, None)
-        # the module has other names, too
+        # the module has other names than dictionaries
         if not self.dictionary.startswith("DICT_") or not isinstance(number, int):
             raise CalibrationError(f"dictionary {self.dictionary!r} is none of OpenCV's")
         if min(self.columns, self.rows) < 3 or not 0.0 < self.marker < self.square:
@@ -70,7 +71,7 @@ class Board:
         )
 
     def picture(self, pixels_per_square: int) -> Image:
-        """Returns the board to print, without a border."""
+        """Returns an image of the board for printing, without a border."""
         size = (self.columns * pixels_per_square, self.rows * pixels_per_square)
         picture: Image = np.asarray(self.made().generateImage(size), dtype=np.uint8)
         return picture
@@ -86,7 +87,7 @@ class Corners:
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Of a camera: K (3,3), pixels, and distortion (5,) as OpenCV has it."""
+    """Intrinsics of a camera: K (3,3), pixels, and distortion (5,) as in OpenCV."""
 
     matrix: FloatArray
     distortion: FloatArray
@@ -94,16 +95,16 @@ class Intrinsics:
 
 @dataclass(frozen=True)
 class CameraCalibration:
-    """Where a camera is.
+    """Result of a calibration.
 
     Attributes:
         camera: X_WC (4,4); z ahead, y down.
         board: X_TB (4,4) of the board in the tool.
-        intrinsics: that were given or found.
+        intrinsics: intrinsics that were given or found.
         residuals: of each picture, root mean square over its corners, px.
-        rms: over all corners, px.
-        position_std: of the camera's position (3,), m.
-        rotation_std: of its rotation (3,), rad.
+        rms: root mean square over all corners, px.
+        position_std: standard deviation of the translation of X_CW (3,), m.
+        rotation_std: standard deviation of the rotation vector of X_CW (3,), rad.
     """
 
     camera: FloatArray
@@ -116,21 +117,21 @@ class CameraCalibration:
 
 
 def find_corners(image: Image, board: Board) -> Corners | None:
-    """Returns the board's corners in a picture (h,w) or (h,w,3); None where there are too few."""
+    """Returns the board's corners in a picture (h,w) or (h,w,3); None if they fix no pose."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     made = board.made()
     pixels, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(grey)
     if ids is None or len(ids) < LEAST_CORNERS:
         return None
     points = np.asarray(made.getChessboardCorners(), dtype=np.float64)[ids.ravel()]
-    # corners on one line leave the pose open
+    # corners on one line do not determine the pose
     if np.linalg.matrix_rank(points[:, :2] - points[0, :2], tol=1e-6) < 2:
         return None
     return Corners(points, np.asarray(pixels, dtype=np.float64).reshape(-1, 2))
 
 
 def find_intrinsics(corners: Sequence[Corners], width: int, height: int) -> Intrinsics:
-    """Returns the camera's own parameters, from its pictures of the board."""
+    """Returns the camera's intrinsics from pictures of the board."""
     _, matrix, distortion, _, _ = cv2.calibrateCamera(
         [c.points.astype(np.float32) for c in corners],
         [c.pixels.astype(np.float32) for c in corners],
@@ -147,15 +148,16 @@ def find_intrinsics(corners: Sequence[Corners], width: int, height: int) -> Intr
 def calibrate(
     corners: Sequence[Corners], tools: FloatArray, intrinsics: Intrinsics
 ) -> CameraCalibration:
-    """Returns where the camera is.
+    """Returns the pose of the camera.
 
     Args:
-        corners: of N pictures.
-        tools: (N,4,4) X_WT of the tool that holds the board, in each.
-        intrinsics: of the camera.
+        corners: corners in N pictures.
+        tools: (N,4,4) X_WT of the tool that holds the board, in each picture.
+        intrinsics: intrinsics of the camera.
 
     Raises:
-        CalibrationError: too few pictures, or too much alike.
+        CalibrationError: there are too few pictures, their poses are too similar, or the board's
+            pose in one of them cannot be found.
     """
     if len(corners) < LEAST_PICTURES:
         raise CalibrationError(
@@ -213,11 +215,11 @@ def _two_transforms(seen: FloatArray, tools: FloatArray) -> tuple[FloatArray, Fl
     """Returns X_CW and X_TB (4,4) with seen_i ≈ X_CW tools_i X_TB (Shah 2013).
 
     Rotations: R_i R_TB' = R_CW T_i for all i, whose two unknowns are the left and right singular
-    vectors of Σ T_i ⊗ R_i that belong to its largest singular value. Positions are linear then.
+    vectors of Σ T_i ⊗ R_i for its largest singular value. Positions then follow linearly.
     """
     both = sum(np.kron(t[:3, :3], r[:3, :3]) for t, r in zip(tools, seen, strict=True))
     u, _, vt = np.linalg.svd(both)
-    # columns one after the other
+    # column-major
     r_cw = _nearest_rotation(u[:, 0].reshape(3, 3, order="F"))
     r_tb = _nearest_rotation(vt[0].reshape(3, 3, order="F")).T
     # t_i = R_CW T_i t_TB + R_CW p_i + t_CW
@@ -231,7 +233,7 @@ def _two_transforms(seen: FloatArray, tools: FloatArray) -> tuple[FloatArray, Fl
 
 
 def _nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """Returns the rotation nearest to a matrix that may have the wrong sign."""
+    """Returns the rotation nearest to a matrix whose sign may be wrong."""
     u, _, vt = np.linalg.svd(matrix * np.sign(np.linalg.det(matrix)))
     rotation: FloatArray = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
     return rotation
@@ -240,7 +242,7 @@ def _nearest_rotation(matrix: FloatArray) -> FloatArray:
 def _residuals(
     x: FloatArray, corners: Sequence[Corners], tools: FloatArray, intrinsics: Intrinsics
 ) -> FloatArray:
-    """Returns how far all corners are from where they should be seen, (2K,) px."""
+    """Returns the reprojection errors of all corners, (2K,) px."""
     camera, board = _pose(x[:6]), _pose(x[6:])
     rest = []
     for seen, tool in zip(corners, tools, strict=True):

@@ -1,4 +1,4 @@
-"""Reads triangle meshes from files, strictly: what is not understood is refused with its line."""
+"""Reads triangle meshes from files, strictly: errors name the line that is not understood."""
 
 from drake_dress.models.garment.files.raw import RawMesh
 from drake_dress.models.garment.files.read import EXTENSIONS, MOST_TRIANGLES, read_mesh

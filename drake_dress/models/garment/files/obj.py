@@ -1,9 +1,9 @@
 """Reads the polygons of a Wavefront OBJ file.
 
-The readers of mesh libraries lose some of the format's dialects (byte order marks, tabs, comments
-at line ends, relative indices that stand between nodes, Latin-1 names), and name no line where
-they fail. This reader takes nodes, polygons, objects and groups, passes over everything else that
-the format defines for polygons, and refuses the rest with its line.
+The readers of mesh libraries fail on some dialects of the format (byte order marks, tabs, comments
+at line ends, relative indices between nodes, Latin-1 names), and do not report the line. This
+reader takes nodes, polygons, objects and groups, and skips everything else that the format defines
+for polygons. It refuses the rest and reports the line.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _CURVED = frozenset(
     "cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con ctech stech "
     "bsp bzp cdc cdp res".split()
 )
-# A name or path may end in a backslash, which continues no line there.
+# A name or path may end in a backslash, which is then not a line continuation.
 _NAMED = frozenset(("o", "g", "mtllib", "usemtl", "maplib", "usemap"))
 _MOST_CORNERS = 1000  # of one polygon
 _INDEX = re.compile(r"([+-]?\d{1,18})(?:/[+-]?\d*){0,2}", re.ASCII)
@@ -40,10 +40,11 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
     Args:
         data: content of the file.
         source: its name, for messages.
-        most_faces: number of polygons beyond which reading ends.
+        most_faces: number of polygons above which the file is refused.
 
     Raises:
-        UserError: a line cannot be read, names nodes that the file lacks, or there are too many.
+        UserError: a line cannot be read or names nodes that the file lacks, or there are too many
+            polygons.
     """
     numbers = Numbers(source)
     nodes: list[list[float]] = []
@@ -68,7 +69,7 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
             if keyword == "o":
                 name = " ".join(words)
             else:
-                # several words are several groups, or a name with spaces: either may be asked for
+                # several words are several groups or one name with spaces: either may be asked for
                 groups = tuple(dict.fromkeys((*words, " ".join(words))))
             part = parts.setdefault(tuple(filter(None, (name, *groups))), len(parts))
         elif keyword in _CURVED:
@@ -94,7 +95,7 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
 
 
 def _statements(text: str) -> Iterator[tuple[int, str, list[str]]]:
-    """Yields line, keyword and words of each statement; no comments, continued lines joined."""
+    """Yields line, keyword and words of each statement; drops comments, joins continued lines."""
     lines = iter(enumerate(lines_of(text), start=1))
     for line, content in lines:
         words = content.partition("#")[0].split()
@@ -113,7 +114,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, list[str]]]:
 
 
 def _node(numbers: Numbers, words: list[str], line: int, source: str) -> list[float]:
-    """Returns x, y, z; after them may stand a weight, a colour, or both."""
+    """Returns x, y, z; a weight, a colour, or both may follow them."""
     if len(words) not in (3, 4, 6, 7, 8):
         raise UserError(
             source,

@@ -29,11 +29,11 @@ def read_ply(data: bytes, source: str, most_faces: int) -> RawMesh:
     Args:
         data: content of the file.
         source: its name, for messages.
-        most_faces: number of polygons beyond which nothing is read.
+        most_faces: number of polygons above which the file is refused.
 
     Raises:
-        UserError: there are too many faces, the file is cut off or longer than its header
-            tells, or holds no triangles.
+        UserError: there are too many faces, the file is cut off or longer than its header states,
+            or its header, nodes or faces are invalid.
     """
     header, body = _split(data, source)
     order, elements = read_header(header, source)
@@ -61,7 +61,7 @@ def _split(data: bytes, source: str) -> tuple[str, bytes]:
     end = _END.search(data[:_MOST_HEADER])
     if data[:3] != b"ply" or end is None:
         raise UserError(source, "", "has no PLY header (ply … end_header), expected a PLY file")
-    # comments alone may hold other characters, and mean nothing
+    # only comments may hold other characters, and they are ignored
     header = data[: end.end()].decode("ascii", errors="replace").replace("\ufffd", "?")
     header = header.replace("\r\n", "\n").replace("\r", "\n")
     return header, data[end.end() :]

@@ -1,4 +1,4 @@
-"""The rows of a PLY file's elements, in text or in bytes of either order.
+"""Reads the rows of a PLY file's elements, as text or as bytes of either order.
 
     ply
     format ascii | binary_little_endian | binary_big_endian 1.0
@@ -7,8 +7,8 @@
     property list TYPE TYPE NAME
     end_header
 
-Every number is held against its type and every row against the header; nothing is reserved for rows
-that the file does not hold.
+Every number is checked against its type and every row against the header. No memory is reserved for
+rows that the file does not hold.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Property:
     """A property of an element: a number, or a list of numbers.
 
     Attributes:
-        name: of the property.
-        dtype: of a number, without its byte order.
+        name: name of the property.
+        dtype: type of a number, without its byte order.
         counted: type of the list's length; empty for a single number.
     """
 
@@ -60,12 +60,12 @@ class Property:
 
 @dataclass
 class Element:
-    """An element as the header tells it.
+    """An element as the header declares it.
 
     Attributes:
-        name: of the element.
-        count: of its rows.
-        properties: of each row, in order.
+        name: name of the element.
+        count: number of its rows.
+        properties: properties of each row, in order.
     """
 
     name: str
@@ -74,11 +74,11 @@ class Element:
 
     @property
     def names(self) -> list[str]:
-        """Of the properties."""
+        """Names of the properties."""
         return [p.name for p in self.properties]
 
 
-# By name of a property: (count,) numbers, or a list of lists of numbers.
+# Maps a property's name to (count,) numbers, or to a list of lists of numbers.
 Rows = dict[str, Any]
 
 
@@ -86,7 +86,7 @@ def read_header(header: str, source: str) -> tuple[str, list[Element]]:
     """Returns the byte order (empty for text) and the elements.
 
     Raises:
-        UserError: a line is none of a PLY header.
+        UserError: the header is not valid PLY.
     """
     order: str | None = None
     elements: list[Element] = []
@@ -132,10 +132,10 @@ def _bad(source: str, number: int, what: str) -> UserError:
 
 
 def read_text(body: bytes, elements: list[Element], source: str) -> dict[str, Rows]:
-    """Returns the rows of each element, a line each; blank lines mean nothing.
+    """Returns the rows of each element, one line each; blank lines are skipped.
 
     Raises:
-        UserError: lines lack, are too many, or hold something else than the header tells.
+        UserError: lines are missing, too many, or do not match the header.
     """
     lines = [line for line in re.split(rb"\r\n|\n|\r", body) if line.strip()]
     found, at = {}, 0
@@ -175,7 +175,7 @@ def _take_words(words: list[bytes], element: Element, rows: Rows, key: str, sour
 
 def _number(word: bytes, dtype: str, key: str, source: str) -> float:
     try:
-        # a whole number may be written with a point
+        # an integer written with a point is refused
         value = float(word) if dtype[0] == "f" else int(word)
     except ValueError:
         told = word[:40].decode(errors="replace")
@@ -193,10 +193,10 @@ def _as_arrays(rows: Rows, element: Element, source: str) -> Rows:
 
 
 def read_binary(body: bytes, order: str, elements: list[Element], source: str) -> dict[str, Rows]:
-    """Returns the rows of each element; `order` is that of the bytes.
+    """Returns the rows of each element; `order` is the byte order.
 
     Raises:
-        UserError: bytes lack, or follow the last row.
+        UserError: bytes are missing, or follow the last row.
     """
     found, at = {}, 0
     for element in elements:
@@ -235,7 +235,7 @@ def _listed(body: bytes, at: int, order: str, element: Element, source: str) -> 
 
 
 def _of_one_length(body: bytes, at: int, order: str, element: Element) -> tuple[Rows, int] | None:
-    """Returns the rows of an element whose lists are all as long as in its first row, if so."""
+    """Returns what `_listed` does if all lists are as long as in the first row, else None."""
     if element.count == 0:
         return {name: [] for name in element.names}, at
     layout: list[Any] = []
@@ -277,7 +277,7 @@ def _taken(
 
 
 def too_short(source: str, element: Element, rows: int) -> UserError:
-    """Returns the error of a file that holds fewer rows than its header counts."""
+    """Returns the error for a file that holds fewer rows than its header counts."""
     return UserError(
         source,
         f"element {element.name}",
@@ -286,5 +286,5 @@ def too_short(source: str, element: Element, rows: int) -> UserError:
 
 
 def too_long(source: str) -> UserError:
-    """Returns the error of a file that goes on after its last row."""
+    """Returns the error for a file that goes on after its last row."""
     return UserError(source, "", "holds more than its header counts, expected a PLY file")

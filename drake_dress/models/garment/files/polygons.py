@@ -1,8 +1,8 @@
 """Cuts polygons into triangles.
 
 Quads are cut along the shorter diagonal that lies inside. Convex polygons are cut in a zigzag,
-which makes no long fans. All others lose ears, the one with the shortest diagonal first
-(Meisters 1975, "Polygons have ears"), in the plane of their vector area.
+which avoids long fans. All others are cut by ear clipping in the plane of their vector area, the
+ear with the shortest diagonal first (Meisters 1975, "Polygons have ears").
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _STRAIGHT = 1e-6
 def triangulated(
     position: FloatArray, polygons: Sequence[Sequence[int]]
 ) -> tuple[IndexArray, IndexArray]:
-    """Returns (F,3) triangles, turned as their polygons, and (F,) the polygon of each, ascending.
+    """Returns (F,3) triangles, oriented as their polygons, and (F,) the polygons, ascending.
 
     Args:
         position: (n,3).
-        polygons: node indices of each, three at least.
+        polygons: node indices of each, at least three.
     """
     triangles: list[IndexArray] = [np.empty((0, 3), dtype=np.int64)]
     owners: list[IndexArray] = [np.empty(0, dtype=np.int64)]
@@ -58,7 +58,7 @@ def _quads(position: FloatArray, corners: IndexArray) -> IndexArray:
 
 
 def _lie_inside(position: FloatArray, corners: IndexArray, cut: IndexArray) -> MaskArray:
-    """Returns (k,) whether all triangles of a cut face the way their polygon does."""
+    """Returns (k,) whether all triangles of a cut are oriented as their polygon."""
     normal = _vector_area(position[corners])
     x = position[cut]
     areas = np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0])
@@ -78,7 +78,7 @@ def _larger(position: FloatArray, corners: IndexArray) -> IndexArray:
 
 
 def _zigzag(n: int) -> IndexArray:
-    """Returns (n-2,3) places in a convex polygon of n corners."""
+    """Returns (n-2,3) corner numbers of the triangles of a convex polygon with n corners."""
     triangles = []
     low, high = 0, n - 1
     while high - low >= 2:
@@ -107,7 +107,7 @@ def _corner_sines(x: FloatArray) -> FloatArray:
 
 
 def _without_ears(x: FloatArray, corners: IndexArray) -> IndexArray:
-    """Returns (n-2,3) triangles of one polygon (n,3), cutting off its ears."""
+    """Returns (n-2,3) triangles of one polygon (n,3) by ear clipping."""
     at = _flattened(x)
     left = np.arange(len(corners))
     triangles = []
@@ -129,7 +129,7 @@ def _flattened(x: FloatArray) -> FloatArray:
 
 
 def _ear(at: FloatArray) -> int:
-    """Returns the corner of a plane polygon to cut off: an ear, or the most convex one."""
+    """Returns the corner of a plane polygon to cut off: an ear, or else the most convex one."""
     before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
     to, away = at - before, after - at
     sine = _cross(to, away) / np.maximum(
@@ -142,7 +142,7 @@ def _ear(at: FloatArray) -> int:
         a, b, c = before[k], at[k], after[k]
         sides = [_cross(q - p, at - p) for p, q in ((a, b), (b, c), (c, a))]
         within = np.minimum.reduce(sides) >= 0.0
-        # the ear's own corners, and nodes at the same place, block nothing
+        # the ear's own corners, and nodes at the same place, do not block it
         within &= (np.abs(at[:, None, :] - np.stack([a, b, c])).max(axis=2) > 0.0).all(axis=1)
         if not within.any():
             return int(k)

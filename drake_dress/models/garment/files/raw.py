@@ -1,4 +1,4 @@
-"""A mesh as its file gives it, with the file's own numbers of nodes and lines."""
+"""A mesh as read from a file, with the file's own numbers of nodes and lines."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ MaskArray = BoolArray
 
 
 def too_many(source: str, most: int) -> UserError:
-    """Returns the refusal of a file with more faces than are read."""
+    """Returns the error for a file with too many faces."""
     return UserError(source, "faces", f"has over {most:,} faces, expected fewer: thin it first")
 
 
 def place(point: FloatArray) -> str:
-    """Returns a point, m, as messages write it; nothing if it is not finite."""
+    """Returns a point, m, formatted for messages; empty if it is not finite."""
     if not np.isfinite(point).all():
         return ""
     near = np.abs(point) < 1000.0
@@ -30,16 +30,16 @@ def place(point: FloatArray) -> str:
 class RawMesh:
     """Triangles of a file, and where each node and face comes from.
 
-    Nodes may be merged and left out; `file_node` and `became` keep the relation to the file.
+    Nodes may be merged and left out; `file_node` and `became` map to and from the file's nodes.
 
     Attributes:
         source: the file, for messages.
-        position: (n,3).
+        position: (n,3), in the unit of the file until `scaled`.
         faces: (F,3) indices into `position`.
         face_part: (F,) index into `part_names`.
         part_names: names of the object and groups that each part of the file belongs to.
-        file_node: (n,) the file's first node that each node comes from, counted from 0.
-        became: (m,) the node that each node of the file has become, -1 for none.
+        file_node: (n,) the file's node that each node comes from, counted from 0.
+        became: (m,) the node that each node of the file was merged into, -1 for none.
         node_line: (m,) line of each node of the file, counted from 1; None in binary files.
         face_line: (F,) line of each face; None in binary files.
     """
@@ -78,7 +78,7 @@ class RawMesh:
         return replace(self, position=self.position * factor)
 
     def only(self, keep: MaskArray) -> RawMesh:
-        """Returns the mesh with the (F,) faces marked `keep`, without the nodes of no face."""
+        """Returns the mesh with only the faces marked in `keep`, (F,), and the nodes they use."""
         faces = self.faces[keep]
         used = np.unique(faces)
         new = np.full(len(self.position), -1, dtype=np.int64)
@@ -96,7 +96,7 @@ class RawMesh:
     def joined(self, root: IndexArray) -> RawMesh:
         """Returns the mesh with each node replaced by node `root[node]`.
 
-        Faces that collapse and nodes of no face are dropped. A node keeps the place of its root.
+        Collapsed faces and unused nodes are dropped. A merged node is at the place of its root.
 
         Raises:
             UserError: no face is left.
@@ -113,14 +113,14 @@ class RawMesh:
         return replace(self, faces=faces, became=became).only(~flat)
 
     def node(self, i: int | np.integer) -> str:
-        """Returns a node as the file knows it, and its place: `node 12 (line 13) at (0, 0, 1) m`.
+        """Returns a node's name in the file and its place: `node 12 (line 13) at (0, 0, 1) m`.
 
-        The mesh is in m, or its coordinates are not finite.
+        The mesh must be in m, or its coordinates not finite.
         """
         number = int(self.file_node[i])
         line = "" if self.node_line is None else f" (line {self.node_line[number]})"
         return f"node {number}{line}{place(self.position[i])}"
 
     def face(self, i: int | np.integer) -> str:
-        """Returns a face as the file knows it: by its line, or else by its number."""
+        """Returns a face's name: its line in the file, or else its number."""
         return f"face {int(i)}" if self.face_line is None else f"line {self.face_line[i]}"

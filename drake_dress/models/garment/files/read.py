@@ -1,4 +1,4 @@
-"""Reads a mesh file by its extension, within stated limits of size."""
+"""Reads a mesh file by its extension, within limits of size."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.stl import read_stl
 
 EXTENSIONS = (".obj", ".ply", ".stl")
-# A scan of a garment has some 100,000. The most take about half a minute to read and to thin.
+# A scan of a garment has some 100,000. This many take about half a minute to read and simplify.
 MOST_TRIANGLES = 200_000
-_LARGEST = 1e9  # coordinate in any unit: squares of larger ones overflow, and no garment has them
+_LARGEST = 1e9  # coordinate in any unit: no garment is larger, and huge numbers overflow if squared
 _MOST_BYTES = 200 * 10**6
 
 
@@ -30,7 +30,7 @@ def read_mesh(path: Path) -> RawMesh:
     source = str(path)
     data = _content(path)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # numpy's words on damaged numbers: checked below
+        warnings.simplefilter("ignore")  # numpy warns of damaged numbers, which are checked below
         if path.suffix.lower() == ".obj":
             mesh = read_obj(data, source, MOST_TRIANGLES)
         elif path.suffix.lower() == ".ply":

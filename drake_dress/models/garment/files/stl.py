@@ -1,6 +1,6 @@
 """Reads STL files, binary and text.
 
-A binary file may begin with "solid" as text files do, so its length decides: 84 bytes and 50 for
+A binary file may begin with "solid" like a text file, so its length decides: 84 bytes and 50 for
 each triangle that it counts.
 """
 
@@ -24,7 +24,7 @@ def read_stl(data: bytes, source: str, most_faces: int) -> RawMesh:
     Args:
         data: content of the file.
         source: its name, for messages.
-        most_faces: number of triangles beyond which reading ends.
+        most_faces: number of triangles above which a text file is refused.
 
     Raises:
         UserError: there are too many triangles, the file is cut off, counts other triangles
@@ -74,7 +74,7 @@ def _text(text: str, source: str, most_faces: int) -> RawMesh:
 
 
 class _Statements:
-    """What the statements of a text have told so far."""
+    """Nodes and faces that the statements of a text have given so far."""
 
     def __init__(self, source: str, most_faces: int) -> None:
         self.source, self.most_faces = source, most_faces
@@ -85,7 +85,7 @@ class _Statements:
         self.face_part: list[int] = []
         self.names: list[tuple[str, ...]] = []
         self.open_solid = False
-        self.corners = 0  # of the triangle that is open
+        self.corners = 0  # of the open triangle
 
     def add_corner(self, words: list[str], line: int) -> None:
         if len(words) != 4:
@@ -112,7 +112,7 @@ class _Statements:
         self.names.append(tuple(filter(None, (" ".join(words[1:]),))))
 
     def mesh(self) -> RawMesh:
-        """Returns the mesh, at the end of the text."""
+        """Returns the mesh; called at the end of the text."""
         source = self.source
         if self.open_solid or self.corners:
             raise UserError(source, "", "ends within a solid, expected endsolid (is it cut off?)")

@@ -1,4 +1,4 @@
-"""Text of mesh files: its encodings, line ends and numbers."""
+"""Reads the text of mesh files: encodings, line ends and numbers."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 def decoded(data: bytes, source: str) -> str:
     """Returns the text of a file.
 
-    A byte order mark decides. Without one, zero bytes tell UTF-16, and text that is not UTF-8 is
-    taken for Latin-1, which can only spoil names.
+    A byte order mark decides the encoding. Without one, zero bytes indicate UTF-16, and text that
+    is not UTF-8 is read as Latin-1, which can only garble names.
 
     Raises:
         UserError: the file is not text.
@@ -71,11 +71,11 @@ class Numbers:
         """Returns finite numbers.
 
         Args:
-            words: as the file writes them.
-            line: of the file, for messages.
+            words: numbers as the file writes them.
+            line: line of the file, for messages.
 
         Raises:
-            UserError: a word is no finite decimal number, or the file mixes points and commas.
+            UserError: a word is not a finite decimal number, or the file mixes points and commas.
         """
         return [self._number(word, line) for word in words]
 
