@@ -4,9 +4,9 @@ Without contact (Eqs. delta-definiation and iterative-solver):
 
     A Δx = h M v + ½h² f,    A Δv = h f + ½h² df/dt,
 
-with A = P = M + h² Σ w AᵀA for one iteration; for more, A follows from the inner iterations of
-inner/. One iteration resists rotation as if it were stretch: at h = 0.1 s a coat that the grippers
-turn hardly turns in the prediction.
+with A = P = M + h² Σ w AᵀA for one iteration; for more, inner/ defines A. One iteration resists
+rotation as if it were stretch: at h = 0.1 s a coat that the grippers turn hardly turns in the
+prediction.
 
 Contact and grasp prescribe motions instead of adding forces (paper-notes: the printed contact
 force is an elastic bounce, and springs at the grippers report forces that do not exist):
