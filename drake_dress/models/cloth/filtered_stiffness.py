@@ -92,7 +92,7 @@ def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore
         z: (n,3).
         nodes: `triangle_lanes` of the elements.
         gradient: `gradient_lanes` of the elements.
-        block: of `prepare_filtered`.
+        block: result of `prepare_filtered`.
         scale: factor.
         product: (n,3), added to.
     """
@@ -132,7 +132,7 @@ def normal_response(
 
     Args:
         elements: the rest shape.
-        block: of `prepare_filtered`.
+        block: result of `prepare_filtered`.
         scale: factor.
         diagonal: (n,) of the scalar part, kg.
     """

@@ -70,7 +70,7 @@ class LayeredCloth:
     nodes in the grippers is not part of the grippers' force.
 
     Args:
-        integrator: steps the garment.
+        integrator: scheme that steps the garment.
         thickness: distance kept between layers, m.
     """
 

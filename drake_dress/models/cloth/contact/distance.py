@@ -13,9 +13,9 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# A distance above any that a garment has, m.
+# A distance larger than any that occurs, m.
 _FAR = 1e9
-# Rounding of distances, m.
+# Rounding error of distances, m.
 _ROUNDING = 1e-9
 # Distance at which a point on its path counts as touching, m; steps after which a grazing path is
 # given up.

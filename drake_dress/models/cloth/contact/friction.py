@@ -1,7 +1,7 @@
 """Dry friction: modes of the nodes in contact, from the force that sticking would take.
 
 Eq. contact-type with paper-notes' corrections: a node that would have to be pulled takes off, one
-whose tangential force exceeds the cone slips with μ times its normal force, the rest stick.
+whose tangential force exceeds the cone slips with μ times its normal force, and the rest stick.
 """
 
 from __future__ import annotations
@@ -111,8 +111,8 @@ def revise_modes(
     Nodes that would be pulled to a surface are released: across a gap they would gain energy, at
     h = 0.2 s twenty times what a falling sheet had. (A node that lies on the surface and is held
     back for a step gains none, and its release would only move the pull to its neighbours.)
-    Sticking nodes beyond the friction cone slip if their sum matters, because the forces of
-    sticking press nodes that the motion does not press.
+    Sticking nodes beyond the friction cone slip if their total excess matters, because the
+    forces of sticking press nodes that the motion does not press.
 
     Args:
         binding: (c,3) forces that bind the nodes, in any unit.

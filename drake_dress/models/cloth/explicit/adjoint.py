@@ -8,8 +8,9 @@ normals and gaps follow nodes and bodies, and how the system follows positions i
 With `frozen_contact`, surfaces stay where each node met them, and slipping nodes keep the direction
 of their friction. That is not the derivative of the step, but it is the one to use for descent.
 Through several steps in contact the exact derivative grows tenfold with each: a node that is a
-millimetre nearer to a limb moves its stiff neighbours by a millimetre, and these move others by
-leverage. Motions of a centimetre show no such growth (docs/control.md has the figures).
+millimetre nearer to a limb moves its stiff neighbours by a millimetre, and lever arms amplify this
+for the cloth that they carry. Motions of a centimetre show no such growth (docs/control.md has the
+figures).
 """
 
 from __future__ import annotations
@@ -169,7 +170,7 @@ def _through_binding(
 
     Args:
         cloth: the garment.
-        tape: of a step with nodes in contact.
+        tape: tape of a step with nodes in contact.
         back: the unknowns, not bound yet.
         follows: whether surfaces and the direction of friction follow nodes.
     """
@@ -239,7 +240,7 @@ def _through_friction(
 
     Args:
         cloth: the garment.
-        tape: of the step.
+        tape: tape of the step.
         binding_in: (c,3) derivative by n + μ d of the nodes in contact.
         slip: (c,) which of them slip.
     """
@@ -291,7 +292,7 @@ def _material_derivative(
 
     Args:
         cloth: the garment.
-        tape: of the step.
+        tape: tape of the step.
         g_in: (n,3) derivative by the right-hand side of Δx.
         rate_in: (n,3) by that of Δv.
         force_in: (n,3) derivative by the force f.
@@ -347,7 +348,7 @@ def _contact_derivative(
 def _carry(  # type: ignore[no-untyped-def]
     x, owner, normal, slope, origin, omega, prescribed_in, surface_in, normal_in, geometric, bodies
 ):
-    """Adds all but the part of the normals to `geometric` (c,3), which holds it, and `bodies`."""
+    """Adds the other terms to `geometric` (c,3), which holds those of normals, and to `bodies`."""
     for i in range(x.shape[0]):
         m = owner[i]
         n0, n1, n2 = normal[i, 0], normal[i, 1], normal[i, 2]

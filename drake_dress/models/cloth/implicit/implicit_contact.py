@@ -1,7 +1,8 @@
 """Contact with dry friction in one linearly implicit step, found by an active-set iteration.
 
-The unknowns are the velocities u at the end of the step. With w = u − u_surface, r the impulse of
-contact, r_N along the normal n, and u_N* the normal velocity that brings a node onto its margin,
+The unknowns are the mean velocities u over the step, for bound nodes also those at its end. With
+w = u − u_surface, r the impulse of contact, r_N along the normal n, and u_N* the normal velocity
+that brings a node onto its margin,
 
     free     w_N ≥ u_N*,  r = 0
     stick    w_N = u_N*,  w_T = 0,  ‖r_T‖ ≤ μ r_N
@@ -152,7 +153,7 @@ class ImplicitContact:
         )
 
     def slip_out_of_cone(self, velocity: FloatArray, residual: FloatArray) -> bool:
-        """Lets nodes beyond the friction cone slip if their sum matters; returns whether it does.
+        """Lets nodes beyond the friction cone slip if their total excess matters; returns whether.
 
         Args:
             velocity: (n,3) m/s.
@@ -280,7 +281,7 @@ class ImplicitContact:
 
 
 def _push_out(gap: FloatArray, h: float) -> FloatArray:
-    """Returns the normal velocity (k,), m/s, that brings nodes with gaps (k,), m, to the margin."""
+    """Returns the normal velocity (k,), m/s, that moves nodes with gaps (k,), m, to the margin."""
     push: FloatArray = np.where(gap > 0.0, -gap / h, np.minimum(-0.5 * gap / h, _LARGEST_PUSH))
     return push
 
@@ -414,7 +415,7 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
 def _slip_out_of_cone(  # type: ignore[no-untyped-def]
     normal, surface_velocity, velocity, impulse, mu, adhesion, mode, friction, resistance
 ):
-    """Lets sticking nodes beyond the cone slip if their sum matters; returns whether it does."""
+    """Lets sticking nodes beyond the cone slip if their excess matters; returns whether it does."""
     excess = 0.0
     bound = 0.0
     for i in range(mode.shape[0]):

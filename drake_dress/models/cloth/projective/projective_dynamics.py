@@ -74,7 +74,7 @@ class ProjectiveInfo:
     Attributes:
         iterations: number of global steps.
         remaining: estimated distance to the fixed point, m, the largest over the nodes.
-        converged: whether that is within the tolerance.
+        converged: whether that satisfied the stopping rule.
         contraction: ρ of that estimate.
         refactored: number of factors made.
         solves: number of triangular solves, with those of conjugate gradients.

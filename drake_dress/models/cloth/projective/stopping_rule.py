@@ -22,9 +22,9 @@ class StoppingRule:
     """Estimates the distance to the fixed point from the last updates.
 
     The rate is the largest over several spans that end at the last update, and the estimate has to
-    hold twice. Fast modes decay first, so that early rates are too good, and L-BFGS makes updates
-    of very unequal size. The rule cannot detect a motion that has yet to begin: near a saddle,
-    where cloth is about to buckle, updates shrink before they grow.
+    hold twice in a row. Fast modes decay first, so that early rates are too good, and L-BFGS makes
+    updates of very unequal size. The rule cannot detect a motion that has yet to begin: near a
+    saddle, where cloth is about to buckle, updates shrink before they grow.
 
     Args:
         tolerance: accepted distance to the fixed point, m.
@@ -58,5 +58,5 @@ class StoppingRule:
         self._within = self._within + 1 if self.remaining <= self._tolerance else 0
 
     def reached(self) -> bool:
-        """Returns whether the estimate is within the tolerance."""
+        """Returns whether the estimate was within the tolerance twice in a row, or is 0."""
         return self.remaining == 0.0 or self._within >= 2

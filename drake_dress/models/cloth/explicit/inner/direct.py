@@ -20,7 +20,7 @@ class Direct(FilteredScheme):
 
     Args:
         matrix: A(x).
-        p: (n,n) P, for its size.
+        p: (n,n) P; only its size matters.
         held: (k,) nodes with prescribed motion.
     """
 

@@ -2,9 +2,9 @@
 
 A step solves A z = rhs twice, for the motion and for the change of velocity, with A = M + h² K of
 the scheme. Nodes in the grippers have prescribed values from the start. `hold` binds nodes in
-contact: sticking ones move by a target, slipping ones do so along their normal, and the forces that
-this takes are the result. The adjoint of a step consists of the same solves, since every scheme
-here is symmetric: the map from rhs to the free part of z is.
+contact: sticking ones move by a target, slipping ones do so only along their normal. It returns the
+forces that this takes. The adjoint of a step consists of the same solves, because in every scheme
+here the map from rhs to the free part of z is symmetric.
 
 Schemes differ in A and in how far they iterate:
 
@@ -94,7 +94,7 @@ class StepSystem(Protocol):
         """Returns an unknown whose right-hand side and held values are zero."""
 
     def pairs(self, forward: Unknown, backward: Unknown) -> list[tuple[FloatArray, FloatArray]]:
-        """Returns pairs (w, z): by a change δA of A, the loss of `backward` changes by −Σ wᵀ δA z.
+        """Returns pairs (w, z): a change δA changes the loss of `backward` by −Σ wᵀ δA z.
 
         Args:
             forward: unknown that the step solved.
