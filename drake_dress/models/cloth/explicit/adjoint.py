@@ -348,7 +348,10 @@ def _contact_derivative(
 def _carry(  # type: ignore[no-untyped-def]
     x, owner, normal, slope, origin, omega, prescribed_in, surface_in, normal_in, geometric, bodies
 ):
-    """Adds the other terms to `geometric` (c,3), which holds those of normals, and to `bodies`."""
+    """Adds the remaining terms to `geometric` (c,3), and all terms to `bodies` (4,m,3).
+
+    `geometric` already holds the terms of the normals.
+    """
     for i in range(x.shape[0]):
         m = owner[i]
         n0, n1, n2 = normal[i, 0], normal[i, 1], normal[i, 2]
