@@ -1,4 +1,4 @@
-"""Garments without Drake: make one, step it, roll it out, and go backward through it.
+"""Garments without Drake: make, step, roll out and differentiate them.
 
     from drake_dress import cloth
 
@@ -7,9 +7,9 @@
     plant = cloth.ImplicitCloth(elements, cloth.Material(), 0.01, coat.held)
     state, _ = plant.step(cloth.ClothState.at_rest(coat.rest_position), ...)
 
-`ImplicitCloth` is the accurate scheme, `LayeredCloth` keeps its layers apart,
-`ExplicitBiasCloth` is the one with derivatives, and `cloth_step` is its step for torch (the `torch`
-extra). What stands in `__all__` is public.
+`ImplicitCloth` is the accurate scheme, `LayeredCloth` keeps its layers apart, `ExplicitBiasCloth`
+has derivatives, and `cloth_step` is its step for torch (the `torch` extra). The names in `__all__`
+are public.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ _OF_TORCH = ("MATERIAL", "cloth_step", "material_tensor")
 
 
 def __getattr__(name: str) -> Any:
-    """Imports torch with the first name that needs it."""
+    """Imports torch when a name first needs it."""
     if name in _OF_TORCH:
         from drake_dress.models.cloth.explicit import torch_step
 

@@ -1,15 +1,15 @@
-"""Compression that gives way where a mesh is too coarse for the wrinkles that cloth would have.
+"""Compression limit for meshes too coarse for the wrinkles that cloth would have.
 
-A strip that is pushed together buckles at Euler's load, B (2π/λ)² for a wave of length λ. A mesh
-has no wave shorter than a few of its spacings, so it bears what cloth would not: at 2 cm a coat's
-grippers felt a quarter more than at 1 cm, at 3 cm up to three times as much. So principal
-compressions bear at most the load of the shortest wave that the mesh has, per width,
+A compressed strip buckles at Euler's load, B (2π/λ)² for a wave of length λ. A mesh cannot form
+waves shorter than a few of its spacings, so it bears loads that cloth would not: at 2 cm spacing a
+coat's grippers felt a quarter more force than at 1 cm, at 3 cm up to three times as much. Principal
+compressions therefore bear, per width, little more than the load of the mesh's shortest wave,
 
     σ = k e                              e = σ_i − 1 > −e_c,   e_c = B (2π/λ)² / k,
     σ = −k e_c + AFTER k (e + e_c)       beyond,
 
-with λ a number of spacings. On fine meshes e_c is beyond all that happens, and the law is that of
-`forces`: what changes with it is how fast a mesh comes near to that. (Tension-field theory, Pipkin
+with λ a number of spacings. On fine meshes compression never reaches e_c and the law equals that of
+`forces`; the limit only changes how fast results converge to that. (Tension-field theory, Pipkin
 1986, "The relaxed energy density for isotropic elastic membranes", has e_c = 0.)
 """
 
@@ -30,21 +30,21 @@ from drake_dress.models.cloth.forces import (
 )
 from drake_dress.models.cloth.material import Material
 
-# Stiffness beyond e_c, as a share of k. A strip that has buckled bears hardly more than at first
-# (elastica); with none at all, triangles would collapse.
+# Stiffness beyond e_c, as a share of k. A buckled strip bears hardly more than its buckling load
+# (elastica), but with zero stiffness triangles would collapse.
 _AFTER = 0.02
 # Rows of `Buckling.prepare`: those of `prepare_filtered`, and five more.
 BUCKLED_ROWS = PLAIN_ROWS + 5
-# Difference of principal stretches below which they are alike.
+# Difference below which principal stretches count as equal.
 _ALIKE = 1e-9
 
 
 class Buckling:
-    """The stretch of a garment whose compression gives way.
+    """Stretch force and stiffness of a garment with limited compression.
 
     Args:
         elements: the rest shape.
-        material: its stretch and bending.
+        material: its stretch and bending stiffness.
         wavelength: λ, in spacings of the mesh; above 0.
     """
 
@@ -53,10 +53,10 @@ class Buckling:
         self._limit = in_lanes(buckling_strain(elements, material, wavelength)[:, None])
 
     def force(self, elements: Elements, x: FloatArray) -> FloatArray:
-        """Returns the force of stretch (n,3), N, at positions `x` (n,3), m.
+        """Returns the stretch force (n,3), N, at positions `x` (n,3), m.
 
         Args:
-            elements: those of the rest shape; their areas may be scaled.
+            elements: those of the constructor; their areas may be scaled.
             x: (n,3) positions, m.
         """
         e, force = elements, np.zeros_like(x)
@@ -64,11 +64,11 @@ class Buckling:
         return force
 
     def prepare(self, elements: Elements, x: FloatArray) -> FloatArray:
-        """Returns what products with the positive semi-definite stiffness need, (⌈F/L⌉,19,L).
+        """Returns the data for products with the positive semi-definite stiffness, (⌈F/L⌉,19,L).
 
-        The rows of `prepare_filtered`; what the stiffness lacks of k area along the larger and the
-        smaller principal stretch, and in shear between them; cosine and sine of twice the angle of
-        the larger.
+        The rows of `prepare_filtered`, followed by: k area less the stiffness along the larger and
+        the smaller principal stretch, and in shear between them; cosine and sine of twice the angle
+        of the larger stretch.
         """
         block = np.empty((len(elements.triangle_lanes), BUCKLED_ROWS, LANES))
         e = elements
@@ -77,7 +77,7 @@ class Buckling:
 
 
 def buckling_strain(elements: Elements, material: Material, wavelength: float) -> FloatArray:
-    """Returns e_c of the triangles, (F,); their spacing is that of a grid of right triangles."""
+    """Returns e_c (F,) of the triangles, with the spacing of a grid of right triangles."""
     wave = wavelength * np.sqrt(2.0 * elements.triangle_area)
     load = material.bending_stiffness * (2.0 * np.pi / wave) ** 2
     strain: FloatArray = load / material.stretch_stiffness
@@ -108,7 +108,7 @@ def _force(x, nodes, gradient, limit, stretch, force):  # type: ignore[no-untype
                 f00, f01, f10, f11, f20, f21
             )
             e1, e2, p1, p2, mean = _tension(s00, s01, s11, limit[b, 0, l])
-            # the tension has the axes of S
+            # the tension has the principal axes of S
             w = -stretch * gradient[b, 4, l]
             slope = w * (p1 - p2) / max(e1 - e2, _ALIKE)
             level = w * 0.5 * (p1 + p2)
@@ -149,7 +149,7 @@ def _prepare(x, nodes, gradient, limit, stretch, block):  # type: ignore[no-unty
             k2 = 1.0 if e2 > -most else _AFTER
             shear = (p1 - p2) / apart if apart > _ALIKE else k1
             spin = max(0.5 * (p1 + p2) / mean, 0.0)
-            # across itself, cloth under tension resists by it, and compressed cloth not at all
+            # along the normal, tension provides stiffness and compression none
             q1 = 1.0 - max(p1, 0.0) / (1.0 + max(e1, 0.0))
             q2 = 1.0 - max(p2, 0.0) / (1.0 + max(e2, 0.0))
             middle = 0.5 * (q1 + q2)
@@ -180,7 +180,7 @@ def _prepare(x, nodes, gradient, limit, stretch, block):  # type: ignore[no-unty
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[no-untyped-def]
-    """Adds scale · K₊ z to `product`, as `filtered_product` does; `block` of `Buckling.prepare`."""
+    """Adds scale · K₊ z to `product`, like `filtered_product`; `block` of `Buckling.prepare`."""
     tile = np.empty(6 * LANES)
     for b in range(block.shape[0]):
         gather(z, nodes, b, tile)
@@ -189,7 +189,7 @@ def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[
             r00, r01, r10 = block[b, 0, l], block[b, 1, l], block[b, 2, l]
             r11, r20, r21 = block[b, 3, l], block[b, 4, l], block[b, 5, l]
             n0, n1, n2 = block[b, 6, l], block[b, 7, l], block[b, 8, l]
-            # G = Rᵀ dF, in the plane: strain, and what turns
+            # G = Rᵀ dF, in the plane: strain and rotation
             g01 = r00 * d01 + r10 * d11 + r20 * d21
             g10 = r01 * d00 + r11 * d10 + r21 * d20
             spin = block[b, 12, l] * (g10 - g01)
@@ -205,7 +205,7 @@ def buckled_product(z, nodes, gradient, block, scale, product):  # type: ignore[
             q00 = middle + apart * c - t3 * s
             q11 = middle - apart * c + t3 * s
             q01 = apart * s + t3 * c
-            # what is lacking of w dF: along R, and along the normal
+            # the stiffness missing from w dF, in the plane and along the normal
             h00, h01, h10, h11 = q00, q01 - spin, q01 + spin, q11
             m0 = n0 * d00 + n1 * d10 + n2 * d20
             m1 = n0 * d01 + n1 * d11 + n2 * d21

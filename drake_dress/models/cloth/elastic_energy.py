@@ -1,4 +1,4 @@
-"""The elastic energy whose derivative `forces.internal_force` is; line searches ask for it.
+"""The elastic energy, for line searches; `forces.internal_force` is minus its gradient.
 
 Stretch: ½ k area ‖F − R‖² = ½ k area (tr C − 2 tr S + 2), with C = FᵀF = S². Only C is needed, no
 polar factor. Bending: ½ B weight (‖Σ c x‖ − rest)².
@@ -17,7 +17,7 @@ from drake_dress.models.cloth.forces import LEAST_CURVATURE, SMALLEST_STRETCH
 def elastic_energy(elements: Elements, stretch: float, bending: float, x: FloatArray) -> float:
     """Returns the energy, J, of positions `x` (n,3), m.
 
-    Exact for all but triangles crushed to a thousandth of their area, whose force is bounded.
+    Exact except for triangles crushed to a thousandth of their area, whose force is bounded.
 
     Args:
         elements: the rest shape.

@@ -1,8 +1,8 @@
 """The garment as elements: triangles that stretch and hinges that bend.
 
 Everything here depends on the rest shape alone. A triangle maps its nodes to the 3×2 deformation
-gradient F = Σ x_i ⊗ g_i, a hinge (two triangles that share an edge) maps its four nodes to one
-vector Σ c_i x_i that is parallel to the mean curvature normal; both are the operators A_i of the
+gradient F = Σ x_i ⊗ g_i. A hinge (two triangles that share an edge) maps its four nodes to one
+vector Σ c_i x_i, parallel to the mean curvature normal. Both are the operators A_i of the
 paper's energy (Eq. Wx).
 """
 
@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# Elements that a kernel works on at once: vector units want the same number of many elements side
-# by side, and this many fit in the first cache.
+# Elements that a kernel processes at once. Vector units need the same value of many elements side
+# by side, and the data of this many fit in the L1 cache.
 LANES = 32
 
 
@@ -34,14 +34,14 @@ class Elements:
         hinge_coefficient: (H,4) c_i, dimensionless.
         hinge_weight: (H,) 1 / (area of the two triangles), 1/m²; the hinge's energy is
             ½ B weight (‖Σ c x‖ − rest)². (Bergou et al. 2006 have 3 in place of 1. A sheet bent to
-            a cylinder then stores three times ½ B κ² on equilateral triangles and on a grid along
-            its lines, 4.5 times across the diagonals of a grid; with 1 a strip droops by its
+            a cylinder then stores three times ½ B κ² on equilateral triangles and on a grid bent
+            along its lines, 4.5 times across the diagonals of a grid. With 1, a strip droops by its
             bending length.)
         hinge_rest: (H,) ‖Σ c x‖ at rest, m.
         node_area: (n,) a third of the area of the triangles around a node, m².
         edge: (E,2) unique edges; edge_rest_length: (E,) m.
-        triangle_lanes: (⌈F/L⌉,3,L) `triangle` in tiles of L = LANES, padded with triangles without
-            area at node 0.
+        triangle_lanes: (⌈F/L⌉,3,L) `triangle` in tiles of L = LANES, padded with zero-area
+            triangles at node 0.
         gradient_lanes: (⌈F/L⌉,5,L) g_1, g_2 (g_0 = −g_1 − g_2) and area, likewise.
         hinge_lanes: (⌈H/L⌉,4,L) `hinge`, likewise.
         bend_lanes: (⌈H/L⌉,6,L) coefficients, weight and rest of the hinges, likewise.
@@ -72,8 +72,8 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
         faces: (F,3) node indices, consistently oriented, manifold.
 
     Raises:
-        ValueError: a triangle has no area, a node of it does not exist or is not finite, a triangle
-            is inverted, or an edge has more than two triangles.
+        ValueError: a triangle has no area or refers to a missing node, a node is not finite, a
+            triangle is inverted, or an edge has more than two triangles.
     """
     x = np.ascontiguousarray(rest_position, dtype=np.float64)
     triangle = np.ascontiguousarray(faces, dtype=np.int32)
@@ -130,7 +130,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
 
 
 def in_lanes(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Returns (k,c) rows, one an element, as (⌈k/L⌉,c,L) tiles, L = LANES, padded with zeros."""
+    """Returns (k,c) rows, one per element, as (⌈k/L⌉,c,L) tiles, L = LANES, padded with zeros."""
     count, columns = rows.shape
     tiles = -(-count // LANES)
     padded = np.zeros((tiles * LANES, columns), dtype=rows.dtype)
@@ -139,12 +139,12 @@ def in_lanes(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _half_edges(triangle: IntArray) -> IntArray:
-    """Returns (3F,2) the edges of each triangle in the direction in which it passes them."""
+    """Returns (3F,2) the directed edges of the triangles, in each triangle's orientation."""
     return triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def _check(x: FloatArray, triangle: IntArray) -> None:
-    """Raises an error that names what is wrong with a mesh."""
+    """Raises an error that names the defect of an invalid mesh."""
     n = len(x)
     if triangle.size and not 0 <= triangle.min() <= triangle.max() < n:
         wrong = int(np.flatnonzero(((triangle < 0) | (triangle >= n)).any(axis=1))[0])
@@ -186,7 +186,7 @@ def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _hinge_coefficients(x: FloatArray, hinge: IntArray) -> FloatArray:
-    """Returns (H,4) the row of cotangents of Bergou et al. 2006, "A quadratic bending model"."""
+    """Returns (H,4) the cotangent row of Bergou et al. 2006, "A quadratic bending model"."""
     x0, x1, x2, x3 = (x[hinge[:, i]] for i in range(4))
 
     def cotangent(apex: FloatArray, p: FloatArray, q: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Fibres: a stiffness of each triangle along one direction of its own, as warp and weft have it.
+"""Fibres: additional stiffness of each triangle along one direction, such as warp or weft.
 
 A fibre of direction d (rest frame of the triangle) is stretched to λ = ‖F d‖ and stores
 ½ k A (λ − 1)², A the rest area. F d = Σ c_i x_i over the corners, c_i = g_i · d.
@@ -15,13 +15,13 @@ import scipy.sparse as sp
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.elements import Elements
 
-# A fibre crushed to less than this has no direction.
+# Stretch below which a crushed fibre has no direction.
 _SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
 class Fibres:
-    """One fibre a triangle.
+    """One fibre per triangle.
 
     Attributes:
         triangle: (F,3) node indices.
@@ -39,11 +39,11 @@ class Fibres:
     ) -> Fibres:
         """Returns fibres along `direction` (F,3), each projected into its triangle's plane.
 
-        A triangle to whose plane the direction is normal gets no fibre.
+        A triangle whose plane is normal to the direction gets no fibre.
 
         Args:
             elements: the rest shape.
-            rest_position: (n,3) that it was made from, m.
+            rest_position: (n,3) positions from which `elements` was made, m.
             direction: (F,3) of any length, in the frame of `rest_position`.
             stiffness: k, N/m.
         """
@@ -72,14 +72,14 @@ class Fibres:
     def prepare(self, x: FloatArray) -> FloatArray:
         """Returns (F,4) direction of the fibres at `x` (n,3) and their lateral stiffness share.
 
-        What `filtered_product` needs; pressure has no lateral stiffness.
+        Data for `filtered_product`. Compressed fibres have no lateral stiffness.
         """
         block = np.empty((len(self.weight), 4))
         _prepare(x, self.triangle, self.coefficient, block)
         return block
 
     def matrix(self, node_count: int) -> sp.csc_matrix:
-        """Returns Σ w AᵀA (n,n), N/m, that bounds the stiffness from above."""
+        """Returns Σ w AᵀA (n,n), N/m, an upper bound of the stiffness."""
         local = np.einsum("e,ei,ej->eij", self.weight, self.coefficient, self.coefficient)
         row = np.repeat(self.triangle, 3, axis=1).ravel()
         column = np.tile(self.triangle, (1, 3)).ravel()
@@ -88,7 +88,7 @@ class Fibres:
 
 
 def no_fibres() -> Fibres:
-    """Returns no fibre at all."""
+    """Returns an empty set of fibres."""
     return Fibres(np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3)), np.zeros(0))
 
 
@@ -126,7 +126,7 @@ def _prepare(x, triangle, coefficient, block):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 def filtered_product(z, triangle, coefficient, weight, block, scale, product):  # type: ignore[no-untyped-def]
-    """Adds scale · K₊ z to `product` (n,3), K₊ the fibres' stiffness without that of pressure."""
+    """Adds scale · K₊ z to `product` (n,3), K₊ the stiffness less that of compressed fibres."""
     for e in range(block.shape[0]):
         s0, s1, s2 = _stretched(z, triangle, coefficient, e)
         n0, n1, n2, lateral = block[e, 0], block[e, 1], block[e, 2], block[e, 3]

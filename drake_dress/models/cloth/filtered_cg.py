@@ -1,10 +1,10 @@
 """Conjugate gradients on the motions that contact leaves free.
 
-A node is free (three directions), slips (two directions, none along its normal) or has a
-prescribed motion (none). With Π the projection on what is free, the solver finds z in the range
-of Π with Π A z = Π rhs, A = scalar matrix ⊗ I₃ (+ scale · filtered stretch of the elements), by
+A node is free (three directions), slips (two, none along its normal), moves along a rail (one) or
+has a prescribed motion (none). With Π the projection onto the free directions, the solver finds z
+with Π A z = Π rhs, A = scalar matrix ⊗ I₃ (+ scale · filtered stretch of the elements), by
 preconditioned conjugate gradients with a masked factor of P (Baraff and Witkin 1998, with a
-preconditioner that knows the garment). A factor from a slightly different set of nodes is still
+garment-specific preconditioner). A factor made for a slightly different set of nodes is still
 symmetric positive definite between the projections, so it need not be renewed at every step.
 """
 
@@ -27,25 +27,26 @@ from drake_dress.models.cloth.layers.bonds import NO_BONDS, Bonds, bond_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
-# Weight of motion across the cloth beside P⁻¹ in the preconditioner: smooth motion is in both.
+# Weight of the response along the normal beside P⁻¹ in the preconditioner. It is below 1 because
+# both contain smooth motion.
 _ACROSS = 0.3
-# Of the residual at the start, what rounding leaves over. Where all but nothing drives the free
-# part by itself, a tolerance of that is beyond it, and what iterations go on with is noise.
+# Share of the initial residual that rounding leaves. If almost nothing drives the free part, the
+# tolerance lies below this, and further iterations would only change noise.
 _ROUNDING = 1e-12
-# Nor is more asked for than this share of the tolerance leaves of that residual: where nothing
-# moves and nothing weighs, what is left over has nothing else to be held against.
+# The residual also need not fall below this share of the tolerance relative to its initial value:
+# without motion and weight there is no other reference for it.
 _OF_THE_START = 1e-2
 
 
 @dataclass(frozen=True)
 class Preconditioner:
-    """What approximates the inverse of A.
+    """Approximation of the inverse of A.
 
     Attributes:
-        factor: of P without some nodes. Those that it leaves out and that are free are
-            preconditioned by the diagonal.
-        across: of `normal_response`, added to the preconditioner but not to the norm. A coat on an
-            arm took 16.5 iterations without it, and 12.5 with it.
+        factor: factor of P that leaves some nodes out. The free ones among them are preconditioned
+            by the diagonal.
+        across: result of `normal_response`, added to the preconditioner but not to the norm. A
+            coat on an arm took 16.5 iterations without it, and 12.5 with it.
     """
 
     factor: Factor
@@ -54,11 +55,11 @@ class Preconditioner:
 
 @dataclass(frozen=True)
 class Bound:
-    """What of the nodes' motion is prescribed.
+    """Prescribed part of the nodes' motion.
 
     Attributes:
         mode: (n,) FREE, STICK, SLIP, HELD or RAIL.
-        normal: (n,3) of the surface where a node slips, or direction of its rail.
+        normal: (n,3) surface normal where a node slips, or direction of its rail.
         resistance: (n,) added to the diagonal of A where nodes are free, kg.
     """
 
@@ -69,12 +70,12 @@ class Bound:
 
 @dataclass(frozen=True)
 class Stop:
-    """When conjugate gradients end.
+    """Stopping criteria of conjugate gradients.
 
     Attributes:
-        tolerance: relative to ‖Π against‖.
-        max_iterations: at most.
-        against: (n,3) what the residual is held against; the right-hand side by default.
+        tolerance: residual relative to ‖Π against‖.
+        max_iterations: upper limit of iterations.
+        against: (n,3) reference of the residual; the right-hand side by default.
     """
 
     tolerance: float
@@ -89,8 +90,9 @@ class SystemMatrix:
         linear: the scalar part.
         inverse_diagonal: (n,) of P, for nodes that the factor leaves out but contact does not.
         elements: the rest shape, or None if A has no filtered stretch.
-        scale: of the filtered stretch, s².
-        fibres: further stretch along one direction a triangle; `prepare_fibres` before a product.
+        scale: factor of the filtered stretch, s².
+        fibres: additional stretch along one direction per triangle; call `prepare_fibres` before a
+            product.
     """
 
     def __init__(
@@ -110,7 +112,7 @@ class SystemMatrix:
         self._fibres = f
         self._fibre_block = np.zeros((0, 4))
         self._bonds = NO_BONDS
-        # its own: the diagonal may be changed
+        # a copy: `set_diagonal` changes it
         self._linear = (linear.indptr, linear.indices, linear.data.copy())
         row = np.repeat(np.arange(len(linear.indptr) - 1), np.diff(linear.indptr))
         self._diagonal = np.flatnonzero(row == linear.indices)
@@ -119,15 +121,15 @@ class SystemMatrix:
         self._inverse_diagonal = inverse_diagonal
 
     def set_diagonal(self, diagonal: FloatArray) -> None:
-        """Makes `diagonal` (n,) that of the scalar part from now on."""
+        """Replaces the diagonal of the scalar part by `diagonal` (n,)."""
         self._linear[2][self._diagonal] = diagonal
 
     def set_bonds(self, bonds: Bonds) -> None:
-        """Adds what pairs of layers resist with, in place of those of before."""
+        """Replaces the pairs of layers that resist approach."""
         self._bonds = bonds
 
     def prepare_fibres(self, x: FloatArray) -> None:
-        """Takes the fibres' directions from positions `x` (n,3), m."""
+        """Computes the fibres' directions at positions `x` (n,3), m."""
         self._fibre_block = self._fibres.prepare(x)
 
     def _operator(self, block: FloatArray) -> tuple[object, ...]:
@@ -136,7 +138,7 @@ class SystemMatrix:
         return (*self._linear, *self._elements, self._fibre_block, block, self._scale, bonds)
 
     def product(self, z: FloatArray, block: FloatArray) -> FloatArray:
-        """Returns A z (n,3); `block` is what `prepare_filtered` wrote for this state."""
+        """Returns A z (n,3); `block` is the result of `prepare_filtered` for this state."""
         out = np.empty_like(z)
         _product(self._operator(block), z, out)
         return out
@@ -160,15 +162,15 @@ class SystemMatrix:
     ) -> tuple[int, float]:
         """Improves `z` (n,3) in place until ‖r‖ ≤ tolerance ‖Π against‖ in the factor's norm.
 
-        Or until ‖r‖ is what rounding leaves of it, or a hundredth of the tolerance of where it
-        started; the tolerance counts as met then, too.
+        It also stops, and the tolerance counts as met, once ‖r‖ has fallen to rounding level or to
+        a hundredth of the tolerance relative to its initial value.
 
-        `z` holds the start: its free part is improved, its prescribed part (nodes that are held or
-        stick, normal of those that slip) is kept, and enters the right-hand side through A. A z
-        (n,3) is written into `applied`, if given: it is a by-product.
+        `z` holds the initial guess. Its free part is improved. Its prescribed part (held and
+        sticking nodes, the normal component of slipping ones) is kept and enters the right-hand
+        side through A. `applied`, if given, receives A z (n,3), a by-product.
 
         Returns:
-            Iterations done, and the last relative residual.
+            Number of iterations, and the last relative residual.
         """
         factor, across = preconditioner.factor, preconditioner.across
         if across is None:
@@ -199,13 +201,14 @@ class SystemMatrix:
         tolerance: float,
         max_iterations: int,
     ) -> tuple[int, int]:
-        """Improves both `z` as `solve` does where nothing but what `factor` leaves out is bound.
+        """Improves both `z` like `solve`, where only the nodes that `factor` leaves out are bound.
 
-        The factor is read once for both. The tolerance is of what the starts lack: against what is
-        prescribed, a motion that goes on as before seems right to a percent at every step.
+        The factor is read once for both. The tolerance is relative to the initial residuals.
+        Relative to what is prescribed, unchanged motion would seem right to a percent at every
+        step.
 
         Returns:
-            Iterations done for each.
+            Number of iterations for each.
         """
         return _filtered_cg_pair(
             self._operator(block),
@@ -239,7 +242,7 @@ def _residual2(operator, z, rhs, mode, normal):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _rows(z):  # type: ignore[no-untyped-def]
-    """Returns (n,4): `z` (n,3) and nothing, so that each row is a vector of the processor."""
+    """Returns (n,4): `z` (n,3) padded with zeros, so that each row fills a vector register."""
     rows = np.empty((z.shape[0], 4))
     for i in range(z.shape[0]):
         rows[i, 0] = z[i, 0]
@@ -288,7 +291,7 @@ def matrix_product(
 
 @nb.njit(cache=True, nogil=True)
 def project(z: FloatArray, mode: IntArray, normal: FloatArray) -> None:
-    """Removes from the vectors in `z` (n,3 or more), in place, what the modes do not leave free."""
+    """Projects the vectors in `z` (n,3 or more), in place, onto what the modes leave free."""
     for i in range(z.shape[0]):
         m = mode[i]
         if m == 1 or m == 3:
@@ -331,7 +334,8 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     force = np.empty((n, 4))
     preconditioned = np.zeros((n, 4))
     solution = _rows(z)
-    # what resists is stiff by itself: D M⁻¹ D, D² = P_ii / (P_ii + c_i), takes care of it
+    # Resistance c stiffens its nodes; the preconditioner D M⁻¹ D, D² = P_ii / (P_ii + c_i),
+    # accounts for that.
     damped = np.empty(resistance.shape[0])
     for i in range(damped.shape[0]):
         damped[i] = 1.0 / np.sqrt(1.0 + resistance[i] * masked_scale[i])
@@ -364,7 +368,7 @@ def _filtered_cg(  # type: ignore[no-untyped-def]
     iterations = 0
     while iterations < max_iterations and left > goal:
         _apply(operator, direction, product)
-        # the direction is free: what a projection takes from the product is no work
+        # The direction is free, so projecting the product would not change the curvature.
         curvature = dot(direction, product) + _resisted(resistance, direction)
         if curvature <= 0.0:
             break
@@ -470,9 +474,9 @@ def _resisted(resistance, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _go_across(facing, give, mode, normal, residual, out):  # type: ignore[no-untyped-def]
-    """Adds Π f g fᵀ `residual` of each node to `out`; returns the product of that and `residual`.
+    """Adds Π f g fᵀ `residual` of each node to `out`; returns its product with `residual`.
 
-    f (n,3) is where cloth faces, g (n,) how it gives way there; `residual` is in the range of Π.
+    f (n,3) is the cloth's normal, g (n,) its compliance there; `residual` is in the range of Π.
     """
     total = 0.0
     for i in range(give.shape[0]):

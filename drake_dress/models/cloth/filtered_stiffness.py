@@ -1,8 +1,9 @@
 """The positive semi-definite part K₊ of the stretch stiffness, which implicit schemes need.
 
-Compressed directions keep no geometric stiffness (S⁻¹ is cut at the identity); tension keeps its
-own. (The paper keeps (I − BB†) only; that drops the stiffening by tension as well, which left
-explicit made a hanging coat flutter.) K₊ never exceeds Σ w AᵀA, so P bounds M + h² K₊ from above.
+Compressed directions lose their geometric stiffness (S⁻¹ is clamped to at most the identity);
+directions under tension keep it. (The paper keeps only (I − BB†), which also drops the stiffening
+by tension; treating that explicitly made a hanging coat flutter.) K₊ never exceeds Σ w AᵀA, so P
+bounds M + h² K₊ from above.
 """
 
 from __future__ import annotations
@@ -14,22 +15,22 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import LANES, Elements
 from drake_dress.models.cloth.forces import deformation, gather, polar, put_stress, scatter
 
-# Rows that a triangle has in a block.
+# Rows per triangle in a block.
 PLAIN_ROWS = 14
-# Step of the differences in F, dimensionless.
+# Step of the finite differences in F, dimensionless.
 _DIFFERENCE = 1e-7
 
 
 def no_stretch() -> FloatArray:
-    """Returns the data of no triangle at all."""
+    """Returns the data of zero triangles."""
     return np.zeros((0, PLAIN_ROWS, LANES))
 
 
 def prepare_filtered(elements: Elements, stretch: float, x: FloatArray) -> FloatArray:
-    """Returns what `filtered_product` needs of the triangles at `x` (n,3), m: (⌈F/L⌉,14,L).
+    """Returns the data of the triangles at `x` (n,3), m, for `filtered_product`: (⌈F/L⌉,14,L).
 
-    R (6), its normal (3), k area S⁻¹ clamped to at most the identity (3), k area / max(tr S, 2) and
-    k area.
+    Rows: R (6), its normal (3), k area S⁻¹ clamped to at most the identity (3),
+    k area / max(tr S, 2) and k area.
 
     Args:
         elements: the rest shape.
@@ -56,7 +57,7 @@ def _prepare(x, nodes, gradient, stretch, block):  # type: ignore[no-untyped-def
             n1 = r20 * r01 - r00 * r21
             n2 = r00 * r11 - r10 * r01
             unit = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + 1e-300)
-            # eigenvalues of S⁻¹ above 1 (compression) are cut to 1
+            # eigenvalues of S⁻¹ above 1 (compression) are clamped to 1
             mean = 0.5 * (i00 + i11)
             half = 0.5 * (i00 - i11)
             radius = np.sqrt(half * half + i01 * i01)
@@ -91,9 +92,9 @@ def filtered_product(z, nodes, gradient, block, scale, product):  # type: ignore
         z: (n,3).
         nodes: `triangle_lanes` of the elements.
         gradient: `gradient_lanes` of the elements.
-        block: of `prepare_filtered`.
+        block: result of `prepare_filtered`.
         scale: factor.
-        product: (n,3) added to.
+        product: (n,3), added to.
     """
     tile = np.empty(6 * LANES)
     for b in range(block.shape[0]):
@@ -126,12 +127,12 @@ def normal_response(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns normals (n,3) of the nodes and 1 / (nᵀ A_ii n) (n,), 1/kg.
 
-    A is `diagonal` ⊗ I₃ + scale · K₊ with its blocks A_ii. Across itself, cloth without tension has
-    mass and bending only, and P, which bounds stretch in all directions, is far too stiff there.
+    A is `diagonal` ⊗ I₃ + scale · K₊ with its blocks A_ii. Along its normal, slack cloth has only
+    mass and bending stiffness. P, which bounds stretch in all directions, is far too stiff there.
 
     Args:
         elements: the rest shape.
-        block: of `prepare_filtered`.
+        block: result of `prepare_filtered`.
         scale: factor.
         diagonal: (n,) of the scalar part, kg.
     """
@@ -183,8 +184,8 @@ def filtered_derivative(
 ) -> FloatArray:
     """Returns ∂(wᵀ K₊(x) z)/∂x (n,3).
 
-    K₊ is no Hessian, so that this is no product with a third derivative. It is found a triangle at
-    a time by central differences in the six entries of F, which are exact to about 1e-9.
+    K₊ is not a Hessian, so this is not a product with a third derivative. It is computed per
+    triangle by central differences in the six entries of F, which are accurate to about 1e-9.
 
     Args:
         elements: the rest shape.

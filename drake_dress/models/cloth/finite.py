@@ -1,4 +1,4 @@
-"""One error for a garment that is no longer made of numbers: it names the node."""
+"""The error for a garment with values that are not finite: it names the node."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def explain_not_finite(
         x: (n,3) positions, m.
         v: (n,3) velocities, m/s.
         held_motion: (k,3) motion or velocity of the held nodes.
-        held: (k,) their numbers.
+        held: (k,) indices of the held nodes.
 
     Raises:
-        ValueError: always; also if all inputs are finite: this is called where results are not.
+        ValueError: always. If all inputs are finite, the step's result was not.
     """
     for name, value, nodes in (
         ("position", x, None),

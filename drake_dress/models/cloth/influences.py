@@ -1,6 +1,6 @@
-"""What acts on a garment during one step beside its material, gravity and the bodies it touches.
+"""Influences on a garment during one step, apart from its material, gravity and contact.
 
-Physical effects (`drake_dress/models/effects`) write it, integrators read it.
+Physical effects (`drake_dress/models/effects`) write them; integrators read them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class ContactLaw:
 
     Attributes:
         friction: (n,) Coulomb coefficient.
-        adhesion: (n,) pull that a contact can bear before it is released, N.
+        adhesion: (n,) tension that a contact bears before it is released, N.
     """
 
     friction: FloatArray
@@ -29,12 +29,12 @@ class ContactLaw:
 
 @dataclass(frozen=True)
 class Influences:
-    """Other effects on the garment during a step. None has no effect.
+    """Additional influences on a garment during one step; None has no effect.
 
     Attributes:
         force: (n,3) forces on the nodes, N.
         friction: (n,) coefficients of friction that replace the material's.
-        adhesion: (n,) pull that a contact can bear before it is released, N. It adds to the normal
+        adhesion: (n,) tension that a contact bears before it is released, N. It adds to the normal
             force in friction.
         stretch_factor: (F,) factors on the stretch stiffness of each triangle.
         bonds: pairs of layers that resist approach. Only the linearly implicit scheme uses them.
@@ -47,12 +47,12 @@ class Influences:
     bonds: Bonds | None = None
 
     def contact_law(self, friction: float, count: int) -> ContactLaw:
-        """Returns what contact does with `count` nodes; `friction` is the material's."""
+        """Returns the contact law of `count` nodes; `friction` is the material's coefficient."""
         mu = np.full(count, friction) if self.friction is None else self.friction
         return ContactLaw(mu, np.zeros(count) if self.adhesion is None else self.adhesion)
 
     def stiffened(self, elements: Elements) -> Elements:
-        """Returns the elements, their areas scaled where stretch has another stiffness."""
+        """Returns the elements with their areas scaled by `stretch_factor`."""
         if self.stretch_factor is None:
             return elements
         area = elements.triangle_area * self.stretch_factor

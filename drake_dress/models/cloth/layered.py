@@ -1,9 +1,9 @@
-"""A plant's garment whose layers do not pass through each other.
+"""Self-collision of a plant's garment: keeps its layers from passing through each other.
 
-Wraps any integrator with the interface of `ImplicitCloth`. Pairs of layers that would come too
-close resist within the step of the linearly implicit scheme (`layers/bonds.py`); what it, or
-another, then proposes is corrected by `LayerSeparation`, so that nothing crosses. Where motions of
-grippers leave no way, layers do cross, and are led back from then on (`layers/tangles.py`).
+Wraps any integrator with the interface of `ImplicitCloth`. In the linearly implicit scheme, pairs
+of layers that would come too close resist within the step (`layers/bonds.py`). `LayerSeparation`
+then corrects the result of any scheme so that no layers cross. Where gripper motion makes crossing
+unavoidable, layers cross and are led back over the next steps (`layers/tangles.py`).
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from drake_dress.models.cloth.state import ClothState
 
 # Nodes within this gap of the person are not pushed toward it, m.
 _ON_THE_PERSON = 1e-3
-# Share of what a pair lacks of the thickness that it makes up for in a step.
+# Share of a pair's missing thickness that is recovered per step.
 _RECOVERY = 0.2
-# Resistance of a pair to approach, by the median mass of a node: with a third of it corrections are
-# five times as large, with three times it the solver takes a third more iterations.
+# Resistance of a pair to approach, in median node masses. A third of it makes corrections five
+# times as large; three times it costs the solver a third more iterations.
 _RESISTANCE = 1000.0
-# Speed at which layers that have crossed are led back, m/s: a fold of 2 cm is out in 0.2 s, for its
-# neighbours help. With three times that what was pinched flew apart at 3 m/s.
+# Speed at which crossed layers are led back, m/s. A fold of 2 cm is out in 0.2 s, because its
+# neighbours help. At three times this speed, pinched cloth flew apart at 3 m/s.
 _WAY_OUT = 0.03
-# How far astray nodes look for the layer that they are behind, by the mean edge length.
+# Search distance from crossed nodes to the layer that they have passed, in mean edge lengths.
 _BEHIND = 0.5
 
 
 class Integrator(Protocol):
-    """What steps a plant's garment."""
+    """Interface of the schemes that step a plant's garment."""
 
     elements: Elements
     material: Material
@@ -58,20 +58,20 @@ class Integrator(Protocol):
         influences: Influences = NO_INFLUENCES,
         guess: FloatArray | None = None,
     ) -> tuple[ClothState, Any]:
-        """Returns the state one time step later, and how it was solved."""
+        """Returns the state one time step later, and information on the solve."""
 
 
 class LayeredCloth:
     """Adds self-collision to an integrator.
 
-    Other layers do not move nodes that are held or that stick to the person. They move nodes that
-    lie on the person only along its surface. Where layers would cross because of that, as in an
-    armpit, friction and skin yield, by up to 1.5 mm in the folds that were examined. The force of
-    layers on nodes in the grippers is not part of the grippers' force.
+    Other layers do not move nodes that are held or stick to the person, and move nodes that lie on
+    the person only along its surface. Where layers would cross because of that, as in an armpit,
+    friction and skin yield, by up to 1.5 mm in the folds that were examined. The force of layers on
+    nodes in the grippers is not part of the grippers' force.
 
     Args:
-        integrator: steps the garment.
-        thickness: distance that layers keep, m.
+        integrator: scheme that steps the garment.
+        thickness: distance kept between layers, m.
     """
 
     def __init__(self, integrator: Integrator, thickness: float = 2e-3) -> None:
@@ -108,7 +108,7 @@ class LayeredCloth:
         return self._apart(state, after, w, barred, passing), info
 
     def _tangle(self, state: ClothState) -> Tangle | None:
-        """Returns what pierces, if anything does."""
+        """Returns the tangle of the state, None if nothing pierces."""
         if not state.tangled.any():
             return None
         return self._tangles.at(state.x, state.tangled.astype(np.bool_))
@@ -121,7 +121,7 @@ class LayeredCloth:
         barred: FloatArray,
         tangle: Tangle,
     ) -> ClothState:
-        """Returns `after` with layers on their way back that have crossed."""
+        """Returns `after` with crossed layers moved back toward their own side."""
         h, dx = self.time_step, after.x - before.x
         pairs = self._layers.pairs(before.x, h * before.v, self._behind)
         moved = self._tangles.lead_back(tangle, before.x, dx, w, barred, pairs, _WAY_OUT * h)
@@ -152,12 +152,12 @@ class LayeredCloth:
         return replace(after, x=x, v=v, tangled=tangled.astype(np.int32))
 
     def _bonds(self, state: ClothState, passing: Passing | None) -> Bonds:
-        """Returns the pairs that may come closer than layers keep."""
+        """Returns the pairs that may come closer than the layer thickness."""
         h, thickness = self.time_step, self._layers.thickness
         pairs = self._layers.pairs(state.x, h * state.v, thickness).without(passing)
         rate = np.einsum("pm,pmk,pk->p", pairs.weights, state.v[pairs.node], pairs.direction)
         lacking = thickness - pairs.distance
-        # what is closer parts slowly, what is farther may come as near as layers keep
+        # Pairs that are too close part slowly; the others may approach up to the thickness.
         share = np.where(lacking > 0.0, _RECOVERY, 1.0)
         return Bonds(
             pairs.node,
@@ -174,6 +174,6 @@ def inverse_mass(mass: FloatArray, mode: IntArray) -> FloatArray:
 
 
 def pushed_nodes(rate_change: FloatArray) -> BoolArray:
-    """Returns (n,) which nodes another layer has pushed, by their change (n,3)."""
+    """Returns (n,) whether another layer has pushed a node, given its change of motion (n,3)."""
     pushed: BoolArray = np.any(rate_change != 0.0, axis=1)
     return pushed

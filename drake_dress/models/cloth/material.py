@@ -1,4 +1,4 @@
-"""What the garment is made of, as the numbers that enter its equations of motion."""
+"""Material parameters of the garment's equations of motion."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Material:
         surface_density: mass per rest area, kg/m².
         stretch_stiffness: tension per unit strain of a strip, per width, N/m.
         bending_stiffness: moment per unit curvature, per width, N·m.
-        damping: stiffness-proportional damping time, s; used by the implicit integrator only.
+        damping: stiffness-proportional damping time, s; not used by `ExplicitBiasCloth`.
         friction: Coulomb coefficient against the person, dimensionless.
-        margin: distance that is kept between a node and the person's surface, m.
+        margin: distance kept between a node and the person's surface, m.
 
     Raises:
         ValueError: a value is not finite or outside its range.

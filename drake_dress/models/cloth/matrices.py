@@ -1,4 +1,4 @@
-"""The constant matrices of a garment: mass, stretch without rotation, bending without curvature."""
+"""Constant matrices of a garment: mass, stretch without rotation, bending about a flat shape."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drake_dress.models.cloth.material import Material
 
 @dataclass(frozen=True)
 class Csr:
-    """A scalar (n,n) matrix that acts on each axis alike, as plain arrays for kernels."""
+    """A scalar (n,n) matrix, applied to each axis, as plain CSR arrays for kernels."""
 
     indptr: IntArray
     indices: IntArray
@@ -34,7 +34,7 @@ def lumped_mass(elements: Elements, material: Material) -> FloatArray:
 
 
 def stretch_matrix(elements: Elements, material: Material) -> sp.csc_matrix:
-    """Returns Σ w AᵀA of the triangles, (n,n), N/m: stretch as if no element could turn."""
+    """Returns Σ w AᵀA of the triangles, (n,n), N/m: stretch as if no element could rotate."""
     weight = material.stretch_stiffness * elements.triangle_area
     local = np.einsum("eia,eja->eij", elements.triangle_gradient, elements.triangle_gradient)
     return _assemble(elements.triangle, local * weight[:, None, None], elements.node_count)
@@ -52,9 +52,9 @@ def bending_bound(elements: Elements, material: Material) -> sp.csc_matrix:
     """Returns a graph Laplacian (n,n), N/m, that bounds the bending matrix from above.
 
     A hinge's vector is Σ c_k (x_k − x_0) over its three edges at x_0, so its square is at most
-    3 Σ c_k² ‖x_k − x_0‖². The bound has the pattern of stretch: a factor of P then fills in by
-    a third of what it does with hinges (0.7 against 2.2 ms at 1,680 nodes). In P it only makes a
-    step shorter, forces and so equilibria stay exact.
+    3 Σ c_k² ‖x_k − x_0‖². The bound has the sparsity pattern of stretch, so a factor of P has a
+    third of the fill-in that hinges would cause (0.7 against 2.2 ms at 1,680 nodes). In P it only
+    shortens a step; forces, and therefore equilibria, stay exact.
     """
     c = elements.hinge_coefficient
     weight = 3.0 * material.bending_stiffness * elements.hinge_weight

@@ -1,4 +1,4 @@
-"""Which scheme steps a plant's garment, and how well it solves."""
+"""Choice of the scheme that steps a plant's garment, with its solver settings."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from drake_dress.models.cloth.projective.projective_dynamics import (
 )
 from drake_dress.models.cloth.state import Additions
 
-# Elements, fabric, gravity (3,) and additions to what steps the garment.
+# Maps elements, fabric, gravity (3,) and additions to an integrator.
 MakeIntegrator = Callable[[Elements, Material, FloatArray, Additions], Integrator]
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """Makes an integrator when it is called with a garment; a `MakeIntegrator`.
+    """A `MakeIntegrator`: makes an integrator when called with a garment.
 
     Attributes:
         held: (k,) nodes whose motion is prescribed.
-        time_step: s.
-        settings: of the linearly implicit scheme or of Projective Dynamics, which they choose.
-        damping: in place of the fabric's, s.
+        time_step: duration of a step, s.
+        settings: settings of the linearly implicit scheme or of Projective Dynamics; their type
+            selects the scheme.
+        damping: replaces the fabric's damping time, s; None keeps the fabric's.
     """
 
     held: IntArray
@@ -39,7 +40,7 @@ class Scheme:
     def __call__(
         self, elements: Elements, material: Material, gravity: FloatArray, additions: Additions
     ) -> Integrator:
-        """Returns what steps the garment."""
+        """Returns the integrator of a garment."""
         if self.damping is not None:
             material = replace(material, damping=self.damping)
         given = (elements, material, self.time_step, self.held, gravity, additions)

@@ -1,4 +1,4 @@
-"""The state of a garment, and what is the same for all schemes that step one."""
+"""The state of a garment, and the data that all schemes share."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class ClothState:
         mode: (n,) contact of each node: 0 free, 1 stick, 2 slip, 3 held.
         reaction: (n,3) force of person or gripper on each node in the last step, N.
         owner: (n,) obstacle that each node touches, -1 for none.
-        solver: (2,n+1) starting point of the linear solvers in the next step, so that a step
-            depends on its arguments alone. Row 0 belongs to the linearly implicit scheme, row 1 to
-            Projective Dynamics: how outdated the factor is (-1 without one), then 1 for each node
-            that it leaves out.
-        tangled: (n,) 1 for nodes of edges and triangles that pierce each other although layers are
-            kept apart; 0 for the others.
+        solver: (2,n+1) warm start of the linear solvers in the next step, so that a step depends
+            on its arguments alone. Row 0 belongs to the linearly implicit scheme, row 1 to
+            Projective Dynamics. A row starts with how outdated the factor is (-1 without one),
+            followed by 1 for each node that the factor leaves out.
+        tangled: (n,) 1 for nodes of edges and triangles that pierce each other despite layer
+            separation; 0 for the others.
     """
 
     x: FloatArray
@@ -68,7 +68,7 @@ class ClothState:
 
 @dataclass(frozen=True)
 class Additions:
-    """What effects add to a garment for good.
+    """Permanent additions of effects to a garment.
 
     Attributes:
         fibres: additional stiffness of the triangles along given directions.
@@ -83,7 +83,7 @@ NO_ADDITIONS = Additions()
 
 
 class SteppedCloth:
-    """A garment that a scheme steps.
+    """A garment and its time step, common to all schemes.
 
     Args:
         elements: rest shape, from `make_elements`.
@@ -91,10 +91,10 @@ class SteppedCloth:
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        additions: what effects add to the garment.
+        additions: permanent additions of effects.
 
     Attributes:
-        mass: (n,) of the nodes, kg.
+        mass: (n,) mass of each node, kg.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Sums and lengths of arrays of vectors.
 
-Sums run on whole vector registers; their order is the compiler's.
+Sums run on whole vector registers, in an order that the compiler chooses.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def add(a: FloatArray, scale: float, b: FloatArray) -> None:
 
 @nb.njit(cache=True, nogil=True, fastmath=_SUMS, forceinline=True)
 def turn(direction: FloatArray, beta: float, ahead: FloatArray) -> None:
-    """Writes `ahead` + β `direction` to `direction`: the next one of conjugate gradients."""
+    """Writes `ahead` + β `direction` to `direction`: the next conjugate search direction."""
     p, q = direction.reshape(-1), ahead.reshape(-1)
     for i in range(p.shape[0]):
         p[i] = q[i] + beta * p[i]

@@ -1,1 +1,1 @@
-"""What the garment touches, and where."""
+"""Contact of the garment with bodies."""

@@ -1,12 +1,12 @@
-"""Nodes in the hollow where two bodies meet, such as an armpit.
+"""Contact of nodes in the hollow between two bodies, such as an armpit.
 
-A node that is held out of its nearest body alone is driven into the other one, held out of that in
-the next step, and works its way in between. There it is held off the line where both surfaces meet:
-with gaps g and normals n of both, c = n₁·n₂, the shortest way out of both margins is
+A node that is kept out of its nearest body alone is driven into the other one, kept out of that in
+the next step, and works its way in between. Such a node is kept off the line where both surfaces
+meet instead. With gaps g and normals n of both, c = n₁·n₂, the shortest way out of both margins is
 
-    d = α n₁ + β n₂,   α = (c g₂ - g₁) / (1 - c²),   β = (c g₁ - g₂) / (1 - c²),
+    d = α n₁ + β n₂,   α = (c g₂ - g₁) / (1 - c²),   β = (c g₁ - g₂) / (1 - c²).
 
-and the node lies ‖d‖ deep in a surface across d where α and β are positive; elsewhere the way out
+If α and β are positive, the node counts as ‖d‖ deep in a surface normal to d. Otherwise the way out
 of the nearest body is the way out of both.
 """
 
@@ -21,18 +21,18 @@ from drake_dress.models.cloth.contact.detection import Proximity, surfaces_of
 from drake_dress.models.cloth.contact.distance import nearest_other
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 
-# Between surfaces that face each other more directly a node has no way out, only a place: -c.
+# Value of -c above which surfaces face each other too directly for a way out.
 _FACING = 0.97
 
 
 def held_off_corners(
     near: Proximity, x: FloatArray, obstacles: Obstacles, margin: float
 ) -> Proximity:
-    """Returns what is nearest to nodes, with those between two bodies held off both.
+    """Returns `near` with nodes between two bodies kept off both.
 
     Args:
-        near: the nearest body alone.
-        x: (n,3) of the nodes, m.
+        near: proximity to the nearest body alone.
+        x: (n,3) positions of the nodes, m.
         obstacles: bodies.
         margin: distance to keep, m.
     """
@@ -43,7 +43,7 @@ def held_off_corners(
     distance, other = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
     nearest_other(at, obstacles.packed, near.owner[rows], distance, other)
     first, second = near.gap[rows], distance - margin
-    # a body farther away than what moves a node out of the nearest does not matter
+    # a second body matters only if it is nearer than the depth in the first
     meets = second < -first
     if not meets.any():
         return near

@@ -1,8 +1,8 @@
-"""Where the garment is about to touch something: at nodes, edge midpoints and face centroids.
+"""Contact detection at nodes, edge midpoints and face centroids.
 
-An edge or face that comes too close lends its depth to its nodes: if all nodes of the element
-move out by that depth, so does the point. So contact stays a matter of nodes, and a thin hand
-cannot slip between them.
+The depth of an edge or face that comes too close is passed on to its nodes: if all nodes of the
+element move out by that depth, so does the point. So contact is handled at the nodes, and a thin
+hand cannot slip between them.
 """
 
 from __future__ import annotations
@@ -24,25 +24,26 @@ from drake_dress.models.cloth.contact.distance import (
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.vectors import largest_length
 
-# A node so near to a surface, m, lies there while others are judged (those that slide on something
-# round are left with up to 0.2 mm), and so few others are taken as they seem without contact.
+# Gap, m, up to which a node rests on a surface while others are judged (nodes that slide on a round
+# body keep up to 0.2 mm), and number of other nodes up to which all are taken to be contacts.
 CLOSE, FEW = 3e-4, 20
-# A node that was let be may end so deep, m, else all is solved again with it; so often at most.
+# Depth, m, beyond which a node that was not in contact is added and the step is solved again, and
+# the maximum number of such solves.
 ENTERED, ATTEMPTS = 1e-6, 3
-# A way this short passes by no body unseen, m.
+# Length of a path, m, on which no body can be passed unnoticed.
 SHORT_WAY = 0.005
-# A garment farther from everybody than `_REACH`, m, and so many times its way in a step, with what
-# it falls, m/s², cannot land.
+# A garment cannot land if it is farther from all bodies than `_REACH`, m, plus `_HASTE` times its
+# path in a step, including its fall at `_FALL`, m/s².
 _REACH, _HASTE, _FALL = 0.15, 2.0, 9.81
-# Gap of nodes that nothing is near to, m.
+# Gap of nodes that are far from all bodies, m.
 _FAR_GAP = 1e6
-# Farthest a node in contact is from the origin of a body, m.
+# Largest distance of a node in contact from the origin of a body, m.
 _LARGEST_ARM = 1.0
 
 
 @dataclass(frozen=True)
 class Proximity:
-    """The nodes against the nearest obstacle.
+    """Nearest obstacle of each node.
 
     Attributes:
         gap: (n,) distance less the margin, m; negative where the margin is entered.
@@ -61,7 +62,7 @@ class Proximity:
 def out_of_reach(x: FloatArray, obstacles: Obstacles, distance: float) -> bool:
     """Returns whether all of `x` (n,3) is farther than `distance`, m, from everything.
 
-    By bounding boxes: False may be too careful, True is not.
+    The test uses bounding boxes: False may be too careful, True is certain.
     """
     if obstacles.solids:
         return False
@@ -72,14 +73,14 @@ def out_of_reach(x: FloatArray, obstacles: Obstacles, distance: float) -> bool:
 def cannot_land(
     x: FloatArray, v: FloatArray, held_velocity: FloatArray, obstacles: Obstacles, time_step: float
 ) -> bool:
-    """Returns whether nobody is so near that a garment may touch them within a time step.
+    """Returns whether no body is so near that a garment may touch it within a time step.
 
     Args:
-        x: (n,3) of the nodes, m.
-        v: (n,3) of them, m/s.
-        held_velocity: (k,3) of the held nodes, m/s.
-        obstacles: with velocities.
-        time_step: s.
+        x: (n,3) positions of the nodes, m.
+        v: (n,3) their velocities, m/s.
+        held_velocity: (k,3) velocities of the held nodes, m/s.
+        obstacles: bodies, with velocities.
+        time_step: duration of the step, s.
     """
     speed = (
         fastest(obstacles)
@@ -107,14 +108,14 @@ def find_proximity(
     edge: IntArray | None = None,
     triangle: IntArray | None = None,
 ) -> Proximity:
-    """Returns the gap of each node, with edges and faces where they are given.
+    """Returns the nearest obstacle of each node, with the gap of edges and faces if given.
 
     Args:
-        x: (n,3) m.
+        x: (n,3) positions, m.
         obstacles: bodies.
-        margin: distance to keep, of all or of each (n,), m.
-        edge: (E,2).
-        triangle: (F,3).
+        margin: distance to keep, for all nodes or for each (n,), m.
+        edge: (E,2) nodes of the edges.
+        triangle: (F,3) nodes of the faces.
     """
     n = len(x)
     shapes = obstacles.packed
@@ -140,7 +141,7 @@ def depth_of_elements(
 def _with_elements(
     x: FloatArray, shapes: Any, edge: IntArray, triangle: IntArray, distance: FloatArray
 ) -> FloatArray:
-    """Returns (n,) the least distance of each node and of the middles of its elements."""
+    """Returns (n,) the least distance of each node and of the centres of its elements."""
     lent = distance.copy()
     # Only elements within their own size of a surface can enter it.
     _lend_depth(x, edge, shapes, distance, lent)
@@ -150,7 +151,7 @@ def _with_elements(
 
 @dataclass(frozen=True)
 class Contacts:
-    """The nodes that touch something during a step.
+    """The nodes in contact during a step.
 
     Attributes:
         nodes: (c,) indices, ascending.
@@ -173,7 +174,7 @@ class Contacts:
         return ahead
 
     def chosen(self, some: BoolArray) -> Contacts:
-        """Returns those where `some` (c,) is True."""
+        """Returns the contacts where `some` (c,) is True."""
         if some.all():
             return self
         return Contacts(
@@ -206,15 +207,15 @@ def find_contacts(
 ) -> Contacts:
     """Returns the nodes that lie in a margin, or would enter one by their `motion` (n,3), m.
 
-    Which bodies a node comes to is found along its way, so that a large step leaps over nothing;
-    what it comes to is taken as the plane at the point nearest to where it starts.
+    The body that a node meets is searched for along its path, so that a large step leaps over
+    nothing. The body is replaced by the plane at the point nearest to the node's start.
 
     Args:
         x: (n,3) positions at the start of the step, m.
-        motion: (n,3) of the step without contact, m.
-        obstacles: at the start of the step, with velocities.
-        margin: m.
-        time_step: s.
+        motion: (n,3) displacement of the step without contact, m.
+        obstacles: bodies at the start of the step, with velocities.
+        margin: distance to keep, m.
+        time_step: duration of the step, s.
         excluded: (n,) nodes that do not touch anything.
     """
     if not obstacles.count:
@@ -244,11 +245,11 @@ def _met_on_the_way(
     margin: float,
     met: IntArray,
 ) -> BoolArray:
-    """Returns which nodes (c,) come to a body on their way; writes whose to `met` (c,).
+    """Returns which nodes (c,) meet a body on their path; writes the body to `met` (c,).
 
-    Who ends inside of the body that was nearest has met it. Who ends outside of everything and does
-    not pass the plane of that body has met none, if it moved little. Only the others' ways are
-    looked at.
+    A node that ends inside the body that was nearest has met it. A node that moves little, ends
+    outside all bodies and does not pass the plane of the nearest has met none. Only the paths of
+    the others are followed.
     """
     distance, who = np.empty(len(at)), np.empty(len(at), dtype=np.int32)
     nearest_obstacle(at + relative, shapes, distance, who)
@@ -269,7 +270,7 @@ def _met_on_the_way(
 def known_contacts(
     x: FloatArray, nodes: IntArray, owner: IntArray, obstacles: Obstacles, margin: float
 ) -> Contacts:
-    """Returns contact of `nodes` (c,) with the obstacles `owner` (c,), wherever they are."""
+    """Returns contact of `nodes` (c,) with the obstacles `owner` (c,), at any distance."""
     distance = np.empty(len(nodes))
     distance_to(x[nodes], obstacles.packed, owner, distance)
     return _contacts(x[nodes], nodes, distance, owner, obstacles, margin)
@@ -360,7 +361,7 @@ def _lend_depth(x, element, shapes, distance, lent):  # type: ignore[no-untyped-
         near[count] = e
         count += 1
     depth = np.empty(count)
-    # all at once: neighbours have the same body next to them
+    # all at once, because neighbours mostly have the same nearest body
     nearest_obstacle(middle[:count], shapes, depth, np.empty(count, dtype=np.int32))
     for q in range(count):
         for c in range(corners):

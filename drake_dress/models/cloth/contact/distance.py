@@ -1,7 +1,7 @@
-"""Signed distances, normals and their derivatives, compiled.
+"""Signed distances, normals and their derivatives, as compiled kernels.
 
-Shapes come packed as a tuple of plain arrays (`Obstacles.packed`), so that kernels take them all at
-once.
+Shapes come packed as a tuple of plain arrays (`Obstacles.packed`), so that kernels take all of them
+as one argument.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# Farther than any garment is from anything, m.
+# A distance larger than any that occurs, m.
 _FAR = 1e9
-# Of distances, m.
+# Rounding error of distances, m.
 _ROUNDING = 1e-9
-# A point this close on its way has touched, m; a grazing one is given up after so many marches.
+# Distance at which a point on its path counts as touching, m; steps after which a grazing path is
+# given up.
 TOUCH = 1e-5
 MOST_MARCHES = 64
 
@@ -55,9 +56,9 @@ def _weights(t, w, d, c):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _solid(p0, p1, p2, solids, m, gradient, hessian, order):  # type: ignore[no-untyped-def]
-    """Returns the distance to solid m; writes world gradient (3,) and Hessian (3,3) by order.
+    """Returns the distance to solid m; writes world gradient (3,), Hessian (3,3) up to `order`.
 
-    Outside the grid: the distance at the nearest point of the grid and the way there.
+    Outside the grid: the distance at the nearest point of the grid, plus the distance to it.
     """
     pose, grid, size, spline = solids
     q0, q1, q2 = p0 - pose[m, 9], p1 - pose[m, 10], p2 - pose[m, 11]
@@ -128,14 +129,14 @@ def _solid(p0, p1, p2, solids, m, gradient, hessian, order):  # type: ignore[no-
 
 @nb.njit(cache=True, nogil=True)
 def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: IntArray) -> None:
-    """Writes for each point of `x` (k,3) the least signed distance (k,), m, and whose it is (k,).
+    """Writes the least signed distance (k,), m, and its obstacle (k,) for points `x` (k,3).
 
-    `owner` is -1 where there is no obstacle.
+    `owner` is -1 if there is no obstacle.
     """
     a, b, radius, point, normal, solids = shapes
     m, k = radius.shape[0], point.shape[0]
-    # Neighbours have the same capsule next to them: it is tried first, and the others only where a
-    # ball around them comes as near.
+    # Neighbours mostly have the same nearest capsule, so it is tried first; others are tried only
+    # if a ball around them comes as near.
     ball = np.empty((m if x.shape[0] > m else 0, 4))
     for j in range(ball.shape[0]):
         half2 = 0.0
@@ -183,7 +184,7 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
 def nearest_other(
     x: FloatArray, shapes: Any, owner: IntArray, distance: FloatArray, other: IntArray
 ) -> None:
-    """Writes for each point of `x` (k,3) the nearest body but `owner` (k,), and its distance, m."""
+    """Writes the nearest body other than `owner` (k,) and its distance, m, for points `x` (k,3)."""
     a, b, radius, point, normal, solids = shapes
     m, k = radius.shape[0], point.shape[0]
     gradient = np.empty(3)
@@ -247,8 +248,8 @@ def may_touch(  # type: ignore[no-untyped-def]
 ):
     """Returns which nodes may touch something within a step: nodes (c,), distances, owners.
 
-    A distance changes by no more than its point moves, so whoever is farther away than that and
-    the farthest motion of a surface together is left out.
+    A distance changes by no more than its point moves. So nodes farther away than their own motion
+    plus the largest motion of a surface are left out.
     """
     n = x.shape[0]
     all_distance = np.empty(n)
@@ -274,10 +275,10 @@ def may_touch(  # type: ignore[no-untyped-def]
 def first_touch(  # type: ignore[no-untyped-def]
     x, motion, shapes, margin, owner
 ):
-    """Returns which points (k,) come within `margin` on a straight way; writes whom to `owner`.
+    """Returns which points (k,) come within `margin` on a straight path; writes bodies to `owner`.
 
-    A distance changes by no more than its point moves, so a point may go on by its distance at
-    once: nothing that is thicker than the tolerance is leapt over.
+    A distance changes by no more than its point moves, so a point may advance by its distance at
+    once (sphere tracing): nothing that is thicker than the tolerance is skipped.
     """
     touched = np.zeros(x.shape[0], dtype=np.bool_)
     point = np.empty((1, 3))
@@ -316,9 +317,9 @@ def surface_frame(
 ) -> None:
     """Writes outward unit normals (n,3), slopes (n,) and velocities (n,3) at the points `x` (n,3).
 
-    The gradient of the distance is slope · normal; the slope is 1 but for solids, whose distances
-    are interpolated. The velocity is that of the rigid body at the point itself. Rows without
-    owner are zero.
+    The gradient of the distance is slope · normal; the slope is 1 except for solids, whose
+    distances are interpolated. The velocity is that of the rigid body at the point itself. Rows
+    without owner have zero normal and velocity.
     """
     a, b, radius, point, plane, solids = shapes
     m, k = radius.shape[0], point.shape[0]

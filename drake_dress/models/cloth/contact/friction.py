@@ -1,7 +1,7 @@
-"""Dry friction: what nodes in contact do, judged by the force that sticking would take.
+"""Dry friction: modes of the nodes in contact, from the force that sticking would take.
 
 Eq. contact-type with paper-notes' corrections: a node that would have to be pulled takes off, one
-whose tangential force exceeds the cone slips with μ times its normal force, the rest sticks.
+whose tangential force exceeds the cone slips with μ times its normal force, and the rest stick.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from drake_dress.models.cloth.contact.modes import FREE, SLIP, STICK
 
 # A node within this gap lies on the surface, m.
 LYING = 1e-4
-# Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
+# Tolerated sum of friction beyond the cone, relative to what the cone allows.
 TOLERATED_EXCESS = 0.01
-# Solves of the motion, at most, while modes are corrected by the forces that they led to; fewer
-# where solves are so coarse that their forces say little more the second time.
+# Maximum solves of the motion while modes are corrected by the resulting forces; fewer if solves
+# are so coarse that a second correction gains little.
 _MOST_REVISIONS = 4
 _COARSE, _COARSE_REVISIONS = 1e-3, 2
 
@@ -30,7 +30,7 @@ class Friction:
 
     Attributes:
         mode: (c,) FREE, STICK or SLIP, of the motion.
-        velocity_mode: (c,) likewise, of the velocity at the end: nodes that friction stops within
+        velocity_mode: (c,) the same for the velocity at the end: nodes that friction stops within
             the step stick.
         pressure: (c,) normal part of the sticking force, N.
         tangential: (c,) size of its tangential part, N.
@@ -52,7 +52,7 @@ NO_CONTACT = Friction(_NO_MODE, _NO_MODE, _NONE, _NONE, _NONE_3, _NONE_3)
 
 
 def most_revisions(tolerance: float) -> int:
-    """Returns how often at most the motion is solved, by the relative tolerance of solves."""
+    """Returns the maximum number of solves of the motion, given their relative tolerance."""
     return _COARSE_REVISIONS if tolerance > _COARSE else _MOST_REVISIONS
 
 
@@ -64,18 +64,18 @@ def find_modes(
     time_step: float,
     known: tuple[IntArray, IntArray] | None = None,
 ) -> Friction:
-    """Returns the contact types by the sticking force `reaction` (c,3), N.
+    """Returns the contact types from the sticking force `reaction` (c,3), N.
 
-    The sticking force t ends a motion; t − s / h, s the momentum of sliding, ends a velocity.
-    Friction that exceeds this has stopped the node before the step is over.
+    The sticking force t stops the motion; t − s / h, s the momentum of sliding, stops the velocity.
+    Friction that exceeds the latter has stopped the node before the end of the step.
 
     Args:
-        reaction: (c,3) N.
+        reaction: (c,3) sticking force, N.
         normal: (c,3) outward unit.
         friction: μ.
         momentum: (c,3) of the nodes relative to the surface, kg m/s.
         time_step: h, s.
-        known: (c,) modes of motion and of velocity to take instead of judging them.
+        known: (c,) modes of motion and of velocity to use instead of finding them.
     """
     c = len(reaction)
     mode, velocity_mode = known or (np.empty(c, dtype=np.int32), np.empty(c, dtype=np.int32))
@@ -106,18 +106,18 @@ def revise_modes(
     friction: Friction,
     slide: bool,
 ) -> bool:
-    """Corrects the modes, in place, by the forces that they led to; returns if any changed.
+    """Corrects the modes, in place, by the forces that result; returns whether any changed.
 
-    Nodes that a force would have to draw to a surface are let go: over a gap they would gain energy
-    from nowhere, at h = 0.2 s twenty times what a falling sheet had. (One that lies on the surface
-    and is held back for a step gains nothing, and letting it go would only move the pull to its
-    neighbours.) Sticking nodes that friction cannot hold slip, where it matters in sum: the forces
-    of sticking press nodes that the motion does not press.
+    Nodes that would be pulled to a surface are released: across a gap they would gain energy, at
+    h = 0.2 s twenty times what a falling sheet had. (A node that lies on the surface and is held
+    back for a step gains none, and its release would only move the pull to its neighbours.)
+    Sticking nodes beyond the friction cone slip if their total excess matters, because the
+    forces of sticking press nodes that the motion does not press.
 
     Args:
-        binding: (c,3) what binds the nodes, of any unit of force.
+        binding: (c,3) forces that bind the nodes, in any unit.
         normal: (c,3) outward unit.
-        gap: (c,) at the start of the step, m.
+        gap: (c,) gap at the start of the step, m.
         mu: friction coefficient.
         friction: modes, with the directions of all nodes.
         slide: whether sticking nodes may be made to slip.

@@ -1,10 +1,10 @@
-"""What a gripper holds against the person: it gives way, and presses.
+"""Compliance of a gripper whose cloth is pressed against the person.
 
-Nodes in a gripper go where the gripper goes, and a person may come to where that is. Neither
-passes through the other: the robot's arm is compliant. What is held is displaced as a whole by as
-little as brings it out of the bodies, and the displacement u presses with k u on gripper and
-person, k the stiffness of arm and grasp. Both weigh little beside what a person pushes with, so
-that u follows at once.
+Nodes in a gripper move with it, and may move into the person. Neither passes through the other,
+because the robot's arm is compliant. The held cloth is displaced as a whole by the least amount
+that brings it out of the bodies. The displacement u causes a force k u on gripper and person, k the
+stiffness of arm and grasp. Their inertia is small compared with the person's push, so that u
+follows at once.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 
-# A patch between two bodies is brought out of one after the other, at most this often.
+# Maximum corrections: a patch between two bodies is brought out of one after the other.
 _MOST = 16
-# Depth that is let be, m.
+# Tolerated depth, m.
 _DEPTH = 1e-6
 
 
 @dataclass(frozen=True)
 class Pressing:
-    """How the person presses on what two grippers hold.
+    """Pressing of the person on the cloth that two grippers hold.
 
     Attributes:
-        displacement: (2,3) of it, left and right, m.
-        force: (k,3) on each held node, N.
-        owner: (k,) of the body that presses on it; −1 without.
+        displacement: (2,3) displacement of the held cloth, left and right, m.
+        force: (k,3) force on each held node, N.
+        owner: (k,) body that presses on it; −1 without one.
     """
 
     displacement: FloatArray
@@ -39,13 +39,13 @@ class Pressing:
 
 
 def press(x: FloatArray, side: IntArray, bodies: Obstacles, stiffness: float) -> Pressing:
-    """Returns how what is held gives way.
+    """Returns the displacement of held cloth that the person presses on, and the forces.
 
     Args:
-        x: (k,3) where held nodes are taken, m.
+        x: (k,3) positions to which the grippers take held nodes, m.
         side: (k,) 0 or 1, the gripper that takes them.
-        bodies: of the person, then.
-        stiffness: of a gripper's arm and grasp, N/m.
+        bodies: bodies of the person at that time.
+        stiffness: stiffness of a gripper's arm and grasp, N/m.
     """
     pressing = Pressing(np.zeros((2, 3)), np.zeros_like(x), np.full(len(x), -1, dtype=np.int32))
     if not len(x) or not bodies.count:

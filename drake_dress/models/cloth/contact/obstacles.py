@@ -1,4 +1,4 @@
-"""What the garment touches: moving capsules, spheres, half-spaces and closed meshes.
+"""Obstacles that the garment can touch: moving capsules, spheres, half-spaces and closed meshes.
 
 Each has one owner number in the order capsules, half-spaces, solids, and moves as a rigid body with
 a velocity at its origin (end a of a capsule, the point of a half-space, the frame's origin of a
@@ -36,7 +36,7 @@ class HalfSpaces:
 
     @staticmethod
     def none() -> HalfSpaces:
-        """Returns no half-space."""
+        """Returns an empty set of half-spaces."""
         return HalfSpaces(*(np.zeros((0, 3)) for _ in range(4)))
 
     @staticmethod
@@ -57,7 +57,7 @@ class Solid:
         distance: signed distance in the body's frame B.
         rotation: (3,3) R_WB.
         position: (3,) p_WB, m.
-        velocity: (3,) of B's origin, m/s.
+        velocity: (3,) velocity of B's origin, m/s.
         angular_velocity: (3,), rad/s.
     """
 
@@ -120,7 +120,7 @@ class Obstacles:
         return replace(Obstacles.none(), half_spaces=plane)
 
     def copy(self) -> Obstacles:
-        """Returns a copy with its own arrays; the large signed distances are shared."""
+        """Returns a copy with its own arrays; the large signed distance fields are shared."""
         p = self.half_spaces
         planes = (p.point, p.normal, p.velocity, p.angular_velocity)
         solids = (
@@ -184,7 +184,7 @@ class Obstacles:
 
     @cached_property
     def packed(self) -> tuple[Any, ...]:
-        """The shapes as kernels take them: capsules, half-spaces, and solids with their grids."""
+        """The shapes for kernels: capsules, half-spaces, and solids with their grids."""
         p, solids = self.half_spaces, self.solids
         count = len(solids)
         pose = np.zeros((count, 12))

@@ -1,6 +1,7 @@
-"""What a closed mesh is to contact: samples of its signed distance; made in `solid.py`.
+"""Samples of the signed distance of a closed mesh, for contact; made in `solid.py`.
 
-It stands by itself since a process that steps a garment needs it, and none of what makes it.
+The class has its own module because a process that steps a garment needs it, but not the imports of
+`solid.py`.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ class SignedDistanceField:
 
     Attributes:
         origin: (3,) position of the grid's first node, m.
-        spacing: of the grid, m.
-        coefficients: (i,j,k) of the cubic B-spline.
+        spacing: spacing of the grid, m.
+        coefficients: (i,j,k) coefficients of the cubic B-spline.
     """
 
     origin: FloatArray

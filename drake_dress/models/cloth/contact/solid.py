@@ -1,4 +1,4 @@
-"""A closed mesh as a smooth field of signed distances.
+"""A closed mesh as a smooth signed distance field.
 
 The distance is sampled once on a grid and interpolated by a cubic B-spline, which is twice
 differentiable: normals do not jump from face to face, and their derivative, which the adjoint of a
@@ -16,10 +16,10 @@ from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
 
-# Beyond the mesh the grid reaches this far, m, at least: garments are looked at before they touch.
+# Least distance that the grid extends beyond the mesh, m: distances are needed before contact.
 _PADDING = 0.10
 _MOST_CELLS = 20_000_000
-# Points whose distance is asked for at once; the search takes some hundred bytes a point.
+# Number of points per distance query, which takes some hundred bytes a point.
 _BATCH = 50_000
 
 
@@ -31,7 +31,7 @@ def make_signed_distance_field(
     Args:
         vertices: (n,3) in the body's frame, m.
         faces: (F,3), consistently oriented, outward.
-        spacing: of the grid, m; details smaller than that are rounded.
+        spacing: spacing of the grid, m; smaller details are rounded.
 
     Raises:
         UserError: the mesh is not closed or not finite, or the grid would be too large.
@@ -56,7 +56,7 @@ def make_signed_distance_field(
     distance = np.empty(len(points))
     for begin in range(0, len(points), _BATCH):
         part = slice(begin, begin + _BATCH)
-        # trimesh counts the inside positive
+        # trimesh distances are positive inside
         distance[part] = -trimesh.proximity.signed_distance(mesh, points[part])
     coefficients = ndimage.spline_filter(distance.reshape(tuple(shape)), order=3, mode="mirror")
     return SignedDistanceField(low, float(spacing), np.ascontiguousarray(coefficients))

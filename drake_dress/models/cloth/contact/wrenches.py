@@ -1,4 +1,4 @@
-"""What a garment does to the bodies that it touches."""
+"""Wrenches of a garment on the bodies that it touches."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from drake_dress.models.arrays import FloatArray, IntArray
 def body_wrenches(
     body_of: IntArray, origin: FloatArray, x: FloatArray, owner: IntArray, reaction: FloatArray
 ) -> FloatArray:
-    """Returns (b,6) of each body the moment about its origin, N m, and the force, N, world.
+    """Returns (b,6) the moment about each body's origin, N m, and the force, N, world.
 
     Args:
         body_of: (k,) the body of each obstacle.
-        origin: (b,3) of the bodies, m, world.
+        origin: (b,3) origins of the bodies, m, world.
         x: (n,3) nodes, m, world.
-        owner: (n,) obstacle that a node touches, -1 without.
-        reaction: (n,3) of that obstacle on the node, N.
+        owner: (n,) obstacle that a node touches, -1 without one.
+        reaction: (n,3) force of that obstacle on the node, N.
     """
     wrench = np.zeros((origin.shape[0], 6))
     for i in range(owner.shape[0]):

@@ -1,15 +1,16 @@
-"""The adjoint of a step of `ExplicitBiasCloth`, with contact types held.
+"""The adjoint of a step of `ExplicitBiasCloth`, for fixed contact types.
 
-The step runs: sticking → modes and friction → motion → velocity. The adjoint runs back through the
-same solves; every inner iteration is symmetric, so they are solves of the same system. Beyond the
-paper it carries how friction follows the sticking force, the projection on the surface, how normals
-and gaps follow nodes and bodies, and how the system follows positions where it does.
+The step computes sticking → modes and friction → motion → velocity. The adjoint runs back through
+the same solves; every inner iteration is symmetric, so they are solves of the same system. Beyond
+the paper it includes how friction follows the sticking force, the projection on the surface, how
+normals and gaps follow nodes and bodies, and how the system follows positions if it does.
 
-With `frozen_contact` surfaces stay where each node met them, and slipping nodes keep the direction
-of their friction. That is not the derivative of the step, and it is the one to descend by: through
-several steps in contact the exact one grows tenfold with each, for a node that is a millimetre
-nearer to a limb has its stiff neighbours moved by a millimetre, and what they carry by their lever.
-Motions of a centimetre know nothing of it (docs/control.md has the figures).
+With `frozen_contact`, surfaces stay where each node met them, and slipping nodes keep the direction
+of their friction. That is not the derivative of the step, but it is the one to use for descent.
+Through several steps in contact the exact derivative grows tenfold with each: a node that is a
+millimetre nearer to a limb moves its stiff neighbours by a millimetre, and lever arms amplify this
+for the cloth that they carry. Motions of a centimetre show no such growth (docs/control.md has the
+figures).
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ from drake_dress.models.cloth.layered import pushed_nodes
 if TYPE_CHECKING:
     from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, Tape
 
-# Farthest that a node moves where K is differenced along v, m.
+# Largest displacement of a node in the finite difference of K along v, m.
 _STEP = 1e-8
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative of a scalar by the inputs of a step.
+    """Derivative of a scalar with respect to the inputs of a step.
 
     Attributes:
         x: (n,3) by the positions.
@@ -72,14 +73,14 @@ def run_adjoint(
     by_material: bool,
     frozen_contact: bool = False,
 ) -> Gradient:
-    """Returns the derivative by the inputs; see `ExplicitBiasCloth.vector_jacobian_product`."""
+    """Returns the derivative by all inputs; see `ExplicitBiasCloth.vector_jacobian_product`."""
     h, held = cloth.time_step, cloth.held
     t, nodes, system = tape, tape.contacts.nodes, tape.system
     follows = len(nodes) > 0 and not frozen_contact
     motion_in, v_bar = _through_layers(cloth, t, x_bar, v_bar)
 
-    # reaction of the held nodes: (2/h²) (A Δx − g) seeds what is prescribed there, or k (Δp − 2 Δx)
-    # of springs
+    # The reaction of held nodes is (2/h²) (A Δx − g), which seeds their prescribed values, or
+    # k (Δp − 2 Δx) with springs.
     nothing = seed = np.zeros((0, 3))
     if cloth.spring is None:
         nothing, seed = np.zeros((len(held), 3)), (-2.0 / h**2) * held_reaction_bar
@@ -126,7 +127,7 @@ def run_adjoint(
 
 @dataclass(frozen=True)
 class _Backward:
-    """The unknowns of the adjoint solves: of Δx, of Δv, and of Δx with all nodes sticking."""
+    """The unknowns of the adjoint solves: for Δx, for Δv, and for Δx with all nodes sticking."""
 
     motion: Unknown
     change: Unknown
@@ -135,9 +136,9 @@ class _Backward:
 
 @dataclass(frozen=True)
 class _Bound:
-    """Derivatives (c,3) by what is prescribed to nodes in contact, by Δv there, and by normals.
+    """Derivatives (c,3) by the prescribed Δx of nodes in contact, by their Δv, and by normals.
 
-    `friction` is that by the coefficient.
+    `friction` is the derivative by the coefficient.
     """
 
     prescribed: FloatArray
@@ -152,7 +153,7 @@ _NOTHING_BOUND = _Bound(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
 def _through_layers(
     cloth: ExplicitBiasCloth, tape: Tape, x_bar: FloatArray, v_bar: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns the derivatives (n,3) by Δx and v as they were before layers were kept apart."""
+    """Returns the derivatives (n,3) by Δx and v before layer separation."""
     if tape.separation is None or cloth.layers is None:
         return x_bar, v_bar
     pushed = pushed_nodes(tape.separation.rate_change)[:, None]
@@ -165,12 +166,12 @@ def _through_layers(
 def _through_binding(
     cloth: ExplicitBiasCloth, tape: Tape, back: _Backward, follows: bool
 ) -> _Bound:
-    """Binds the adjoint's unknowns in place, and returns the derivatives by what bound them.
+    """Binds the adjoint's unknowns in place; returns the derivatives by their constraints.
 
     Args:
         cloth: the garment.
-        tape: of a step with nodes in contact.
-        back: the unknowns, free so far.
+        tape: tape of a step with nodes in contact.
+        back: the unknowns, not bound yet.
         follows: whether surfaces and the direction of friction follow nodes.
     """
     t, contacts, friction, system = tape, tape.contacts, tape.friction, tape.system
@@ -189,7 +190,7 @@ def _through_binding(
     if late.any():
         more = system.by_directions(t.change_unknown, back.change, t.target_change, late)
         by_row, by_binding = by_row + more[0], by_binding + more[1]
-    # friction follows the direction of the force of sticking
+    # friction follows the direction of the sticking force
     stick_in, by_friction, friction_in = _through_friction(cloth, t, by_binding, slip)
     everything = np.full(len(mode), STICK, dtype=np.int32)
     push, _ = system.hold(back.stick, everything, normal, (2.0 / cloth.time_step**2) * stick_in)
@@ -206,11 +207,11 @@ def _through_grippers(
     g_in: FloatArray,
     rate_in: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns the derivatives by v (n,3), forces aside, and by the motion of held nodes (k,3).
+    """Returns the derivatives by v (n,3), except through forces, and by held motion (k,3).
 
     Args:
         cloth: the garment.
-        system: of the step.
+        system: system of the step.
         v_bar: (n,3) derivative by the velocity after the solves.
         motion_in: (n,3) by Δx after them.
         held_reaction_bar: (k,3) by the grippers' forces.
@@ -239,7 +240,7 @@ def _through_friction(
 
     Args:
         cloth: the garment.
-        tape: of the step.
+        tape: tape of the step.
         binding_in: (c,3) derivative by n + μ d of the nodes in contact.
         slip: (c,) which of them slip.
     """
@@ -265,7 +266,7 @@ def _stiffness_terms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Returns K force_in, K rate_in and ∂(rate_inᵀ K(x) v)/∂x, all (n,3).
 
-    K is the derivative of a gradient, so the last is the derivative of K rate_in along v.
+    K is a Hessian, so the last is the derivative of K rate_in along v.
     """
     m = cloth.material
     stiffness = (cloth.elements, m.stretch_stiffness, m.bending_stiffness)
@@ -285,13 +286,13 @@ def _material_derivative(
     rate_in: FloatArray,
     force_in: FloatArray,
 ) -> dict[str, float]:
-    """Returns the derivative by stiffnesses and density through forces and right-hand sides.
+    """Returns the derivatives by stiffnesses and density through forces and right-hand sides.
 
-    Forces are linear in each of them.
+    Forces are linear in each parameter.
 
     Args:
         cloth: the garment.
-        tape: of the step.
+        tape: tape of the step.
         g_in: (n,3) derivative by the right-hand side of Δx.
         rate_in: (n,3) by that of Δv.
         force_in: (n,3) derivative by the force f.
@@ -316,11 +317,11 @@ def _contact_derivative(
     normal_in: FloatArray,
     bodies: FloatArray,
 ) -> FloatArray:
-    """Returns the derivative (c,3) of what is prescribed and of normals by the nodes in contact.
+    """Returns the derivative (c,3) by contact nodes through prescribed values and normals.
 
-    The motion is h u − gap n, the velocity u = v + ω × (x − origin) that of the surface. Adds to
-    `bodies` (4,m,3) the derivative by origins, rotations and velocities of the obstacles: a gap
-    only knows where a node is in its body's frame.
+    The prescribed motion is h u − gap n, u = v + ω × (x − origin) the velocity of the surface. Adds
+    the derivatives by origins, rotations and velocities of the obstacles to `bodies` (4,m,3); a gap
+    depends only on the node's position in its body's frame.
     """
     h, near = cloth.time_step, tape.contacts
     x, owner, normal = tape.x[near.nodes], near.owner, near.normal
@@ -347,7 +348,10 @@ def _contact_derivative(
 def _carry(  # type: ignore[no-untyped-def]
     x, owner, normal, slope, origin, omega, prescribed_in, surface_in, normal_in, geometric, bodies
 ):
-    """Adds to `geometric` (c,3), the part of the normals, all else, and to `bodies` (4,m,3)."""
+    """Adds the remaining terms to `geometric` (c,3), and all terms to `bodies` (4,m,3).
+
+    `geometric` already holds the terms of the normals.
+    """
     for i in range(x.shape[0]):
         m = owner[i]
         n0, n1, n2 = normal[i, 0], normal[i, 1], normal[i, 2]

@@ -1,9 +1,9 @@
-"""Gradients that refuse to be differentiated once more.
+"""Gradients that raise an error when they are differentiated again.
 
-`torch.autograd.function.once_differentiable` refuses only where the incoming gradient itself needs
-a gradient. After `x1.sum()` it does not, and a second derivative is then left out without a word.
-Here the returned gradient always depends on the inputs of the step, through a function whose
-backward pass raises.
+`torch.autograd.function.once_differentiable` raises only if the incoming gradient itself needs a
+gradient. After `x1.sum()` it does not, and a second derivative is then silently left out. Here the
+returned gradient always depends on the inputs of the step, through a function whose backward pass
+raises.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ def differentiable_once(
 ) -> tuple[torch.Tensor | None, ...]:
     """Returns `gradients`; a derivative of them raises RuntimeError.
 
-    Call it at the end of a backward pass that is no function of torch.
+    Call it at the end of a backward pass that is not made of torch functions.
 
     Args:
-        gradients: of the inputs of the forward pass, None where there is none.
+        gradients: those of the forward pass's inputs, None for inputs without one.
         inputs: whatever the gradients depend on: saved inputs, incoming gradients.
-        name: of the function, for the error.
+        name: name of the function, for the error.
     """
     if not torch.is_grad_enabled():
         return tuple(gradients)

@@ -1,30 +1,31 @@
-"""The controller's garment: the paper's explicit iteration with bias, with contact and derivatives.
+"""The controller's garment: the paper's explicit iteration with bias, contact and derivatives.
 
 Without contact (Eqs. delta-definiation and iterative-solver):
 
     A Δx = h M v + ½h² f,    A Δv = h f + ½h² df/dt,
 
-A = P = M + h² Σ w AᵀA for one iteration, and what the inner iterations of inner/ make of it for
-more: one iteration resists rotation as if it were stretch, so that at h = 0.1 s a coat that is
-turned by its grippers hardly turns in the prediction.
+with A = P = M + h² Σ w AᵀA for one iteration; for more, inner/ defines A. One iteration resists
+rotation as if it were stretch: at h = 0.1 s a coat that the grippers turn hardly turns in the
+prediction.
 
 Contact and grasp prescribe motions instead of adding forces (paper-notes: the printed contact
-force is an elastic bounce, springs at the grippers report forces that are not there):
+force is an elastic bounce, and springs at the grippers report forces that do not exist):
 
-1. of the nodes that would enter a surface those count that still do once what lies on it is held;
-2. all nodes in contact stick, Δx = h u_surface − gap n, which takes the force r;
-3. nodes with r·n < 0 take off; those with ‖r_T‖ > μ r_N slip: they keep their normal motion and
-   feel friction along r_T, μ times the normal force that they then have; the rest sticks. The
-   reduced system (three rows for stick, one for slip) is solved for Δx: it stays bounded for tight
-   sleeves and large steps. Nodes that it would have to draw to a surface are let go and sticking
-   ones that friction cannot hold slip, and it is solved again;
-4. sticking nodes take the velocity of the surface, slipping ones do so along its normal and feel
-   the same friction, unless it stops them within the step; all others follow
+1. Of the nodes that would enter a surface, only those that still do once resting nodes are held
+   count as contacts.
+2. All contact nodes stick, Δx = h u_surface − gap n, which takes the force r.
+3. Nodes with r·n < 0 take off. Nodes with ‖r_T‖ > μ r_N slip: they keep their normal motion and
+   feel friction along r_T, μ times the normal force that they then have. The rest stick. The
+   reduced system (three rows for stick, one for slip) is solved for Δx; it stays bounded for tight
+   sleeves and large steps. Nodes that would be pulled to a surface are then released, sticking
+   nodes beyond the friction cone slip, and the system is solved again.
+4. Sticking nodes take the velocity of the surface. Slipping nodes take its normal component and
+   feel the same friction, unless it stops them within the step. All others follow
    A Δv = h f + ½h² df/dt. (With the velocity Δx/h instead, a node that starts to slide gains only
    half of its speed.)
 
-`step` returns a tape with which `vector_jacobian_product` (adjoint.py) runs the exact adjoint of
-the step with contact types held: friction follows the sticking force, normals follow the nodes.
+`step` returns a tape, with which `vector_jacobian_product` (adjoint.py) computes the exact adjoint
+of the step for fixed contact types: friction follows the sticking force, normals follow the nodes.
 """
 
 from __future__ import annotations
@@ -80,11 +81,11 @@ INNER = ("one_step", "stationary", "conjugate_gradients", "direct")
 
 @dataclass(frozen=True)
 class ContactTypes:
-    """Contact that is held instead of found: which nodes touch what, and how.
+    """Contact that is given instead of detected: which nodes touch which obstacle, and how.
 
     Attributes:
         nodes: (c,) ascending; owner: (c,) obstacles.
-        mode: (c,) STICK, SLIP or, for nodes that take off, FREE; velocity_mode: (c,) likewise of
+        mode: (c,) STICK, SLIP or, for nodes that take off, FREE; velocity_mode: (c,) the same for
             the velocity at the end of the step.
     """
 
@@ -96,18 +97,18 @@ class ContactTypes:
 
 @dataclass(frozen=True)
 class Tape:
-    """What a step leaves for its adjoint: n nodes, k held ones, c in contact.
+    """Data of a step for its adjoint: n nodes, k of them held, c in contact.
 
     Attributes:
-        x, v, obstacles: of the inputs of the step.
-        system: the linear system; motion_unknown, change_unknown: of Δx and Δv; stick_unknown: of
+        x, v, obstacles: inputs of the step.
+        system: the linear system; motion_unknown, change_unknown: for Δx and Δv; stick_unknown: for
             Δx with all contact nodes sticking, None without contact.
-        contacts: nodes that touch something; prescribed: (c,3) Δx of sticking, m;
-            target_change: (c,3) its Δv, m/s.
-        friction: their modes and what follows from the sticking force.
+        contacts: nodes in contact; prescribed: (c,3) their Δx if they stick, m;
+            target_change: (c,3) their Δv if they stick, m/s.
+        friction: their modes and quantities derived from the sticking force.
         stick_reaction: (c,3) the force that sticking would take, N.
         motion, change: (n,3) Δx, Δv.
-        separation: how layers were kept apart, which changed Δx and Δv once more; None where off.
+        separation: record of the layer separation that then changed Δx and Δv; None if off.
     """
 
     x: FloatArray
@@ -129,7 +130,7 @@ class Tape:
 
     @property
     def types(self) -> ContactTypes:
-        """The contact of this step, to hold in another."""
+        """The contact types of this step, for use in another."""
         f = self.friction
         return ContactTypes(self.contacts.nodes, self.contacts.owner, f.mode, f.velocity_mode)
 
@@ -144,7 +145,7 @@ class Tape:
 
 @dataclass(frozen=True)
 class _Bound:
-    """How c nodes in contact were bound; see `Tape`. `binding` (c,3) is what binds Δx."""
+    """Constraints on c nodes in contact; see `Tape`. `binding` (c,3) is the λ that binds Δx."""
 
     prescribed: FloatArray
     target_change: FloatArray
@@ -169,18 +170,18 @@ _NOTHING_BOUND = _Bound(_NO_VECTORS, _NO_VECTORS, NO_CONTACT, _NO_VECTORS, _NO_V
 
 @dataclass(frozen=True)
 class ExplicitSettings:
-    """How the scheme with bias solves, and what it takes part in.
+    """Settings of the scheme with bias.
 
     Attributes:
         tolerance: relative tolerance of solves by conjugate gradients.
         iterations: inner iterations; 1 is the paper's one-step scheme.
         inner: inner iteration, one of `INNER`. By default `one_step` for 1 iteration and
             `conjugate_gradients` for more.
-        self_collision: distance that layers of the garment keep, m; 0 lets them pass through each
-            other. Layers are separated after the step (layers/). The adjoint keeps their pairs,
-            weights and directions fixed.
+        self_collision: distance kept between layers of the garment, m; 0 lets them pass through
+            each other. Layers are separated after the step (layers/). The adjoint keeps their
+            pairs, weights and directions fixed.
         attachment_stiffness: stiffness of a spring from each held node to its gripper, N/m, as in
-            the paper. By default (None) held nodes move with the gripper. Springs yield by their
+            the paper. By default (None) held nodes move with the gripper. Springs stretch by their
             force, and by v h more in motion.
     """
 
@@ -196,14 +197,15 @@ class ExplicitBiasCloth(SteppedCloth):
 
     Args:
         elements: rest shape, from `make_elements`.
-        material: fabric. `damping` is not used; the scheme has damping of its own.
+        material: fabric. `damping` is not used; the scheme has its own damping.
         time_step: h, s. The motion stays bounded at large steps.
         held: (k,) nodes that move with the grippers.
         gravity: (3,) m/s².
-        settings: how it solves.
+        settings: solver settings.
 
     Raises:
-        ValueError: `inner` is not one of `INNER`, or `one_step` is given more than one iteration.
+        ValueError: `inner` is not one of `INNER`, `one_step` is given more than one iteration, or
+            `attachment_stiffness` is not a number above 0.
     """
 
     def __init__(
@@ -257,9 +259,9 @@ class ExplicitBiasCloth(SteppedCloth):
             x: (n,3) positions, m.
             v: (n,3) velocities, m/s.
             held_motion: (k,3) displacement of the held nodes over this step, m; with springs, from
-                where the nodes are to where the grippers' ends will be.
+                the nodes' positions to those of the grippers' ends after the step.
             obstacles: the person at the start of the step, with velocities.
-            types: contact to hold instead of finding it (for derivative checks).
+            types: contact to use instead of detecting it (for derivative checks).
 
         Raises:
             ValueError: an input has the wrong shape, or something in it is not finite.
@@ -268,7 +270,7 @@ class ExplicitBiasCloth(SteppedCloth):
             raise ValueError(
                 f"held_motion has shape {held_motion.shape}, expected ({len(self.held)}, 3)"
             )
-        # The tape keeps them: a caller may write to his arrays before the adjoint runs.
+        # Copies for the tape: the caller may change the arrays before the adjoint runs.
         x, v, held_motion = x.copy(), v.copy(), held_motion.copy()
         free = self._without_contact(x, v, held_motion)
         h, margin = self.time_step, self.material.margin
@@ -309,7 +311,7 @@ class ExplicitBiasCloth(SteppedCloth):
         return x + moved, velocity, reaction, tape
 
     def _without_contact(self, x: FloatArray, v: FloatArray, held_motion: FloatArray) -> _Free:
-        """Returns a step that meets nothing; for its arguments see `step`."""
+        """Returns the step without contact; for the arguments see `step`."""
         h, m = self.time_step, self.material
         force, rate = force_and_product(
             self.elements, m.stretch_stiffness, m.bending_stiffness, x, v
@@ -336,14 +338,14 @@ class ExplicitBiasCloth(SteppedCloth):
         v: FloatArray,
         types: ContactTypes | None,
     ) -> tuple[Contacts, _Bound, FloatArray, FloatArray]:
-        """Returns what touches, how it is bound, and Δx and Δv, (n,3) m and m/s.
+        """Returns the contacts, their constraints, and Δx and Δv, (n,3) m and m/s.
 
         Args:
             free: the step without contact.
-            stick_unknown: Δx with all nodes sticking that are near a surface; None if none is.
-            near: those nodes.
+            stick_unknown: Δx with all nodes near a surface sticking; None if there are none.
+            near: the nodes near a surface.
             v: (n,3) velocities at the start, m/s.
-            types: contact to hold instead of finding it.
+            types: contact to use instead of detecting it.
         """
         kept, guess = np.ones(len(near.nodes), dtype=np.bool_), None
         if types is None and stick_unknown is not None:
@@ -366,7 +368,7 @@ class ExplicitBiasCloth(SteppedCloth):
     def _layers_apart(
         self, x: FloatArray, motion: FloatArray, contacts: Contacts, contact_mode: IntArray
     ) -> tuple[FloatArray, SeparationRecord]:
-        """Returns Δx with layers kept apart, and how; see `LayerSeparation.correct`."""
+        """Returns Δx with layers separated, and the record; see `LayerSeparation.correct`."""
         assert self.layers is not None
         mode = np.zeros(len(x), dtype=np.int32)
         mode[contacts.nodes] = contact_mode
@@ -381,7 +383,7 @@ class ExplicitBiasCloth(SteppedCloth):
         if self.spring is None:
             reaction[self.held] = (2.0 / h**2) * (free.system.held_rows(motion) - free.g[self.held])
         else:
-            # Within P the spring yields by Δx twice: without that, k v h would be felt in motion.
+            # P counts the spring's Δx twice; k (Δp − Δx) would report k v h in steady motion.
             reaction[self.held] = self.spring * (held_motion - 2.0 * motion[self.held])
         return reaction
 
@@ -397,17 +399,17 @@ class ExplicitBiasCloth(SteppedCloth):
         """Returns the derivative of L with respect to the inputs of the taped step.
 
         Args:
-            tape: of the step.
-            x_bar: (n,3) ∂L/∂ of the step's positions.
-            v_bar: (n,3) ∂L/∂ of the step's velocities.
-            held_reaction_bar: (k,3) ∂L/∂ of the reaction at the held nodes.
-            by_material: also by the material's values, which takes two more solves.
-            frozen_contact: surfaces stay where nodes met them: not exact, and bounded over many
-                steps in contact, where the exact derivative is not (adjoint.py). Nothing is then
-                known of obstacles.
+            tape: tape of the step.
+            x_bar: (n,3) derivative of L by the step's positions.
+            v_bar: (n,3) derivative of L by the step's velocities.
+            held_reaction_bar: (k,3) derivative of L by the reaction at the held nodes.
+            by_material: whether to differentiate by the material's values, too; takes longer.
+            frozen_contact: whether surfaces stay where nodes met them. This is not exact, but stays
+                bounded over many steps in contact, where the exact derivative does not
+                (adjoint.py). Derivatives by obstacles are then zero.
 
         Raises:
-            ValueError: both `by_material` and `frozen_contact` are asked for.
+            ValueError: both `by_material` and `frozen_contact` are set.
         """
         if by_material and frozen_contact:
             raise ValueError("frozen_contact has no derivative by_material")
@@ -416,10 +418,11 @@ class ExplicitBiasCloth(SteppedCloth):
     def _who_touches(
         self, system: StepSystem, unknown: Unknown, near: Contacts
     ) -> tuple[BoolArray, FloatArray | None]:
-        """Returns which of the nodes near a surface (c,) touch it, and a guess at what binds them.
+        """Returns (c,) which nodes near a surface touch it, and a guess of their binding forces.
 
-        Without contact all of a garment falls, and at large steps far more of it would enter than
-        when what lies already is held. So that is held first; nodes that then stay out are let be.
+        Without contact the whole garment falls, and at large steps far more nodes would enter than
+        if resting nodes were held. So resting nodes are held first. Nodes that then stay outside
+        are not contacts.
         """
         lying = near.gap <= CLOSE
         everyone = np.ones(len(lying), dtype=np.bool_)
@@ -444,12 +447,12 @@ class ExplicitBiasCloth(SteppedCloth):
         """Binds the unknowns at the nodes in contact.
 
         Args:
-            system: of the step.
-            unknowns: of Δx with all of them sticking, of Δx, of Δv.
-            contacts: c of them.
+            system: system of the step.
+            unknowns: for Δx with all of them sticking, for Δx, for Δv.
+            contacts: the c nodes.
             v: (n,3) velocities, m/s.
-            guess: (c,3) at what binds sticking nodes.
-            types: contact to hold instead of finding it.
+            guess: (c,3) guess of the binding forces of sticking nodes.
+            types: contact to use instead of detecting it.
         """
         h, m, normal = self.time_step, self.material, contacts.normal
         stick_unknown, motion_unknown, change_unknown = unknowns
@@ -477,7 +480,7 @@ class ExplicitBiasCloth(SteppedCloth):
                 binding, normal, contacts.gap, m.friction, friction, slide=revision == 0
             ):
                 break
-        # A lasting force r moves by ½h² r and hastens by h r.
+        # A constant force r adds ½h² r to the motion and h r to the velocity.
         system.hold(
             change_unknown,
             friction.velocity_mode,
@@ -522,7 +525,7 @@ class ExplicitBiasCloth(SteppedCloth):
 
 @nb.njit(cache=True, nogil=True)
 def _right_hand_sides(mass, gravity, v, force, rate, h, motion, change):  # type: ignore[no-untyped-def]
-    """Writes h M v + ½h² f to `motion` and h f + ½h² df/dt to `change` (n,3), `rate` −df/dt."""
+    """Writes h M v + ½h² f to `motion`, h f + ½h² df/dt to `change` (n,3); `rate` is −df/dt."""
     for i in range(v.shape[0]):
         for c in range(3):
             total = force[i, c] + mass[i] * gravity[c]
@@ -531,11 +534,11 @@ def _right_hand_sides(mass, gravity, v, force, rate, h, motion, change):  # type
 
 
 def _closing(near: Contacts, time_step: float) -> FloatArray:
-    """Returns Δx (c,3) of sticking: new contacts close their gap, deep ones leave by it."""
+    """Returns Δx (c,3) of sticking nodes: it closes gaps and takes deep nodes out."""
     closing: FloatArray = time_step * near.surface_velocity - near.gap[:, None] * near.normal
     return closing
 
 
 def _ahead(near: Contacts, motion: FloatArray, time_step: float) -> FloatArray:
-    """Returns the gap (c,) that is left after `motion` (c,3), m."""
+    """Returns the gap (c,) that remains after `motion` (c,3), m."""
     return near.ahead(motion - time_step * near.surface_velocity)

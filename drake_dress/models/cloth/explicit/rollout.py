@@ -1,7 +1,7 @@
-"""Many steps in a row, and their derivative with memory that grows with the root of their number.
+"""Rollouts of many steps, and their derivative with memory that grows as the root of their number.
 
-A tape holds some thirty arrays of the garment. So only the states at the start of segments are
-kept; the adjoint runs the segments again, last one first, and holds the tapes of one at a time. A
+A tape holds some thirty arrays of the garment, so only the states at the start of segments are
+stored. The adjoint repeats the segments, last one first, and holds the tapes of one at a time. A
 step is a pure function, so the second run repeats the first bit for bit.
 """
 
@@ -18,13 +18,13 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, Tape
 
 Observer = Callable[[int, FloatArray, FloatArray, FloatArray], None]
-# The derivative of a loss by positions (n,3), velocities (n,3), held reactions (k,3) of a step.
+# Derivatives of a loss by positions (n,3), velocities (n,3) and held reactions (k,3) of a step.
 Seeds = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """The stored part of a simulation of N steps, from which `roll_back` repeats the rest.
+    """The stored part of a simulation of N steps, from which `roll_back` recomputes the rest.
 
     Attributes:
         held_motion: (N,k,3) displacement of the held nodes in each step, m.
@@ -46,13 +46,13 @@ class Rollout:
 
 @dataclass
 class RolloutGradient:
-    """Derivative of a scalar by the inputs of a rollout of N steps.
+    """Derivative of a scalar with respect to the inputs of a rollout of N steps.
 
     Attributes:
         x: (n,3) by the positions at the start.
         v: (n,3) by the velocities at the start.
         held_motion: (N,k,3) by the displacements of the held nodes.
-        bodies: (N,m,4,3) by position, rotation, velocity and angular velocity of each obstacle at
+        bodies: (N,m,4,3) by position, rotation, velocity and angular velocity of each obstacle in
             each step; see `Gradient`.
         material: by the fields of `Material`, if requested.
     """
@@ -86,7 +86,7 @@ def roll_out(
         segment: number of steps whose tapes the adjoint may hold at once; √N by default.
 
     Raises:
-        ValueError: the numbers of steps differ, or a step fails; the message names it.
+        ValueError: the numbers of steps differ, or a step fails; the message names the step.
     """
     count = len(held_motion)
     if len(obstacles) != count:
@@ -94,7 +94,7 @@ def roll_out(
             f"{count} motions and {len(obstacles)} sets of obstacles, expected as many"
         )
     length = segment or max(1, math.isqrt(count))
-    # The adjoint runs the steps again: a caller may write to his arrays before it does.
+    # Copies: the adjoint repeats the steps, and the caller may change the arrays before that.
     x, v, held_motion = x.copy(), v.copy(), np.array(held_motion)
     starts, states = [], []
     for j in range(count):
@@ -115,13 +115,13 @@ def roll_back(
     seeds: Callable[[int, FloatArray, FloatArray, FloatArray], Seeds | None],
     by_material: bool = False,
 ) -> RolloutGradient:
-    """Returns the derivative of a loss by the inputs of a rollout.
+    """Returns the derivative of a loss with respect to the inputs of a rollout.
 
     Args:
         rollout: result of `roll_out`.
         seeds: function that takes the index of a step and its results (positions, velocities,
-            reactions of the held nodes) and returns the derivatives of the loss by them, None for
-            those on which it does not depend. It is called once a step, last step first.
+            reactions of the held nodes). It returns the derivatives of the loss by these results,
+            or None if the loss does not depend on them. Called once per step, last step first.
         by_material: whether to differentiate by the material's values, too.
     """
     cloth, motion, obstacles = rollout.cloth, rollout.held_motion, rollout.obstacles

@@ -2,12 +2,12 @@
 
     x, v, reaction = cloth_step(cloth, x, v, held_motion, obstacles)
 
-are tensors that know how to go backward. `bodies` and `material` let gradients flow to where the
-obstacles are and to what the garment is made of, whose values may differ from those of `cloth`: so
-fabrics are fitted. Torch is imported with this module only.
+The results are tensors with a backward pass. `bodies` and `material` let gradients flow to the
+obstacles' poses and to the material's values, which may differ from those of `cloth`, so that
+fabrics can be fitted. Torch is imported with this module only.
 
-The step keeps copies of its inputs, and torch keeps their version numbers: an input that is written
-to before the backward pass raises RuntimeError there. So does a second derivative.
+The step keeps copies of its inputs, and torch keeps their version numbers. If an input is modified
+before the backward pass, that pass raises RuntimeError. So does a second derivative.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class ClothStep(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *bars: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         """Runs the adjoint."""
-        inputs = ctx.saved_tensors  # raises if one was written to since
+        inputs = ctx.saved_tensors  # raises if one was modified since
         g = ctx.cloth.vector_jacobian_product(ctx.tape, *map(_array, bars), ctx.by_material)
         bodies = np.stack([g.origin, g.rotation, g.velocity, g.angular_velocity], axis=1)
         material = None
@@ -87,9 +87,9 @@ def cloth_step(
         v: (n,3) velocities, m/s.
         held_motion: (k,3) displacement of the held nodes over the step, m.
         obstacles: obstacles at the start of the step.
-        bodies: (m,4,3) changes of their poses and velocities; see `Obstacles.moved`.
+        bodies: (m,4,3) changes of the obstacles' poses and velocities; see `Obstacles.moved`.
         material: (5,) the values of `MATERIAL`; by default those of `cloth`. The garment with the
-            last values is kept, so a rollout of one fabric makes it once.
+            last values is cached, so a rollout with one fabric makes it once.
 
     Raises:
         ValueError: a tensor is not float64, or a value of `material` is outside its range.
@@ -110,7 +110,7 @@ def material_tensor(material: Material) -> torch.Tensor:
     return torch.tensor([getattr(material, n) for n in MATERIAL], dtype=torch.float64)
 
 
-# By garment, the one of another fabric that was used last.
+# For each garment, the one last used with another fabric.
 _last: WeakKeyDictionary[ExplicitBiasCloth, ExplicitBiasCloth] = WeakKeyDictionary()
 
 

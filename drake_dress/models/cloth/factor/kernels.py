@@ -1,14 +1,14 @@
-"""What is done with a factor in blocks of columns: eliminating, substituting, factorising.
+"""Kernels of a factor in blocks of columns: elimination, substitution, factorisation.
 
 A block is one, two or four columns of L that follow each other in the elimination tree. Below its
-own triangle it has one list of rows for all its columns, and their values row by row:
+triangle, all its columns share one list of rows, with their values row by row:
 
     first[b], width[b]             its columns
     row[row_start[b]:row_end[b]]   rows below the block, ascending
     value[value_start[b] ...]      the triangle by columns, then `width` values for each row
 
-Where one column of a block lacks a row it has a zero. Right-hand sides are four or eight wide, so
-that a row is a vector of the processor: three coordinates and nothing, twice that, or, in the
+A column of a block has zeros in the rows that it lacks. Right-hand sides are four or eight wide, so
+that a row fills a vector register: three coordinates and padding, twice that, or, in the
 factorisation, four rows of P.
 """
 
@@ -64,7 +64,7 @@ def _eliminate_block(blocks, b, end, work, like):  # type: ignore[no-untyped-def
 
 @vectorised(_WIDTHS)
 def eliminate(blocks, work, like):  # type: ignore[no-untyped-def]
-    """Overwrites `work` (n,w) by L⁻¹ `work`, `like` a tuple of w."""
+    """Overwrites `work` (n,w) with L⁻¹ `work`, `like` a tuple of w."""
     row_end = blocks[3]
     for b in range(row_end.shape[0]):
         _eliminate_block(blocks, b, row_end[b], work, like)
@@ -72,7 +72,7 @@ def eliminate(blocks, work, like):  # type: ignore[no-untyped-def]
 
 @vectorised(_WIDTHS)
 def substitute(blocks, work, like):  # type: ignore[no-untyped-def]
-    """Overwrites `work` (n,w) by L⁻ᵀ D⁻¹ `work`, `like` a tuple of w."""
+    """Overwrites `work` (n,w) with L⁻ᵀ D⁻¹ `work`, `like` a tuple of w."""
     first, width, row_start, row_end, row, value_start, value, inverse = blocks
     for b in range(first.shape[0] - 1, -1, -1):
         i = first[b]
@@ -132,7 +132,7 @@ def row_product(indptr, indices, data, z, out):  # type: ignore[no-untyped-def]
     """Writes (matrix ⊗ I₄) z for a CSR matrix and rows of four, (n,4), to `out`."""
     for i in range(z.shape[0]):
         q, end = indptr[i], indptr[i + 1]
-        # two sums: one waits for itself
+        # two sums, since a single one would wait for its last result
         a, b = FOUR, FOUR
         while q + 1 < end:
             a = more(a, data[q], load(z, indices[q], FOUR))
@@ -149,20 +149,20 @@ def factorize(  # type: ignore[no-untyped-def]
 ):
     """Writes a factor: rows with their ends, values, inverse diagonal.
 
-    Looks up (Davis, "Direct Methods for Sparse Linear Systems", ch. 4), up to four rows of L at
-    once: they are what elimination leaves of four rows of P.
+    The algorithm is up-looking (Davis, "Direct Methods for Sparse Linear Systems", ch. 4). It
+    computes up to four rows of L at once, by elimination from four rows of P.
 
     Args:
-        blocks: with room for the rows that each block has with no node left out.
-        reach_start: of each block in `reach`.
+        blocks: blocks with room for all rows that they have if no node is left out.
+        reach_start: start of each block in `reach`.
         reach: the earlier blocks that have rows in a block, ascending.
-        p_start: of the columns of P's upper triangle.
+        p_start: starts of the columns of P's upper triangle.
         p_row: its rows.
         p_value: its values.
-        masked: (n,) which nodes are left out: their rows are zero, their inverse diagonal too.
+        masked: (n,) which nodes are left out: their rows and inverse diagonal are zero.
 
     Returns:
-        The node whose pivot is not positive, or -1.
+        The column whose pivot is not positive, or -1.
     """
     first, width, row_start, row_end, row, value_start, value, inverse = blocks
     count = first.shape[0]

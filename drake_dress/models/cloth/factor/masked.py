@@ -1,12 +1,12 @@
 """A sparse LDLᵀ factor of P that can leave nodes out.
 
-P's pattern never changes, the set of nodes with a prescribed motion does at every step. So order
-and blocks are found once (`symbolic`); a numeric factor then treats masked nodes as identity rows,
-which is the factor of P_ff with the order of all nodes kept.
+P's pattern never changes, but the set of nodes with a prescribed motion changes at every step. So
+order and blocks are computed once (`symbolic`). A numeric factor then has zeros in the rows of
+masked nodes, which gives the factor of P_ff in the order of all nodes.
 
-What contact asks of P⁻¹ is little: how the nodes in contact move under forces on those same nodes.
-The columns of L that this takes are the paths from these nodes to the root of the elimination tree
-(`part`): a fifth to a third of the factor for an arm in a sleeve.
+Contact needs only a part of P⁻¹: how contact nodes move under forces on the same nodes. This takes
+the columns of L on the paths from these nodes to the root of the elimination tree (`part`): a fifth
+to a third of the factor for an arm in a sleeve.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from drake_dress.models.cloth.factor.kernels import (
 from drake_dress.models.cloth.factor.symbolic import Pattern, find_pattern
 from drake_dress.models.cloth.factor.vector_rows import EIGHT, FOUR
 
-# A part is made for fewer nodes than all by this.
+# A part is made for at most the number of all nodes divided by this.
 _MANY = 3
 
 
@@ -42,10 +42,11 @@ class Factor:
     masked: BoolArray
 
     def part(self, nodes: IntArray) -> tuple[Any, ...]:
-        """Returns what P_ff⁻¹ between `nodes` (k,) needs of L, for `restricted_solve`.
+        """Returns the part of L that P_ff⁻¹ between `nodes` (k,) needs, for `restricted_solve`.
 
-        The blocks that the nodes reach in the elimination tree, numbered anew: they fit in the
-        first caches. For a third of all nodes it is the factor itself. The last array is scratch.
+        It has the blocks that the nodes reach in the elimination tree, renumbered so that they fit
+        in the fastest caches. For more than a third of all nodes it is the factor itself. The last
+        array is scratch.
         """
         p = self.pattern
         if _MANY * len(nodes) > len(self.masked):
@@ -55,7 +56,7 @@ class Factor:
         return found
 
     def solve_pair(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Returns P_ff⁻¹ of two (n,3) right-hand sides, in the time of little more than one."""
+        """Returns P_ff⁻¹ of two (n,3) right-hand sides, in little more time than for one."""
         out = np.empty_like(first), np.empty_like(second)
         solve_pair_into(self.blocks, self.pattern.permutation, first, second, *out)
         return out
@@ -85,7 +86,7 @@ class SymbolicFactor:
 
     @property
     def fill(self) -> int:
-        """Values of a factor, zeros of blocks counted."""
+        """Number of values of a factor, including the zeros of blocks."""
         return int(self.pattern.value_start[-1])
 
     def factorize(self, masked: BoolArray) -> Factor:
@@ -132,7 +133,7 @@ def solve_into(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
 def solve_rows(blocks, permutation, rhs, out, work):  # type: ignore[no-untyped-def]
-    """Does as `solve_into` with rows of four, (n,4)."""
+    """Does the same as `solve_into` with rows of four, (n,4)."""
     take_rows(permutation, rhs, work)
     eliminate(blocks, work, FOUR)
     substitute(blocks, work, FOUR)
@@ -163,7 +164,7 @@ def restricted_solve(part, force, motion):  # type: ignore[no-untyped-def]
     """Writes to `motion` (k,3) the rows of P_ff⁻¹ E `force` at the nodes where `force` (k,3) acts.
 
     Args:
-        part: of `Factor.part`.
+        part: result of `Factor.part`.
         force: (k,3).
         motion: (k,3), written.
     """

@@ -1,9 +1,9 @@
-"""The order of elimination and the blocks of columns: found once for a pattern.
+"""Elimination order and blocks of columns: computed once per sparsity pattern.
 
-The order is minimum degree, then a postorder of the elimination tree, in which a column's parent
-often is the next one. Such columns have nearly the same rows; up to four of them make a block
-(`kernels`), zeros kept where one lacks a row: of all ways to cut the columns into blocks the one is
-taken that costs least time by the times of `_COST`.
+The order is minimum degree, then a postorder of the elimination tree, in which a column's parent is
+often the next column. Such columns have nearly the same rows. Up to four of them form a block
+(`kernels`), with zeros where a column lacks a row. Of all ways to cut the columns into blocks, the
+one with the least time by `_COST` is taken.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import scipy.sparse.linalg as spla
 
 from drake_dress.models.arrays import IntArray
 
-# Time of a row of a block of one, two and four columns, and of a block, in rows of one column.
+# Time per row of a block of one, two and four columns, per block and per column, in rows of one
+# column.
 _COST = np.array([0.0, 1.0, 1.15, 0.0, 1.4])
 _PER_BLOCK, _PER_COLUMN = 5.0, 1.5
 
@@ -27,11 +28,12 @@ class Pattern:
     """Order and blocks of a symmetric sparse matrix with n nodes.
 
     Attributes:
-        permutation: (n,) the node that is eliminated as k-th; inverse_permutation: its inverse.
+        permutation: (n,) the node that is eliminated k-th; inverse_permutation: its inverse.
         first: (B,) first column of each block; width: (B,) 1, 2 or 4 columns.
-        row_start: (B+1,) of each block's rows in `row`, ascending; value_start: (B+1,) of its
-            values.
-        reach_start: (B+1,) of each block in `reach`: the earlier blocks with rows in it, ascending.
+        row_start: (B+1,) start of each block's rows in `row`, ascending; value_start: (B+1,) start
+            of its values.
+        reach_start: (B+1,) start of each block in `reach`: the earlier blocks with rows in it,
+            ascending.
         block_of: (n,) the block of a column.
     """
 
@@ -50,7 +52,7 @@ class Pattern:
 def find_pattern(matrix: sp.csc_matrix) -> tuple[Pattern, sp.csc_matrix]:
     """Returns the pattern of an (n,n) symmetric positive definite matrix.
 
-    And its upper triangle in the order of elimination, indices sorted.
+    Also returns its upper triangle in elimination order, indices sorted.
     """
     lu = spla.splu(
         sp.csc_matrix(matrix),
@@ -69,7 +71,7 @@ def find_pattern(matrix: sp.csc_matrix) -> tuple[Pattern, sp.csc_matrix]:
     _column_rows(upper.indptr, upper.indices, parent, start, rows)
     first, width = _cut(parent, counts)
     block_of = np.repeat(np.arange(len(first), dtype=np.int32), width)
-    # all columns of a block have rows among those of its last one
+    # the rows of all columns of a block are among those of its last column
     last = first + width - 1
     row_start = np.concatenate([[0], np.cumsum(counts[last])]).astype(np.int32)
     row = np.concatenate([rows[start[j] : start[j + 1]] for j in last]).astype(np.int32)
@@ -103,7 +105,7 @@ def _permuted_upper(matrix: sp.csc_matrix, permutation: IntArray) -> sp.csc_matr
 
 
 def _tree(upper: sp.csc_matrix) -> tuple[IntArray, IntArray]:
-    """Returns the elimination tree (n,), -1 for roots, and how many rows each column has (n,)."""
+    """Returns the elimination tree (n,), -1 for roots, and the number of rows per column (n,)."""
     n = upper.shape[0]
     parent, counts = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     _elimination_tree(n, upper.indptr, upper.indices, parent, counts)
@@ -129,7 +131,7 @@ def _elimination_tree(n, start, row, parent, counts):  # type: ignore[no-untyped
 
 @nb.njit(cache=True, nogil=True)
 def _postorder(parent):  # type: ignore[no-untyped-def]
-    """Returns the columns (n,) so that each comes right after the trees of its children."""
+    """Returns the columns (n,) in an order where each follows the trees of its children."""
     n = parent.shape[0]
     child = np.full(n, -1, dtype=np.int32)
     sibling = np.full(n, -1, dtype=np.int32)
@@ -178,7 +180,7 @@ def _column_rows(p_start, p_row, parent, start, rows):  # type: ignore[no-untype
 
 @nb.njit(cache=True, nogil=True)
 def _cut(parent, counts):  # type: ignore[no-untyped-def]
-    """Returns first column and width of blocks that cost least in sum."""
+    """Returns first column and width of the blocks with the least total cost."""
     n = parent.shape[0]
     least = np.zeros(n + 1)
     choice = np.ones(n, dtype=np.int32)

@@ -1,7 +1,7 @@
 """Rows of four or eight numbers as tuples, for kernels on vector registers.
 
-A tuple in place of an array lets LLVM keep a row in registers, and its length, which is part of its
-type, chooses the width when a kernel is compiled. `like` is any tuple of the width that is wanted.
+A tuple in place of an array lets LLVM keep a row in registers. Its length is part of its type and
+selects the width when a kernel is compiled. `like` is any tuple of the wanted width.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def more(typing_context: Any, a: Any, s: Any, b: Any) -> Any:
 
 
 def _fused(operation: str) -> Any:
-    """Returns what generates `a` fsub or fadd `s b`, with one rounding."""
+    """Returns the generator of `a` fsub or fadd `s b`, with one rounding."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         pairs = zip(

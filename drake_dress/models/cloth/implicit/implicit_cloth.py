@@ -1,15 +1,15 @@
-"""The plant's garment: a linearly implicit scheme with contact and dry friction by nodes.
+"""The plant's garment: a linearly implicit scheme with contact and dry friction at the nodes.
 
-With w the mean velocity over a step and θ the place in it at which forces count,
+With w the mean velocity over a step and θ the fraction of the step at which forces are taken,
 
     (M / θ + (θ h² + hβ) K₊) w = M v / θ + h f(x),  x' = x + h w,  v' = v + (w − v) / θ,
 
-K₊ the positive semi-definite part of the exact stiffness. θ = 1 is the step of Baraff and Witkin
-(1998), whose damping grows with h; near 1/2 it is of second order and damps little, so that steps
-may be longer. It is not the controller's scheme: position and velocity are consistent, stretched
+with K₊ the positive semi-definite part of the exact stiffness. θ = 1 is the step of Baraff and
+Witkin (1998), whose damping grows with h. Near 1/2 it is of second order and damps little, so steps
+may be longer. Unlike in the controller's scheme, position and velocity are consistent, stretched
 cloth stiffens against sideways motion, and rotation is not resisted. Contact sets velocities, so a
-landing does not bounce: for nodes that are bound v' = w, with M in place of M / θ. Sticking nodes
-move with the surface, slipping nodes keep their normal velocity and feel μ times their normal
+landing does not bounce: bound nodes have v' = w, with M in place of M / θ. Sticking nodes move with
+the surface. Slipping nodes keep their normal velocity and feel friction of μ times their normal
 force; see `implicit_contact.py`.
 """
 
@@ -60,15 +60,15 @@ from drake_dress.models.cloth.state import (
 )
 
 _REFACTOR_AFTER = 40
-# A slipping node whose friction resists by more than this share of P's diagonal is left out of the
-# factor: with it, P⁻¹ is far too soft around it. Two sleeves on arms: 46 iterations a step before,
-# 33 with this.
+# Resistance of friction, as a share of P's diagonal, above which a slipping node is left out of the
+# factor: P⁻¹ is far too soft around it otherwise. Two sleeves on arms took 46 iterations a step
+# without this, 33 with it.
 _FIRM = 0.03
-# The passes before the last only find the modes: their tolerance is this much coarser.
+# Factor on the tolerance of the passes before the last, since they only find the modes.
 _COARSER = 6.0
-# Solves added, at most, for nodes that would end inside a body.
+# Maximum number of additional solves for nodes that would end inside a body.
 _LANDING_PASSES = 3
-# Solves added, at most, while pairs of layers pull.
+# Maximum number of additional solves while pairs of layers pull.
 _PARTING_PASSES = 3
 # Share of the nodes in contact whose mode may still change without another pass.
 _TOLERATED_CHANGES = 0.02
@@ -76,7 +76,7 @@ _TOLERATED_CHANGES = 0.02
 
 @dataclass(frozen=True)
 class StepInfo:
-    """How a step was solved."""
+    """Information on the solve of a step."""
 
     passes: int
     cg_iterations: int
@@ -86,20 +86,20 @@ class StepInfo:
 
 @dataclass
 class _Problem:
-    """What a step solves, and how far it is.
+    """The problem of a step, and the progress of its solution.
 
     Attributes:
-        state: at its start.
-        obstacles: the person then.
+        state: state at the start of the step.
+        obstacles: the person at that time.
         driven: (n,3) impulse of elastic forces, weight and influences, N s.
-        block: of `prepare_filtered`.
-        facing, light: of `normal_response`.
-        near: what is nearest to the nodes; contact: with it.
+        block: result of `prepare_filtered`.
+        facing, light: results of `normal_response`.
+        near: nearest surfaces of the nodes; contact: contact with them.
         bonds: pairs of layers.
         inertia: (n,) M / θ of nodes that the last pass solved as free, M of others, kg.
-        pushed: (n,3) momentum, with `driven` and what layers add, N s.
-        velocity: (n,3) m/s, of the last pass; impulse: (n,3) that it asks of contact, N s.
-        passes, iterations: done so far; residual: of the last pass.
+        pushed: (n,3) momentum plus `driven` and the impulse of layers, N s.
+        velocity: (n,3) m/s, of the last pass; impulse: (n,3) that it requires of contact, N s.
+        passes, iterations: numbers so far; residual: of the last pass.
     """
 
     state: ClothState
@@ -125,17 +125,17 @@ class _Problem:
 
 @dataclass(frozen=True)
 class ImplicitSettings:
-    """How exactly the linearly implicit scheme solves, and what it looks at.
+    """Settings of the linearly implicit scheme.
 
     Attributes:
         tolerance: residual at which conjugate gradients stop, relative to the momentum plus what
             gravity adds to it in a step.
-        max_iterations: iterations of conjugate gradients per pass, at most.
-        max_passes: passes of the active-set iteration per step, at most. The next step corrects
-            what is left.
+        max_iterations: maximum iterations of conjugate gradients per pass.
+        max_passes: maximum passes of the active-set iteration per step. The next step corrects
+            the remaining error.
         sample_elements: whether edge midpoints and face centroids have contact, in addition to
             nodes.
-        most_cone_passes: additional solves, at most, while nodes stick beyond the friction cone.
+        most_cone_passes: maximum additional solves while nodes stick beyond the friction cone.
         implicitness: θ, above 0.5 up to 1. 1 is implicit Euler; smaller values damp less.
         buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression
             that would buckle at shorter wavelengths is relaxed (`Buckling`). 0 turns this off.
@@ -159,8 +159,8 @@ class ImplicitCloth(SteppedCloth):
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        additions: what effects add to the garment.
-        settings: how exactly it solves.
+        additions: permanent additions of effects.
+        settings: solver settings.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class ImplicitCloth(SteppedCloth):
             Csr.of(mass + scale * bending), 1.0 / p.diagonal(), elements, scale, fibres
         )
         self._scale, self._bending = scale, scale * bending.diagonal()
-        # the factor made last: another state may go on with the same one
+        # the last factor: another state may be able to use it
         self._factor: Factor | None = None
 
     def step(
@@ -235,10 +235,10 @@ class ImplicitCloth(SteppedCloth):
         if p.residual > max(0.1, self._settings.tolerance):
             memory[0] = -1
         reaction = p.contact.impulse(p.velocity, p.impulse) / h
-        # for this step only
+        # rails are for this step only
         mode[mode == RAIL] = SLIP
         touching = (mode == STICK) | (mode == SLIP)
-        # θ where the step was solved as free, 1 where it was bound
+        # θ for nodes that were solved as free, 1 for bound ones
         share = (self.mass / p.inertia)[:, None]
         after = ClothState(
             end,
@@ -257,7 +257,7 @@ class ImplicitCloth(SteppedCloth):
         held_velocity: FloatArray,
         influences: Influences,
     ) -> _Problem:
-        """Returns what a step has to solve, made ready for its first pass."""
+        """Returns the problem of a step, prepared for its first pass."""
         m, h, x, v = self.material, self.time_step, state.x, state.v
         e = influences.stiffened(self.elements)
         force, block = self._elastic(e, x)
@@ -283,13 +283,13 @@ class ImplicitCloth(SteppedCloth):
         return p
 
     def _make_ready(self, p: _Problem) -> None:
-        """Makes matrix and momentum those of modes and pairs of layers as they are now."""
+        """Updates matrix and momentum to the current modes and pairs of layers."""
         self._system.set_bonds(p.bonds.now)
         p.inertia = self._bound_inertia(p.contact.mode)
         p.pushed = p.inertia[:, None] * p.state.v + p.driven + p.bonds.drive
 
     def _solve(self, p: _Problem, factor: Factor) -> None:
-        """Finds velocities and impulses, with modes and pairs of layers to which they belong."""
+        """Finds velocities and impulses with consistent modes and pairs of layers."""
         cones, landings, partings = (
             self._settings.most_cone_passes,
             _LANDING_PASSES,
@@ -314,22 +314,22 @@ class ImplicitCloth(SteppedCloth):
             elif glued:
                 partings -= 1
                 continue
-            # Sticking may not hold more than friction can: what does slides after all.
+            # Sticking nodes beyond the friction cone have to slip.
             elif cones > 0 and contact.slip_out_of_cone(p.velocity, p.impulse):
                 cones -= 1
                 continue
-            # Nothing may end up inside the person because it was not seen to land.
+            # No node may end inside the person because its landing was missed.
             if landings == 0 or not contact.is_near or not self._stop_entering(p):
                 return
             landings -= 1
 
     def _pass(self, p: _Problem, factor: Factor, tolerance: float) -> None:
-        """Solves for modes and pairs of layers as they are now."""
+        """Solves for the current modes and pairs of layers."""
         contact = p.contact
         contact.prescribe(p.velocity)
         bound = contact.mode.any()
         iterations, p.residual = self._system.solve(
-            # alone, P keeps the momentum of what is free, however soon iterations end
+            # without bound nodes, P alone conserves momentum, however soon iterations end
             Preconditioner(
                 factor,
                 (p.facing, p.bonds.now.stiffened(p.facing, p.light)) if bound else None,
@@ -354,7 +354,7 @@ class ImplicitCloth(SteppedCloth):
         return p.contact.stop_entering(p.state.x, p.velocity, p.impulse, p.obstacles, margin)
 
     def _elastic(self, elements: Elements, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Returns the internal force (n,3), N, and what products with K₊ need."""
+        """Returns the internal force (n,3), N, and the data for products with K₊."""
         m = self.material
         if self._buckling is None:
             force = internal_force(elements, m.stretch_stiffness, m.bending_stiffness, x)
@@ -365,7 +365,7 @@ class ImplicitCloth(SteppedCloth):
         return force, self._buckling.prepare(e, x)
 
     def _bound_inertia(self, mode: IntArray) -> FloatArray:
-        """Returns (n,), kg, M / θ of the nodes, M of bound ones, and makes it the system's."""
+        """Returns (n,), kg, M / θ of free nodes and M of bound ones, and sets it in the system."""
         if self._settings.implicitness == 1.0:
             return self.mass
         inertia = np.where(mode == FREE, self._inertia, self.mass)
@@ -375,10 +375,10 @@ class ImplicitCloth(SteppedCloth):
     def _start(
         self, p: _Problem, held_velocity: FloatArray, guess: FloatArray | None
     ) -> FloatArray:
-        """Returns where conjugate gradients start: in steady motion, in free fall or as guessed.
+        """Returns the initial guess of conjugate gradients: steady motion, free fall or `guess`.
 
-        A hanging garment keeps its velocity, a falling one gains θ h g; whichever leaves the
-        smaller residual. Starting a hanging coat from free fall doubled the iterations.
+        A hanging garment keeps its velocity, a falling one gains θ h g; the one with the smaller
+        residual is taken. Starting a hanging coat from free fall doubled the iterations.
         """
         v, mode, normal = p.state.v, p.contact.mode, p.near.normal
         fall = self._settings.implicitness * self.time_step * self.gravity
@@ -387,7 +387,7 @@ class ImplicitCloth(SteppedCloth):
         for start in (v.copy(), other):
             start[self.held] = held_velocity
             size = self._system.residual2(start, p.block, p.pushed, mode, normal)
-            # what is no number is taken, too: it is told at the end of the step
+            # a start that is not finite is taken, too: the end of the step reports it
             if not size >= least:
                 best, least = start, size
         return best
@@ -395,14 +395,14 @@ class ImplicitCloth(SteppedCloth):
     def _renewed_factor(
         self, memory: IntArray, mode: IntArray, resistance: FloatArray
     ) -> tuple[Factor, bool, IntArray]:
-        """Returns a factor of P without the bound nodes, a new one if the last has become stale.
+        """Returns a factor of P without the fixed nodes, a new one if the last has become stale.
 
-        Also returns whether it is new, and what the next step has to know of it.
+        Also returns whether it is new, and the row of `ClothState.solver` for the next step.
 
         Args:
             memory: (n+1,) row of `ClothState.solver`.
-            mode: (n,) of the nodes.
-            resistance: (n,) of friction to slipping nodes, kg.
+            mode: (n,) modes of the nodes.
+            resistance: (n,) resistance of friction to slipping nodes, kg.
         """
         masked = (mode == STICK) | (mode == HELD) | (resistance > self._firm)
         age, last = int(memory[0]), memory[1:] == 1

@@ -1,17 +1,18 @@
 """Contact with dry friction in one linearly implicit step, found by an active-set iteration.
 
-Unknown are velocities u at the end of the step. With w = u − u_surface, r the impulse of contact,
-r_N along the normal n, and u_N* the normal velocity that brings a node onto its margin,
+The unknowns are the mean velocities u over the step, for bound nodes also those at its end. With
+w = u − u_surface, r the impulse of contact, r_N along the normal n, and u_N* the normal velocity
+that brings a node onto its margin,
 
     free     w_N ≥ u_N*,  r = 0
     stick    w_N = u_N*,  w_T = 0,  ‖r_T‖ ≤ μ r_N
     slip     w_N = u_N*,  r_T = −μ r_N w_T / ‖w_T‖
-    rail     held by two bodies: w only along the line where their surfaces meet, and friction on it
+    rail     between two bodies: w only along the line where their surfaces meet, with friction
 
-Modes start from those of the step before. Friction of slipping nodes enters as a resistance c w_T,
-c = μ r_N / ‖w_T‖ of the last pass or step: it cannot turn a node around. As a fixed impulse, ten
-times what a light node carries, it did: nodes stuck, left and came back, the tension around a drum
-was 21 % too small at μ = 0.5, and a sleeve over an arm pulled a third too little.
+Modes start from those of the previous step. Friction of slipping nodes enters as a resistance
+c w_T, c = μ r_N / ‖w_T‖ of the last pass or step, which cannot reverse a node's motion. A fixed
+impulse, ten times the momentum of a light node, did: nodes stuck, left and came back, the tension
+around a drum was 21 % too small at μ = 0.5, and a sleeve over an arm pulled a third too little.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ from drake_dress.models.cloth.filtered_cg import Bound
 from drake_dress.models.cloth.influences import ContactLaw
 from drake_dress.models.cloth.state import ClothState
 
-# A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.
+# Largest velocity that pushes a node out to its margin, m/s; a larger one would throw it.
 _LARGEST_PUSH = 0.2
 # Tangential speed above which a node lands sliding, m/s.
 _LANDING_SLIP_SPEED = 5e-3
-# A slipping node that is slower, m/s, or slows to this share in a pass, is tried as sticking: as
-# slipping it would come to rest in the limit only.
+# A slipping node that is slower than this, m/s, or slows to this share in a pass, is tried as
+# sticking: as slipping it would come to rest only in the limit.
 _SLOWEST, _STOPPING = 2e-4, 0.7
-# Gap up to which a node keeps the contact of the step before, m.
+# Gap up to which a node keeps the contact of the previous step, m.
 _KEPT_GAP = 1e-3
 # Gap within which a node may land during a step, m.
 _NEAR = 0.05
 # Depth within its margin, m, at which a node that comes from outside has to be stopped.
 _ENTERED = 1.5e-3
-# Between surfaces that face each other, or look the same way, more than this there is no corner.
+# Cosine between two surface normals, of either sign, above which the surfaces form no corner.
 _FACING = 0.97
-# Friction beyond the cone, in sum and relative to what the cone allows, that is let be.
+# Tolerated sum of friction beyond the cone, relative to what the cone allows.
 _TOLERATED_EXCESS = 0.02
 
 
@@ -51,16 +52,16 @@ class ImplicitContact:
     """The contacts of one step.
 
     Args:
-        near: what is nearest to the nodes at its start.
-        state: of the garment at its start.
+        near: nearest surfaces of the nodes at the start of the step.
+        state: state of the garment at that time.
         held: (k,) nodes whose motion is prescribed; they feel no contact.
         time_step: h, s.
         gravity: (3,) m/s².
         law: friction and adhesion.
 
     Attributes:
-        mode: (n,) FREE, STICK, SLIP, RAIL or HELD, now. Of a node on a rail, `normal` is the rail's
-            direction.
+        mode: (n,) FREE, STICK, SLIP, RAIL or HELD, current. For a node on a rail, `normal` is the
+            rail's direction.
         resistance: (n,) c of nodes that slip or are on a rail, kg.
     """
 
@@ -115,12 +116,12 @@ class ImplicitContact:
         return bool(np.any(self._near.gap < _NEAR))
 
     def bound(self) -> Bound:
-        """Returns what of the nodes' motion is bound, for the linear solver."""
+        """Returns the constraints on the nodes' motion, for the linear solver."""
         resistance = self.resistance if self.resistance.any() else None
         return Bound(self.mode, self._near.normal, resistance)
 
     def prescribe(self, velocity: FloatArray) -> None:
-        """Writes what contact prescribes into `velocity` (n,3), m/s."""
+        """Writes the velocities that contact prescribes into `velocity` (n,3), m/s."""
         _prescribe(self.mode, self._near.normal, self._near.surface_velocity, self._push, velocity)
 
     def drive(self) -> FloatArray:
@@ -128,11 +129,11 @@ class ImplicitContact:
         return self._friction + self.resistance[:, None] * self._near.surface_velocity
 
     def update(self, velocity: FloatArray, residual: FloatArray) -> int:
-        """Sets modes and friction by what a pass has found; returns how many nodes changed.
+        """Updates modes and friction after a pass; returns the number of nodes that changed.
 
         Args:
             velocity: (n,3) m/s.
-            residual: (n,3) of the equations of motion without contact, N s.
+            residual: (n,3) residual of the equations of motion without contact, N s.
         """
         return int(
             _update_modes(
@@ -152,11 +153,11 @@ class ImplicitContact:
         )
 
     def slip_out_of_cone(self, velocity: FloatArray, residual: FloatArray) -> bool:
-        """Lets nodes slip that stick beyond what friction holds; returns if it matters in sum.
+        """Lets nodes beyond the friction cone slip if their total excess matters; returns whether.
 
         Args:
             velocity: (n,3) m/s.
-            residual: (n,3) of the equations of motion without contact, N s.
+            residual: (n,3) residual of the equations of motion without contact, N s.
         """
         return bool(
             _slip_out_of_cone(
@@ -180,15 +181,15 @@ class ImplicitContact:
         obstacles: Obstacles,
         margin: float,
     ) -> bool:
-        """Binds nodes that would end farther inside a body; returns if there are any.
+        """Binds nodes that would end deeper inside a body; returns whether there are any.
 
-        A node that is free lands on that body; one that is bound goes where the surfaces of what it
-        touches and of that body meet, and slides along that line with friction.
+        A free node lands on that body. A bound node moves to the line where the surfaces of both
+        bodies meet, and slides along it with friction.
 
         Args:
             x: (n,3) at the start of the step, m.
             velocity: (n,3) mean over the step, m/s.
-            residual: (n,3) of the equations of motion without contact, N s.
+            residual: (n,3) residual of the equations of motion without contact, N s.
             obstacles: bodies.
             margin: distance to keep, m.
         """
@@ -198,7 +199,7 @@ class ImplicitContact:
         bound = (self.mode == STICK) | (self.mode == SLIP)
         end = distance - margin
         entered = (end < -_ENTERED) & (self.mode != HELD) & (self.mode != RAIL)
-        # what was as deep in that body before is on its way out
+        # nodes that were as deep in that body before are on their way out
         leaving = (near.owner == owner) & (end > near.gap - _ENTERED)
         rows = np.flatnonzero(entered & ~leaving)
         if not len(rows):
@@ -228,18 +229,17 @@ class ImplicitContact:
         moving: FloatArray,
         gap: float,
     ) -> None:
-        """Leaves to node `i`, bound already, the line where a second surface meets its own.
+        """Restricts node `i`, already bound, to the line where a second surface meets its own.
 
-        Surfaces that face each other, or look the same way, have no such line: between them a node
-        slips.
+        Surfaces that are nearly parallel have no such line: between them a node slips.
 
         Args:
             i: the node.
-            velocity: (3,) of it, m/s.
-            residual: (3,) N s.
-            normal: (3,) of the second surface.
-            moving: (3,) its velocity, m/s.
-            gap: of it, less the margin, m.
+            velocity: (3,) velocity of the node, m/s.
+            residual: (3,) residual at the node, N s.
+            normal: (3,) normal of the second surface.
+            moving: (3,) velocity of the second surface, m/s.
+            gap: gap to the second surface, less the margin, m.
         """
         near = self._near
         own, c = near.normal[i].copy(), float(near.normal[i] @ normal)
@@ -257,14 +257,14 @@ class ImplicitContact:
             w = velocity - between
             slid = float(np.linalg.norm(w - (own @ w) * own))
         near.surface_velocity[i] = between
-        # what the first surface bore so far tells how large friction is
+        # the load on the first surface so far gives the size of friction
         pressure = max(float(own @ residual) + float(self._adhesion[i]), 0.0)
         self.resistance[i] = self._mu[i] * pressure / max(slid, _SLOWEST)
 
     def impulse(self, velocity: FloatArray, residual: FloatArray) -> FloatArray:
         """Returns (n,3) the impulse of person and grippers at a solution, N s.
 
-        What conjugate gradients left over along a slip is none of it.
+        It excludes the residual that conjugate gradients leave along the slip direction.
         """
         out = np.empty_like(residual)
         _impulse(
@@ -281,7 +281,7 @@ class ImplicitContact:
 
 
 def _push_out(gap: FloatArray, h: float) -> FloatArray:
-    """Returns the normal velocity (k,), m/s, that brings nodes with gaps (k,), m, to the margin."""
+    """Returns the normal velocity (k,), m/s, that moves nodes with gaps (k,), m, to the margin."""
     push: FloatArray = np.where(gap > 0.0, -gap / h, np.minimum(-0.5 * gap / h, _LARGEST_PUSH))
     return push
 
@@ -335,7 +335,7 @@ def _initial_modes(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _landing_mode(v, surface_velocity, normal, i):  # type: ignore[no-untyped-def]
-    """A node that lands while it slides keeps sliding: sticking would take its momentum."""
+    """Returns SLIP if the node slides as it lands: sticking would take its momentum."""
     sliding = _tangential_speed(v, surface_velocity, normal, i) > _LANDING_SLIP_SPEED
     return SLIP if sliding else STICK
 
@@ -366,7 +366,7 @@ def _initial_friction(  # type: ignore[no-untyped-def]
     resistance,
     speed,
 ):
-    """Starts slipping nodes from the normal force of the step before."""
+    """Initialises friction of slipping nodes from the normal force of the previous step."""
     for i in range(mode.shape[0]):
         if mode[i] != SLIP:
             continue
@@ -415,7 +415,7 @@ def _prescribe(mode, normal, surface_velocity, push, velocity):  # type: ignore[
 def _slip_out_of_cone(  # type: ignore[no-untyped-def]
     normal, surface_velocity, velocity, impulse, mu, adhesion, mode, friction, resistance
 ):
-    """Lets sticking nodes slip whose friction exceeds the cone; returns if it matters in sum."""
+    """Lets sticking nodes beyond the cone slip if their excess matters; returns whether it does."""
     excess = 0.0
     bound = 0.0
     for i in range(mode.shape[0]):
@@ -484,7 +484,7 @@ def _update_modes(  # type: ignore[no-untyped-def]
     resistance,
     speed,
 ):
-    """One round of the active set; returns how many nodes changed what binds them."""
+    """Runs one round of the active set; returns how many nodes changed their constraint."""
     changed = 0
     for i in range(mode.shape[0]):
         m = mode[i]

@@ -1,20 +1,20 @@
-"""What keeps layers apart within an implicit step: resistance to approach, pair by pair.
+"""Resistance of pairs to approach, which keeps layers apart within an implicit step.
 
-A correction after the step knows nothing of how stiff cloth is: layers that a coat's tension
-presses together were pushed through each other by the solver and back by the correction at every
-step, by 5 to 7 mm at 8 ms, and edges there were stretched by 40 %. With the pairs in the system the
-solver knows: corrections are below 1 mm, and edges are stretched as they are without layers.
+A correction after the step does not know how stiff cloth is. When a coat's tension pressed layers
+together, the solver pushed them through each other at every step and the correction pushed them
+back, by 5 to 7 mm at 8 ms, and edges there were stretched by 40 %. With the pairs in the solver's
+system, corrections are below 1 mm, and edges are stretched as they are without layers.
 
-Of a pair with weights c and unit direction n, s = n·Σ c x the distance and u = n·Σ c w the rate at
-which it grows, one that would come closer than the thickness T gets the impulse
+A pair has weights c, unit direction n, distance s = n·Σ c x and rate u = n·Σ c w at which it grows.
+If it would come closer than the thickness T, it gets the impulse
 
     J = κ max(0, r − u),   r = (T − s) / h, a share of it where s < T.
 
-Of the pairs that act it is linear in w: κ (c ⊗ n)(c ⊗ n)ᵀ is added to the matrix, κ r (c ⊗ n) to
-the right-hand side. Which pairs act is found by a semismooth Newton iteration: after a solve, those
-with u < r do. Layers push and do not pull: while all pairs acted that were about to come too close,
-those that would have parted by themselves were glued together. Folds of some hundred such pairs
-shook themselves up within a tenth of a second, and in one of 200 dressings the coat flew apart.
+For active pairs it is linear in w: κ (c ⊗ n)(c ⊗ n)ᵀ is added to the matrix, κ r (c ⊗ n) to the
+right-hand side. A semismooth Newton iteration finds the active pairs: after a solve, those with
+u < r. Layers push and do not pull. When all pairs that were about to come too close were active,
+those that would have separated by themselves were glued together. Folds of some hundred such pairs
+became unstable within a tenth of a second, and in one of 200 dressings the coat flew apart.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
-# Pull of pairs, by the push of the others, from which a step is solved again.
+# Pull of pairs, relative to the push of the others, above which a step is solved again.
 _PULLING = 0.2
-# Approach of a pair that did not act beyond what it may in a step, m, from which a step is solved
-# again; what is less is corrected.
+# Excess approach of an inactive pair in a step, m, above which the step is solved again; less is
+# left to the correction.
 _CLOSER = 1e-3
 
 
@@ -38,11 +38,11 @@ class Bonds:
     """Pairs that resist approach.
 
     Attributes:
-        node: (P,4).
+        node: (P,4) nodes of each pair.
         row: (P,4,3) c ⊗ n.
         resistance: (P,) κ, kg.
-        rate: (P,) r, at which a pair is to part at least, m/s.
-        closing: (P,) whether it resists before anything is known of the step.
+        rate: (P,) r, least rate at which a pair is to separate, m/s.
+        closing: (P,) whether it is active in the first solve of a step.
     """
 
     node: IntArray
@@ -52,7 +52,7 @@ class Bonds:
     closing: BoolArray
 
     def chosen(self, which: BoolArray) -> Bonds:
-        """Returns those that are true in `which` (P,)."""
+        """Returns the bonds for which `which` (P,) is true."""
         return Bonds(*(values[which] for values in vars(self).values()))
 
     def lacking(self, velocity: FloatArray) -> FloatArray:
@@ -68,11 +68,11 @@ class Bonds:
         return impulse
 
     def stiffened(self, facing: FloatArray, light: FloatArray) -> FloatArray:
-        """Returns (n,), 1/kg, what is left of `light` where nodes face along bonds.
+        """Returns (n,), 1/kg, `light` reduced where the nodes' normals lie along bonds.
 
         Args:
             facing: (n,3) unit normals of the nodes.
-            light: of `normal_response`.
+            light: (n,) compliance from `normal_response`.
         """
         left = light.copy()
         _stiffen(self.node, self.row, self.resistance, facing, left)
@@ -89,15 +89,15 @@ NO_BONDS = Bonds(
 
 
 class ActingBonds:
-    """Those of a step's bonds that push, as far as its solves have shown.
+    """The active bonds of a step, updated after its solves.
 
     Attributes:
-        now: they.
-        drive: (n,3) of them, N s.
+        now: the active bonds.
+        drive: (n,3) their impulse, N s.
 
     Args:
-        bonds: all pairs that may.
-        count: n, of the garment's nodes.
+        bonds: all pairs that may become active.
+        count: n, number of the garment's nodes.
         time_step: h, s.
     """
 
@@ -109,10 +109,10 @@ class ActingBonds:
         return len(self._bonds.node)
 
     def update(self, velocity: FloatArray) -> bool:
-        """Lets those act that push at `velocity` (n,3), m/s; returns whether it was far from that.
+        """Activates the bonds that push at `velocity` (n,3), m/s; returns whether to solve again.
 
-        Far: pairs that pull do so with a share of what the others push with, or pairs that did not
-        act come much too close.
+        That is needed if active pairs pulled with more than a share of what the others pushed with,
+        or if inactive pairs came much too close.
         """
         lacking = self._bonds.lacking(velocity)
         acting = lacking > 0.0

@@ -2,8 +2,8 @@
 
 A pair is four nodes and a kind. The weights sum to zero and give the vector between the closest
 points, Σ c_i x_i, from the second part (triangle, second edge) to the first (node, first edge).
-Both parts are convex, so a plane across that vector separates them: `separation` along the unit
-vector is the distance itself.
+Both parts are convex, so a plane perpendicular to that vector separates them: `separation` along
+the unit vector is the distance itself.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ NODE_TRIANGLE = 0
 EDGE_EDGE = 1
 # Squared sine of the angle below which two edges count as parallel.
 _PARALLEL = 1e-10
-# The same of the angle at a corner below which a triangle counts as a line.
+# Squared sine of the angle at a corner below which a triangle counts as a line.
 _FLAT = 1e-12
 
 
@@ -44,7 +44,7 @@ def offset(x, pair, weights):  # type: ignore[no-untyped-def]
 def separation(x, kind, pair, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Returns the gap of the two parts along a unit vector, m, and the two corners that bound it.
 
-    Positive: a plane across the vector lies between them. The corners are places in `pair`.
+    If it is positive, a plane across the vector lies between them. Corners are indices in `pair`.
     """
     a, b, c, d = pair[0], pair[1], pair[2], pair[3]
     h0 = nx * x[a, 0] + ny * x[a, 1] + nz * x[a, 2]
@@ -65,7 +65,7 @@ def separation(x, kind, pair, nx, ny, nz):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _node_triangle(x, pair, weights):  # type: ignore[no-untyped-def]
-    """The foot of the perpendicular where it lies inside, else the best of the three sides."""
+    """Uses the foot of the perpendicular if it lies inside, else the closest of the three sides."""
     p, i, j, k = pair[0], pair[1], pair[2], pair[3]
     ab0, ab1, ab2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     ac0, ac1, ac2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
@@ -90,7 +90,7 @@ def _node_triangle(x, pair, weights):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _on_border(d1, d2, bb, bc, cc):  # type: ignore[no-untyped-def]
-    """Returns the closest point on the three sides, by what it takes of second and third corner."""
+    """Returns the closest point on the three sides as weights of second and third corner."""
     best = np.inf
     u, v = 0.0, 0.0
     for side in range(3):
@@ -114,7 +114,7 @@ def _on_border(d1, d2, bb, bc, cc):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _edge_edge(x, pair, weights):  # type: ignore[no-untyped-def]
-    """The lines' closest points where both lie within, else the best of four ends."""
+    """Uses the lines' closest points if both lie within, else the best of the four ends."""
     i, j, k, l = pair[0], pair[1], pair[2], pair[3]
     u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     v0, v1, v2 = x[l, 0] - x[k, 0], x[l, 1] - x[k, 1], x[l, 2] - x[k, 2]

@@ -1,8 +1,9 @@
-"""The last resort: what impulses could not part moves together as one rigid piece.
+"""The last resort: nodes that impulses could not separate move together as one rigid body.
 
 A zone is a set of nodes linked by pairs that would still cross (Provot 1997). Its displacement is
-replaced by the twist t + ω × r nearest to it by mass, which conserves momentum and angular
-momentum and adds no energy. Nodes that share a twist cannot cross: along it no distance shrinks.
+replaced by the mass-weighted best-fitting twist t + ω × r, which conserves momentum and angular
+momentum and adds no energy. Nodes that share a twist cannot cross, because no distance shrinks
+along it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# Weight of a node whose motion is prescribed, by the zone's free mass.
+# Weight of a node whose motion is prescribed, in units of the zone's free mass.
 _PRESCRIBED = 1e8
 
 
@@ -22,10 +23,10 @@ class Zone:
     """One replacement of displacements by a twist.
 
     Attributes:
-        node: (z,).
-        gain: (6,3z) twist by displacements.
-        basis: (3z,6) displacements by twist.
-        keep: (z,3,3) what a node keeps of its own displacement: all, one direction or nothing.
+        node: (z,) its nodes.
+        gain: (6,3z) maps displacements to the twist.
+        basis: (3z,6) maps the twist to displacements.
+        keep: (z,3,3) part of its own displacement that a node keeps: all, one direction or nothing.
     """
 
     node: IntArray
@@ -53,7 +54,7 @@ def make_zone(node: IntArray, x: FloatArray, inverse_mass: FloatArray, barred: F
     Args:
         node: (z,) its nodes.
         x: (n,3) m.
-        inverse_mass: (n,) 1/kg, 0 where the motion is prescribed: those nodes set the twist.
+        inverse_mass: (n,) 1/kg, 0 where the motion is prescribed: these nodes determine the twist.
         barred: (n,3) unit directions along which nodes keep their own motion, or zero.
     """
     w = inverse_mass[node]

@@ -1,8 +1,8 @@
-"""Which nodes of different layers may meet during a motion, found without looking at all anew.
+"""Finds nodes of different layers that may meet during a motion, reusing earlier searches.
 
-A grid of nodes is searched with some room to spare; as long as nodes have not used it up, whoever
-may meet is among those that were found then. That is tested for each of them at every call, and
-they stand in the order of their numbers, so that what comes back depends on the arguments alone.
+A search of a grid of nodes leaves some room to spare. Until nodes have used it up, all nodes that
+may meet are among those that it found. Every call tests each of them, in the order of their
+numbers, so that the result depends on the arguments alone.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from drake_dress.models.cloth.layers.motion import Motion
 from drake_dress.models.cloth.layers.topology import Topology
 
 _MOST_CELLS = 400_000
-# Room to spare, by the mean edge length: for what two nodes move nearer to each other between
-# searches, and for how much more a node moves in a later step. More finds nodes two edges away on
-# the same layer, which are no other layer.
+# Room to spare, in mean edge lengths: for how much nearer two nodes get between searches, and for
+# how much more a node moves in a later step. More room would find nodes two edges away on the same
+# layer, which are not another layer.
 _ROOM = 0.3
 _MORE = 0.05
-# The same, for rounding: a node at the border of what is asked for is found by all searches.
+# The same, for rounding: all searches must find a node at the limit of the requested distance.
 _ROUNDING = 1e-9
-# Mean relative motion in a step, by the mean edge length, from which room would not last.
+# Mean relative motion in a step, in mean edge lengths, above which room would not last.
 _LARGE = 0.1
 
 
 @dataclass(frozen=True)
 class _Search:
-    """What a search found, and for how long it holds.
+    """Result of a search, and the limits within which it holds.
 
     Attributes:
         met: (K,2) nodes, the lower number first, in ascending order.
-        x: (n,3) nodes then, m.
-        reach: (n,) up to which a node's relative motion may grow, m.
-        longest: (n,) squared, up to which its edges may, m².
-        near: up to which what is asked for may, m.
-        room: that two nodes may move nearer to each other, m.
+        x: (n,3) positions of the nodes at the search, m.
+        reach: (n,) limit of a node's relative motion, m.
+        longest: (n,) limit of the squared length of its edges, m².
+        near: limit of the requested distance, m.
+        room: limit of how much nearer two nodes get, m.
     """
 
     met: IntArray
@@ -53,9 +53,9 @@ class Meetings:
     """Finds nodes that may meet; keeps work space only.
 
     Args:
-        topology: of the mesh.
+        topology: topology of the mesh.
         edge: mean length of its edges, m.
-        usual: distance that is often asked for, m: a search for less serves that as well.
+        usual: distance that is often requested, m: a search for less covers it, too.
     """
 
     def __init__(self, topology: Topology, edge: float, usual: float = 0.0) -> None:
@@ -66,9 +66,9 @@ class Meetings:
         self._last: _Search | None = None
 
     def find(self, x: FloatArray, motion: Motion, near: float) -> IntArray:
-        """Returns (M,2) the nodes that may come within `near`, m, beyond each other's rings.
+        """Returns (M,2) nodes whose elements may come within `near`, m, outside each other's rings.
 
-        Their corners' elements may; see `neighbours`.
+        See `neighbours` for the bound.
         """
         last = self._last
         if last is None or not self._holds(last, x, motion, near):
@@ -124,9 +124,9 @@ class Meetings:
 
 @nb.njit(cache=True, nogil=True)
 def _within(x, before, reach, most_reach, longest, most_longest, room):  # type: ignore[no-untyped-def]
-    """Returns whether no two nodes moved nearer than by `room`, and none moves more than allowed.
+    """Returns whether no two nodes got nearer by more than `room`, and no limit is exceeded.
 
-    What all nodes do alike brings none nearer to another.
+    The mean motion is subtracted, as it brings no node nearer to another.
     """
     n = x.shape[0]
     m0 = m1 = m2 = 0.0
@@ -148,7 +148,7 @@ def _within(x, before, reach, most_reach, longest, most_longest, room):  # type:
 
 @nb.njit(cache=True, nogil=True)
 def _meeting(among, x, rest, spread, longest, near):  # type: ignore[no-untyped-def]
-    """Returns those of `among` (K,2) that may meet."""
+    """Returns the pairs in `among` (K,2) that may meet."""
     met = np.empty_like(among)
     count = 0
     for k in range(among.shape[0]):
@@ -163,7 +163,7 @@ def _meeting(among, x, rest, spread, longest, near):  # type: ignore[no-untyped-
 
 @nb.njit(cache=True, nogil=True)
 def _cells(x, reach, longest, near, room):  # type: ignore[no-untyped-def]
-    """Returns the box of all nodes and a size of cells: about the radius that is searched."""
+    """Returns the bounding box of all nodes, and a cell size of about the search radius."""
     low = np.full(3, np.inf)
     high = np.full(3, -np.inf)
     far, size = 0.0, 0.0
@@ -180,7 +180,7 @@ def _cells(x, reach, longest, near, room):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _bin(x, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Returns the nodes in order of cells, and where each cell begins."""
+    """Returns the nodes in cell order, and where each cell begins."""
     n = x.shape[0]
     n1, n2 = shape[1], shape[2]
     where = np.empty(n, dtype=np.int64)
@@ -208,7 +208,7 @@ def _search(  # type: ignore[no-untyped-def]
 ):
     """Writes i n + j, i < j, of nodes that may meet while the search holds.
 
-    Beyond the room of `met` it only counts.
+    Beyond the capacity of `met` it only counts.
     """
     n = x.shape[0]
     n1, n2 = shape[1], shape[2]
@@ -236,8 +236,8 @@ def _search(  # type: ignore[no-untyped-def]
         a1 = min(int((x0 + radius - low[0]) * inverse), shape[0] - 1)
         b1 = min(int((x1 + radius - low[1]) * inverse), n1 - 1)
         c1 = min(int((x2 + radius - low[2]) * inverse), n2 - 1)
-        # Only nodes behind this one in the order of cells: each two meet once. Whether a node is
-        # near is a coin toss to the processor, so they are gathered without branches first.
+        # Only nodes after this one in cell order, so that each two meet once. The processor cannot
+        # predict whether a node is near, so they are gathered without branches first.
         gathered = 0
         for a in range(a0, a1 + 1):
             for b in range(own if a == a0 else b0, b1 + 1):

@@ -1,8 +1,8 @@
-"""What a displacement is without its common part.
+"""A displacement without its rigid part.
 
-The common part costs nothing: the best-fitting twist t + ω × r is taken off. It is linear in r and
-its symmetric part is the identity, so along it no distance ever shrinks, and the distance of a pair
-can shrink at most by the relative motion of what is left.
+The rigid part is the best-fitting twist t + ω × r. It is linear in r, and the symmetric part of
+r + ω × r is the identity, so no distance shrinks along it. The distance of a pair can therefore
+shrink at most by the relative motion that is left without it.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from drake_dress.models.cloth.layers.topology import Topology
 
 @dataclass(frozen=True)
 class Motion:
-    """A displacement without its common part.
+    """A displacement without its rigid part.
 
     Attributes:
-        rest: (n,3) what the best-fitting twist leaves of the displacement, m.
-        spread: (n,) how far a node's neighbours depart from it at most, m.
-        reach: (n,) size of `rest` and `spread` together, m.
+        rest: (n,3) the displacement less the best-fitting twist, m.
+        spread: (n,) largest motion of a node's neighbours relative to it, m.
+        reach: (n,) length of `rest` plus `spread`, m.
         longest: (n,) squared length of the longest edge at a node, m².
         turn: angle of the twist, rad.
     """
@@ -70,7 +70,7 @@ def _take_off_twist(x, dx, rest):  # type: ignore[no-untyped-def]
         l0 += r1 * u2 - r2 * u1
         l1 += r2 * u0 - r0 * u2
         l2 += r0 * u1 - r1 * u0
-    # A little more inertia than there is: nodes on a line have none about it.
+    # Slightly increased inertia, because nodes on a line have none about it.
     more = 1e-9 * (xx + yy + zz) + 1e-300
     a00, a11, a22 = yy + zz + more, xx + zz + more, xx + yy + more
     a01, a02, a12 = -xy, -xz, -yz

@@ -1,10 +1,10 @@
-"""Which nodes and triangles, and which edges, may come near each other during a motion.
+"""Finds pairs of node and triangle, and of edges, that may come near each other during a motion.
 
-Pairs are found through nodes: when a node and a triangle, or two edges, are closer than d, then
-two of their corners are within sqrt(d² + (ℓ_i² + ℓ_j²)/3), ℓ the longest edge at each. So one
-uniform grid of nodes is searched (`meetings`), and only nodes that see another layer are looked at
-further. A pair belongs to its two closest corners, hence it is found once. What lies further apart
-than may be along where the cloth of one node faces, or along the line between both, is passed over.
+Pairs are found through nodes: if a node and a triangle, or two edges, are closer than d, then two
+of their corners are within sqrt(d² + (ℓ_i² + ℓ_j²)/3), ℓ the longest edge at each. So one uniform
+grid of nodes is searched (`meetings`), and only nodes near another layer are examined further. A
+pair belongs to its two closest corners, so it is found only once. Pairs are skipped if they are too
+far apart along the cloth normal at one node, or along the line between both nodes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from drake_dress.models.cloth.layers.topology import Topology
 
 @dataclass(frozen=True)
 class Passing:
-    """Who may pass through whom.
+    """Layers that may pass through each other.
 
     Attributes:
-        tangled: (n,) nodes among which everyone may.
-        astray: (n,) nodes behind a layer, which may come back through it.
-        around: (n,) nodes among which that layer is.
+        tangled: (n,) nodes that may all pass through each other.
+        astray: (n,) nodes that have passed a layer and may come back through it.
+        around: (n,) nodes that contain this layer.
     """
 
     tangled: BoolArray
@@ -36,7 +36,7 @@ class Passing:
     around: BoolArray
 
     def may(self, node: IntArray) -> BoolArray:
-        """Returns (P,) which pairs of nodes (P,4) may pass."""
+        """Returns (P,) which pairs of nodes (P,4) may pass through each other."""
         back = self.astray[node].any(axis=1) & self.around[node].all(axis=1)
         passing: BoolArray = np.logical_or(back, self.tangled[node].all(axis=1))
         return passing
@@ -48,7 +48,7 @@ class Pairs:
 
     Attributes:
         node: (P,4) node and triangle, or edge and edge.
-        kind: (P,) which of both.
+        kind: (P,) NODE_TRIANGLE or EDGE_EDGE.
         weights: (P,4) of the closest points at the start.
         direction: (P,3) unit vector between them, toward the first part.
         distance: (P,) m.
@@ -61,7 +61,7 @@ class Pairs:
     distance: FloatArray
 
     def without(self, passing: Passing | None) -> Pairs:
-        """Returns these without those that may pass."""
+        """Returns the pairs that may not pass through each other."""
         if passing is None:
             return self
         kept = ~passing.may(self.node)
@@ -72,7 +72,7 @@ class PairFinder:
     """Finds pairs; keeps work space only, so that results depend on the arguments alone.
 
     Args:
-        topology: of the mesh.
+        topology: topology of the mesh.
         edge: mean length of its edges, m.
         usual: see `Meetings`.
     """
@@ -85,7 +85,7 @@ class PairFinder:
     def find(self, x: FloatArray, motion: Motion, near: float) -> Pairs:
         """Returns all pairs that may come within `near`, m, when nodes at `x` move by `motion`.
 
-        Pairs that touch already have no side to be kept on and are left out.
+        Pairs that already touch have no defined side and are left out.
         """
         t = self._t
         met = self._meetings.find(x, motion, near)
@@ -152,13 +152,13 @@ def _pairs_at(  # type: ignore[no-untyped-def]
     n = x.shape[0]
     ring_i = np.full(n, -1, dtype=np.int32)
     ring_j = np.full(n, -1, dtype=np.int32)
-    # Of the neighbours of i and j: whether they may belong to a pair of this meeting (its number
-    # if so), and how far they stand out toward the other node.
+    # For the neighbours of i and j: the number of the meeting if they may belong to a pair of it,
+    # and how far they extend toward the other node.
     open_i = np.full(n, -1, dtype=np.int32)
     open_j = np.full(n, -1, dtype=np.int32)
     out_i = np.zeros(n)
     out_j = np.zeros(n)
-    # where cloth faces, and how high both parts of a meeting are along that
+    # cloth normals, and the heights of both parts of a meeting along them
     facing = _facing(x, triangle)
     height_i = np.zeros(n)
     height_j = np.zeros(n)
@@ -237,7 +237,7 @@ def _pairs_at(  # type: ignore[no-untyped-def]
 def _open(  # type: ignore[no-untyped-def]
     x, i, j, m, gap2, ring_j, joined_start, joined, is_open, out
 ):
-    """Marks the neighbours of i that are beyond j's ring and not closer to j than i is."""
+    """Marks the neighbours of i that are outside j's ring and not closer to j than i is."""
     for k in range(joined_start[i], joined_start[i + 1]):
         a = joined[k]
         d2 = squared(x, a, j)
@@ -248,7 +248,7 @@ def _open(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _facing(x, triangle):  # type: ignore[no-untyped-def]
-    """Returns (n,3) where cloth faces at each node, unit vectors, or zeros."""
+    """Returns (n,3) the cloth normal at each node, unit vectors, or zeros."""
     facing = np.zeros_like(x)
     for t in range(triangle.shape[0]):
         i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
@@ -274,7 +274,7 @@ def _parted(  # type: ignore[no-untyped-def]
 ):
     """Returns the gap between i and j, each with its open neighbours, along `facing` (3,), m.
 
-    Writes how high they are, mirrored so that j's part is the upper one.
+    Writes the heights of both parts, mirrored so that j's part is the upper one.
     """
     n0, n1, n2 = facing[0], facing[1], facing[2]
     high = n0 * x[i, 0] + n1 * x[i, 1] + n2 * x[i, 2]
@@ -297,7 +297,7 @@ def _parted(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _before(a, b, i, j):  # type: ignore[no-untyped-def]
-    """An order of pairs of nodes, for those that are equally far apart."""
+    """Returns whether (a, b) comes before (i, j), to order pairs that are equally far apart."""
     return min(a, b) < min(i, j) or (min(a, b) == min(i, j) and max(a, b) < max(i, j))
 
 
@@ -307,7 +307,7 @@ def _add(  # type: ignore[no-untyped-def]
 ):
     """Adds a pair if its distance may fall below `near`; beyond the capacity it only counts.
 
-    The arrays have one row more than their capacity, where what is not kept is written.
+    The arrays have one row beyond their capacity, where discarded pairs are written.
     """
     apart = max(squared(rest, i, k), squared(rest, i, l))
     if which == NODE_TRIANGLE:
@@ -332,7 +332,7 @@ def _add(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _along(x, i, j, k):  # type: ignore[no-untyped-def]
-    """Returns (x_k − x_i)·(x_j − x_i): how far k stands out from i toward j, by their distance."""
+    """Returns (x_k − x_i)·(x_j − x_i): how far k extends from i toward j, times their distance."""
     return (
         (x[k, 0] - x[i, 0]) * (x[j, 0] - x[i, 0])
         + (x[k, 1] - x[i, 1]) * (x[j, 1] - x[i, 1])

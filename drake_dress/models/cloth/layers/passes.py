@@ -1,17 +1,18 @@
 """Gauss-Seidel passes of inelastic impulses that keep a plane between the two parts of each pair.
 
-With linear motion, two convex parts that a fixed plane separates at the start and at the end of a
-motion are separated by it all along. So a pair is safe once a direction n is known along which its
-separation is positive at both ends: no cubic equation is solved. Three directions are tried, those
-between the closest points at the start, at the end and half-way: the first holds what comes head
-on, the others let a node slide past a border it is beside. Where all fail, the one that asks for
-least is kept, and an impulse along it shortens the relative displacement of the closest points
-(Bridson, Fedkiw and Anderson 2002, without repulsion) until the layers keep their thickness.
+If a fixed plane separates two convex parts at the start and at the end of a linear motion, it
+separates them all along. So a pair is safe once a direction n is known along which its separation
+is positive at both ends; no cubic equation is solved. Three directions are tried: those between the
+closest points at the start, at the end and half-way. The first stops head-on motion, the others let
+a node slide past a border beside it. If all fail, the direction with the least correction is kept,
+and an impulse along it reduces the relative displacement of the closest points (Bridson, Fedkiw and
+Anderson 2002, without repulsion) until the layers keep their thickness.
 
 Impulses are accumulated, so that one which others have made needless is taken back: the passes are
-projected Gauss-Seidel on the least correction by inverse masses. Its solution adds no energy, for
-every constraint allows no relative motion at all. The first passes take back, the last only add:
-that converges soon. What a corner of a part still lacks to its plane, a plain impulse adds.
+projected Gauss-Seidel iterations for the least mass-weighted correction. Its solution adds no
+energy, because zero relative motion satisfies every constraint. The first passes take impulses
+back, the last only add, which converges soon. A plain impulse moves corners that are still too
+close to the plane.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ import numpy as np
 
 from drake_dress.models.cloth.layers.closest import closest, offset, separation
 
-# What is left of a pair.
+# State of a pair.
 SAFE = 0
 THIN = 1
 CROSSING = 2
 IMMOVABLE = 3
-# Part of the thickness that corners keep from the plane; a pair is safe with half of it.
+# Share of the thickness that corners keep from the plane; a pair is safe with half of it.
 _CORNER = 0.2
-# Part of the thickness to which passes converge.
+# Tolerance of the passes, as a share of the thickness.
 _TOLERANCE = 0.02
-# Part of the thickness by which an impulse may be needless before it is taken back.
+# Excess that makes an impulse needless, so that it is taken back, as a share of the thickness.
 _NEEDLESS = 0.1
 _MOST_CORNERS = 4
-# A node goes at most this many times as far as a pair lacks. Where prescribed nodes leave only one
+# Largest displacement of a node, relative to what a pair lacks. If prescribed nodes leave only one
 # with a small weight, or one barred from nearly that direction, it would be thrown (34 m/s for a
 # coat on the floor); other pairs hold it better.
 MOST_LEVER = 4.0
@@ -69,22 +70,22 @@ def run_passes(  # type: ignore[no-untyped-def]
     applied_slot,
     applied_release,
 ):
-    """Corrects `dx` (n,3), m, in place; with `most_passes` 0 it only judges the pairs.
+    """Corrects `dx` (n,3), m, in place; with `most_passes` 0 it only classifies the pairs.
 
-    `pair` to `distance` are those of `Pairs`, `inverse_mass` (n,) is in 1/kg and 0 where a node may
-    not be moved, `barred` (n,3) holds unit directions along which it may not, or zeros, and
-    `take_back` says whether needless impulses are.
+    `pair` to `distance` are the fields of `Pairs`. `inverse_mass` (n,) is in 1/kg, 0 for nodes that
+    may not be moved. `barred` (n,3) holds unit directions along which a node may not be moved, or
+    zeros. `take_back` says whether needless impulses are taken back.
 
     Kept between calls: `clock` counts impulses, `evaluated` (P,) and `changed` (n,) hold its value
-    when a pair was last judged and a node last moved; `active` (P,) whether a plane is held,
-    `total` (P,) its accumulated impulse, kg m, `wanted` (P,) the separation it keeps, m, and its
-    `plane_weights` (P,4) and `plane_direction` (P,3).
+    when a pair was last evaluated and a node last moved. `active` (P,) says whether a pair has a
+    plane, `total` (P,) is its accumulated impulse, kg m, `wanted` (P,) the separation that it
+    keeps, m, `plane_weights` (P,4) and `plane_direction` (P,3) the plane.
 
-    `state` (P,) and the impulses in order, `applied_…` (K,…), are results; a slot is a pair's
-    number, -1 for a corner.
+    Results are `state` (P,) and the impulses in order, `applied_…` (K,…); a slot is the index of a
+    pair, -1 for a corner.
 
     Returns:
-        impulses written, clock, and whether another pass is due.
+        number of impulses written, clock, and whether another pass is due.
     """
     a = np.empty((4, 3))
     b = np.empty((4, 3))
@@ -114,7 +115,7 @@ def run_passes(  # type: ignore[no-untyped-def]
                 for k in range(3):
                     a[m, k] = x[node, k]
                     b[m, k] = x[node, k] + dx[node, k]
-            # the plane that is held already, or the one that asks for least
+            # the plane in use, or the one with the least correction
             if active[p]:
                 n0, n1, n2 = (
                     plane_direction[p, 0],
@@ -253,7 +254,7 @@ def transpose_impulses(  # type: ignore[no-untyped-def]
 ):
     """Runs the transposed impulses on `bar` (n,3) in place, last first.
 
-    `total_bar` (slots,) is the derivative by the accumulated impulses, zero at first.
+    `total_bar` (slots,) is the derivative by the accumulated impulses, initially zero.
     """
     for k in range(scale.shape[0] - 1, -1, -1):
         n0, n1, n2 = direction[k, 0], direction[k, 1], direction[k, 2]
@@ -287,7 +288,7 @@ def transpose_impulses(  # type: ignore[no-untyped-def]
 def _least_plane(  # type: ignore[no-untyped-def]
     a, b, middle, kind, local, thickness, weights, direction, distance, c, best
 ):
-    """Returns the direction that asks for the least correction; writes its weights to `best`."""
+    """Returns the direction with the least correction; writes its weights to `best`."""
     n0, n1, n2 = direction[0], direction[1], direction[2]
     for m in range(4):
         best[m] = weights[m]
@@ -341,7 +342,7 @@ def _push(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _mobility(nodes, weights, inverse_mass, barred, n0, n1, n2):  # type: ignore[no-untyped-def]
-    """Returns Σ c² n·W n, 1/kg, W the inverse mass across the barred direction; 0 if too little."""
+    """Returns Σ c² n·W n, 1/kg, W the inverse mass normal to `barred`; 0 if it is too little."""
     total = 0.0
     furthest = 0.0
     for m in range(4):

@@ -1,4 +1,4 @@
-"""Counts where a garment passes through itself; shares no code with what keeps layers apart."""
+"""Finds where a garment passes through itself, by a test independent of layer separation."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drake_dress.models.cloth.elements import Elements
 
 
 def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArray:
-    """Returns (k,2) the edges that pierce triangles, as (edge, triangle).
+    """Returns (k,2) the pairs (edge, triangle) in which the edge pierces the triangle.
 
     Args:
         x: (n,3) positions, m.
         elements: the mesh; edges that share a node with a triangle are left out.
-        rings: leaves out as well edges of which a node is joined to one of the triangle's by this
-            many edges or fewer.
+        rings: also leaves out edges with a node that this many edges or fewer connect to one of the
+            triangle's.
     """
     e = elements
     found = piercings(x, e.edge, e.triangle)
@@ -28,7 +28,7 @@ def piercing_edges(x: FloatArray, elements: Elements, rings: int = 0) -> IntArra
 
 
 def piercings(x: FloatArray, edge: IntArray, triangle: IntArray) -> IntArray:
-    """Returns (k,2) which of the edges (E,2) pierce which of the triangles (F,3), as rows of both.
+    """Returns (k,2) rows of edges (E,2) and of the triangles (F,3) that they pierce.
 
     Args:
         x: (n,3) positions, m.
@@ -49,7 +49,7 @@ def piercings(x: FloatArray, edge: IntArray, triangle: IntArray) -> IntArray:
 
 
 def told_apart(found: IntArray, elements: Elements, reach: Sequence[IntArray]) -> BoolArray:
-    """Returns (k,) which edges and triangles (k,2) are no neighbours, `reach` of `within_rings`."""
+    """Returns (k,) which (edge, triangle) in (k,2) are no neighbours; `reach` of `within_rings`."""
     edge, triangle = elements.edge, elements.triangle
     apart = [
         not any(np.isin(reach[int(node)], triangle[t]).any() for node in edge[k]) for k, t in found
@@ -105,7 +105,7 @@ def _pierced(x, edge, triangle, low, axis, longest):  # type: ignore[no-untyped-
 
 @nb.njit(cache=True, nogil=True)
 def _pierces(p, q, a, b, c):  # type: ignore[no-untyped-def]
-    """The ends lie on both sides, and the edge's line passes within all three sides."""
+    """Returns whether the ends lie on both sides and the edge's line passes between all sides."""
     if _volume(a, b, c, p) * _volume(a, b, c, q) >= 0.0:
         return False
     first = _volume(p, q, a, b)

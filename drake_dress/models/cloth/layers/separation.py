@@ -1,13 +1,13 @@
-"""Keeps the layers of a garment apart: a correction of the displacement of a time step.
+"""Keeps the layers of a garment apart by correcting the displacement of a time step.
 
-Any scheme may propose a displacement; what comes back crosses nothing that it did not cross
-before. The idea, in order: find the pairs that may come near (`neighbours`), take away their
-approach by impulses (`passes`), let what would still cross move rigidly (`zones`).
+Any scheme may propose a displacement; the corrected one crosses nothing that it did not cross
+before. The steps are: find the pairs that may come near (`neighbours`), remove their approach by
+impulses (`passes`), move what would still cross as rigid bodies (`impact_zones`).
 
-A displacement whose relative motion is large against the mesh is taken in parts: within a part the
-motion is linear, between parts pairs and planes are found anew. The path is then a polygon, along
-which nothing crosses. A node's displacement in a part starts from what the parts before left of
-it, as after an inelastic collision.
+A displacement with relative motion that is large against the mesh is divided into parts. Within a
+part the motion is linear; between parts, pairs and planes are computed anew. The path is then a
+polygon along which nothing crosses. A node's displacement in a part is what the earlier parts have
+left of it, as after an inelastic collision.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from drake_dress.models.cloth.layers.passes import (
 from drake_dress.models.cloth.layers.topology import make_topology
 from drake_dress.models.cloth.vectors import largest_length
 
-# Relative motion in one part of a step, by the mean edge length.
+# Largest relative motion in one part of a step, in mean edge lengths.
 _LONGEST_PART = 1.0
 _MOST_PARTS = 64
-# Angle, rad, or relative motion by the mean edge length, from which the garment's rotation is taken
-# off exactly.
+# Angle, rad, or relative motion, in mean edge lengths, above which the garment's rotation is
+# subtracted exactly.
 _TURN = 0.05
 _FAR = 4.0
-# Corrections that the search for pairs allows for before it is repeated, by the mean edge length.
+# Corrections that the search for pairs allows for before it is repeated, in mean edge lengths.
 _SLACK = 0.15
-# Part of the thickness that pairs may lose unseen by such corrections.
+# Share of the thickness that pairs outside the search may lose by such corrections.
 _UNSEEN = 0.5
 _PASSES = 64
 _PASSES_AT_ONCE = 4
-# Passes that take needless impulses back.
+# First passes, which take needless impulses back.
 _TAKE_BACK = 8
 _ROUNDS = 6
 _ZONE_ROUNDS = 40
-# How often those that would still cross are given way to: what yields moves its neighbours.
+# How often nodes that would still cross are made to yield, since yielding moves their neighbours.
 _YIELDS = 3
 
 
@@ -59,7 +59,7 @@ class Impulses:
         node: (K,4); weights: (K,4) signed, of the closest points or of two corners.
         direction: (K,3) unit; scale: (K,) 1 / Σ c² n·W n, kg.
         slot: (K,) which accumulated impulse it adds to, -1 for none.
-        release: (K,) whether it takes the whole of that back.
+        release: (K,) whether it takes the whole accumulated impulse back.
         slots: number of accumulated impulses.
     """
 
@@ -74,22 +74,21 @@ class Impulses:
 
 @dataclass(frozen=True)
 class SeparationRecord:
-    """How a displacement was corrected; enough to run the correction's transpose.
+    """Record of a correction, sufficient to run its transpose.
 
     Attributes:
         parts: the impulses and zones of each part of the step, in order of application.
-        rate_change: (n,3) change of the displacement per step at the end of the step, m: after
-            the last collision. With one part it is dx' − dx; divided by the time step it is the
-            change of velocity.
-        frame: (3,3) axes in which directions and barred directions are expressed, as columns:
-            those of an observer who turns with the garment, where it turns far.
-        inverse_mass: (n,) as given, or as what yielded has it; barred: (n,3) likewise, in the
+        rate_change: (n,3) change of the displacement per step after the last collision, m. With one
+            part it is dx' − dx; divided by the time step it is the change of velocity.
+        frame: (3,3) axes in which directions and barred directions are expressed, as columns. They
+            rotate with the garment if it rotates far.
+        inverse_mass: (n,) as given, or that of yielding nodes; barred: (n,3) likewise, in the
             frame's axes.
-        thin: pairs left closer than the thickness asks for, after the last part.
-        crossing: pairs that could not be kept apart, over all parts: only where motions that are
-            prescribed leave no way. unparted: (4 crossing,) their nodes.
-        zones: rigid zones over all parts.
-        pairs: pairs that were looked at in the last part.
+        thin: number of pairs left closer than the thickness requires, after the last part.
+        crossing: number of pairs that could not be kept apart, over all parts: above 0 only if
+            prescribed motions make crossing unavoidable. unparted: (4 crossing,) their nodes.
+        zones: number of rigid zones over all parts.
+        pairs: number of pairs examined in the last part.
     """
 
     parts: tuple[tuple[Impulses | Zone, ...], ...]
@@ -120,7 +119,7 @@ class _Counts:
 
 
 class _Work:
-    """What passes keep between calls, for P pairs, n nodes and K impulses."""
+    """Arrays that passes keep between calls, for P pairs, n nodes and K impulses."""
 
     def __init__(self, pairs: int, nodes: int, room: int) -> None:
         self.take_back = False
@@ -145,21 +144,20 @@ class _Work:
 class LayerSeparation:
     """Corrects displacements so that a garment does not pass through itself.
 
-    The object keeps work space only: a fresh one returns the same. A scheme that keeps a velocity
-    beside its displacement gives the nodes with a `rate_change` the velocity
-    (dx + rate_change) / h and leaves the others: adding rate_change / h to a velocity that differs
-    from dx / h fed energy into a sheet that rests on another.
+    The object keeps work space only: a new one returns the same. A scheme with a velocity beside
+    its displacement gives the nodes with a `rate_change` the velocity (dx + rate_change) / h and
+    leaves the others unchanged. Adding rate_change / h to a velocity other than dx / h fed energy
+    into a sheet that rests on another.
 
     Limitations: layers slide on each other without friction; nodes and edges that are joined by
-    `rings` edges or fewer are not told apart (a fold may close on itself there); layers that cross
-    at the start stay crossed; an impulse knows nothing of the person, who has to be given as
-    inverse masses and barred directions; what yields enters the person, and contact has to drive
-    it out again.
+    `rings` edges or fewer are not kept apart (a fold may close on itself there); layers that cross
+    at the start stay crossed; the person enters only through inverse masses and barred directions;
+    yielding nodes enter the person, and contact has to push them out again.
 
     Args:
         elements: the mesh.
-        thickness: distance that layers keep, m; those closer at the start come no closer.
-        rings: nodes joined by this many edges or fewer belong together.
+        thickness: distance kept between layers, m; layers that start closer come no closer.
+        rings: nodes joined by this many edges or fewer count as one layer.
 
     Raises:
         ValueError: the thickness is not a positive number, or `rings` is below 1.
@@ -184,8 +182,8 @@ class LayerSeparation:
 
         Args:
             x: (n,3) positions at the start of the step, m.
-            dx: (n,3), m.
-            within: m.
+            dx: (n,3) displacement, m.
+            within: distance, m.
         """
         return self._finder.find(x, relative_motion(self._topology, x, dx), within)
 
@@ -198,21 +196,21 @@ class LayerSeparation:
         passing: Passing | None = None,
         yielding: FloatArray | None = None,
     ) -> tuple[FloatArray, SeparationRecord]:
-        """Returns the corrected displacement (n,3), m, and how it came about.
+        """Returns the corrected displacement (n,3), m, and the record of the correction.
 
         Args:
             x: (n,3) positions at the start of the step, m.
             dx: (n,3) displacement that a scheme proposes, m; not changed.
             inverse_mass: (n,) 1/kg, 0 for nodes whose motion is prescribed. A scheme that solves a
-                stiff system P Δx = … shares a push among many nodes; at large steps the diagonal
-                of P⁻¹ says better than 1/m which layer yields.
+                stiff system P Δx = … spreads a push over many nodes; at large steps the diagonal of
+                P⁻¹ is better than 1/m.
             barred: (n,3) unit direction along which a node may not be moved (the normal where it
                 slips on the person), zero for the others; None for no such node.
-            passing: who may pass through whom; None for nobody.
-            yielding: (n,) 1/kg of nodes where nothing bars them, 0 for those whose motion is
-                prescribed whatever it costs. Those that would cross are moved by it: a fold that is
-                pinched between an arm and a chest makes room for itself in the flesh, and slips
-                where it stuck. None where nothing yields.
+            passing: layers that may pass through each other; None for none.
+            yielding: (n,) 1/kg of nodes without constraints, 0 for those whose motion stays
+                prescribed in any case. Nodes that would still cross get this inverse mass: a fold
+                pinched between an arm and a chest presses into the flesh, and slips where it stuck.
+                None if nothing yields.
 
         Raises:
             ValueError: an array has another shape.
@@ -250,15 +248,15 @@ class LayerSeparation:
         m: FloatArray,
         passing: Passing | None,
     ) -> tuple[FloatArray, SeparationRecord]:
-        """Returns what `correct` does where nothing yields."""
+        """Returns the result of `correct` if nothing yields."""
         proposed, frame = dx, np.eye(3)
         motion = relative_motion(self._topology, x, dx)
         furthest = 2.0 * float(motion.reach.max())
-        # The twist of a rotation by half a turn has no angle, but leaves much.
+        # The twist of a rotation by half a turn has no angle, but leaves a large motion.
         turned = motion.turn > _TURN or furthest > _FAR * self._edge
         if turned:
-            # Straight paths of a turning garment close in on each other, those seen by an observer
-            # who turns along do not; what crosses nothing for one crosses nothing for the other.
+            # Straight paths of a rotating garment approach each other, but not in a frame that
+            # rotates with it; paths that do not cross in one frame do not cross in the other.
             frame, dx = _seen_by_a_turning_observer(x, dx)
             m = m @ frame
             motion = relative_motion(self._topology, x, dx)
@@ -281,7 +279,7 @@ class LayerSeparation:
                 parts.append(())
             if count > 1:
                 lag = lag + (rate - dx) / count
-        # What was not touched comes back bit for bit.
+        # Nodes that were not corrected come back bit for bit.
         corrected, rate_change = proposed.copy(), np.zeros((self._n, 3))
         if any(parts):
             rate_change = (rate - dx) @ frame.T
@@ -304,7 +302,7 @@ class LayerSeparation:
     def correct_vjp(self, record: SeparationRecord, bar: FloatArray) -> FloatArray:
         """Returns ∂L/∂dx (n,3) from `bar` (n,3) = ∂L/∂dx'.
 
-        Pairs, weights, directions, the frame, and which impulses act are held.
+        Pairs, weights, directions, the frame, and which impulses act are held fixed.
         """
         count = len(record.parts)
         turned = bar @ record.frame
@@ -330,7 +328,7 @@ class LayerSeparation:
         counts: _Counts,
         motion: Motion | None,
     ) -> None:
-        """Corrects `dx` in place and notes what was done."""
+        """Corrects `dx` in place and records the result in `counts`."""
         counts.thin = 0
         for _ in range(_ROUNDS):
             pairs = self._find(x, dx, counts.passing, motion)
@@ -340,7 +338,7 @@ class LayerSeparation:
                 return
             before = dx.copy()
             state = self._impulses(x, dx, w, barred, pairs, counts, _PASSES)
-            # Pairs that were not looked at are still apart after corrections this small.
+            # Pairs outside the search are still apart after corrections this small.
             complete = 2.0 * largest_length(dx - before) <= self._slack + _UNSEEN * self.thickness
             if complete:
                 break
@@ -366,7 +364,7 @@ class LayerSeparation:
         counts: _Counts,
         passes: int,
     ) -> IntArray:
-        """Runs passes on `dx` in place and returns what is left of each pair (P,)."""
+        """Runs passes on `dx` in place and returns the state of each pair (P,)."""
         work = _Work(len(pairs.kind), self._n, 5 * len(pairs.kind) + 8)
         clock, due = 1, True
         done: list[tuple[np.ndarray, ...]] = []
@@ -441,7 +439,7 @@ class LayerSeparation:
         complete: bool,
         counts: _Counts,
     ) -> None:
-        """Lets what would cross move rigidly, until nothing crosses that can be helped."""
+        """Moves what would cross as rigid zones, until no avoidable crossing is left."""
         union = Union()
         zone = np.full(self._n, -1, dtype=np.int32)
         if not complete:
@@ -449,7 +447,7 @@ class LayerSeparation:
             state = self._judge(x, dx, w, barred, pairs)
         for _ in range(_ZONE_ROUNDS):
             crossing = state == CROSSING
-            # A zone that moves as one is safe, unless prescribed motions differ in it.
+            # A zone that moves rigidly is safe, unless prescribed motions differ in it.
             one = zone[pairs.node]
             together = (one[:, 0] >= 0) & np.all(one == one[:, :1], axis=1)
             new = np.flatnonzero(crossing & ~together)

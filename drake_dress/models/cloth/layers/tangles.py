@@ -1,17 +1,17 @@
 """Leads layers back that have passed through each other.
 
-Nothing crosses where nodes are free, but a gripper that presses a fold against the person leaves
-no way (`SeparationRecord.crossing`); what has crossed would stay so for ever, for layers are kept
-on the sides that they are on. So where edges pierce triangles layers may pass each other again, and
-are moved, by impulses that take the least of it, as fast as they shall be led back:
+Free nodes do not cross, but a gripper that presses a fold against the person can make crossing
+unavoidable (`SeparationRecord.crossing`). Crossed layers would then stay crossed for ever, because
+layers are kept on their current sides. So where edges pierce triangles, layers may pass each other
+again. The smallest sufficient impulses lead them back at a given speed:
 
-- each edge against the triangle that it pierces, in the direction in which the line along which the
-  layers meet becomes shorter (Volino and Magnenat-Thalmann, Resolving surface collisions through
-  intersection contour minimization, 2006);
-- nodes that are astray, back through the layer that they are behind: those that the edges that
-  pierce cut off from most of the garment (as Baraff, Witkin and Kass, Untangling cloth, 2003).
+- each edge relative to the triangle that it pierces, in the direction that shortens the
+  intersection contour of the layers (Volino and Magnenat-Thalmann, Resolving surface collisions
+  through intersection contour minimization, 2006);
+- stray nodes, back through the layer that they have passed: those that piercing edges cut off from
+  most of the garment (as Baraff, Witkin and Kass, Untangling cloth, 2003).
 
-No history is needed: line and sides are those of the moment.
+No history is needed: contours and sides follow from the current positions.
 """
 
 from __future__ import annotations
@@ -36,22 +36,23 @@ from drake_dress.models.cloth.layers.piercing import (
     within_rings,
 )
 
-# A line whose direction to go is less sure than this is led back slower.
+# Gradient of the contour length below which an edge is led back more slowly, as its direction is
+# less certain.
 _SURE = 0.5
-# Rings of nodes around what pierces within which astray nodes may pass, and which are searched for
-# what pierces after a step.
+# Rings of nodes around piercings within which stray nodes may pass, and which are searched for
+# piercings after a step.
 _AROUND = 2
-# Passes over all that is led back.
+# Passes of the projections that lead layers back.
 _PASSES = 8
 
 
 @dataclass(frozen=True)
 class Tangle:
-    """What pierces at a moment, and who is astray.
+    """Piercings at one moment, and the stray nodes.
 
     Attributes:
-        edge, triangle: (k,) that pierce.
-        passing: who may pass whom.
+        edge, triangle: (k,) edges and the triangles that they pierce.
+        passing: layers that may pass through each other.
     """
 
     edge: IntArray
@@ -61,11 +62,11 @@ class Tangle:
 
 @dataclass(frozen=True)
 class _Ways:
-    """Differences of points of two layers, and where they are to go.
+    """Differences of points of two layers, and their ways back.
 
     Attributes:
         node: (m,5); weights: (m,5), those of the second layer negative.
-        direction: (m,3) of length 1; speed: (m,) as a share.
+        direction: (m,3) of length 1; speed: (m,) as a share of the full speed.
     """
 
     node: IntArray
@@ -75,11 +76,11 @@ class _Ways:
 
 
 class Tangles:
-    """Finds what pierces on a mesh, and leads it back.
+    """Finds piercings of a mesh, and leads layers back.
 
     Args:
         elements: the mesh.
-        rings: nodes joined by this many edges or fewer belong together, as in `LayerSeparation`.
+        rings: nodes joined by this many edges or fewer count as one layer, as in `LayerSeparation`.
     """
 
     def __init__(self, elements: Elements, rings: int = 1) -> None:
@@ -88,22 +89,22 @@ class Tangles:
         self._opposite = _opposite_nodes(elements)
 
     def everywhere(self, x: FloatArray) -> BoolArray:
-        """Returns (n,) which nodes are of an edge or a triangle that pierces at `x` (n,3), m."""
+        """Returns (n,) which nodes belong to a piercing edge or triangle at `x` (n,3), m."""
         return self._nodes_of(piercing_edges(x, self._elements, self._rings))
 
     def near(self, x: FloatArray, tangled: BoolArray) -> BoolArray:
-        """Returns the same, looked for near nodes (n,).
+        """Returns the same, searched for only near the nodes `tangled` (n,).
 
-        Near those that were of such a step before, and those that were not kept apart in it
-        (`SeparationRecord.unparted`): elsewhere nothing has begun to pierce.
+        These are the result for the previous step, plus the nodes of pairs that the step did not
+        keep apart (`SeparationRecord.unparted`): elsewhere no piercing can have begun.
         """
         return self._nodes_of(self._piercings(x, self._grown(tangled, _AROUND)))
 
     def at(self, x: FloatArray, tangled: BoolArray) -> Tangle:
-        """Returns the tangle of nodes (n,) that `everywhere` or `near` told at `x` (n,3), m."""
+        """Returns the tangle at `x` (n,3), m, of nodes (n,) from `everywhere` or `near`."""
         found = self._piercings(x, tangled)
         around = self._grown(tangled, _AROUND)
-        # further in, they follow: a cut-off sleeve is not drawn back as a whole
+        # Nodes further in follow by themselves: a cut-off sleeve is not drawn back as a whole.
         astray = self._astray(found[:, 0]) & around
         return Tangle(found[:, 0], found[:, 1], Passing(tangled, astray, around))
 
@@ -117,16 +118,16 @@ class Tangles:
         pairs: Pairs,
         step: float,
     ) -> FloatArray:
-        """Returns a displacement (n,3), m, with what pierces and who is astray on their way back.
+        """Returns a displacement (n,3), m, that leads piercing layers and stray nodes back.
 
         Args:
-            tangle: at x.
+            tangle: tangle at x.
             x: (n,3) positions at the start of the step, m.
             dx: (n,3) displacement that a scheme proposes, m.
-            inverse_mass: (n,) 1/kg, 0 for nodes that are not to be moved.
+            inverse_mass: (n,) 1/kg, 0 for nodes that must not be moved.
             barred: (n,3) unit directions along which nodes may not be moved, or zero.
-            pairs: that are near each other at x.
-            step: by which layers are led back, m.
+            pairs: pairs that are near each other at x.
+            step: distance by which layers are led back, m.
         """
         ways = _together(self._shorter(x, tangle), _back_through(tangle, pairs))
         bar = barred[ways.node]
@@ -142,7 +143,7 @@ class Tangles:
         return moved
 
     def _shorter(self, x: FloatArray, tangle: Tangle) -> _Ways:
-        """Returns how the lines become shorter along which layers meet."""
+        """Returns the ways that shorten the intersection contours."""
         e = self._elements
         rows = [
             self.meeting(x, int(k), int(t))
@@ -156,11 +157,11 @@ class Tangles:
         return _Ways(node, weights, direction, length / np.sqrt(length**2 + _SURE**2))
 
     def meeting(self, x: FloatArray, k: int, t: int) -> tuple[FloatArray, FloatArray]:
-        """Returns where edge k pierces triangle t, and where the edge is to go.
+        """Returns where edge k pierces triangle t, and the direction in which the edge should go.
 
         Returns:
             (5,) weights of the nodes of both in the difference of the points that meet; (3,) minus
-            the gradient of the line's length by it, layers taken to be stiff.
+            the gradient of the contour length by this difference, for rigid layers.
         """
         e = self._elements
         p, q = x[e.edge[k]]
@@ -186,7 +187,7 @@ class Tangles:
         return np.concatenate([[1.0 - share, share], -_barycentric(point, corner)]), way
 
     def _astray(self, edge: IntArray) -> BoolArray:
-        """Returns (n,) who is cut off from most of a piece of the garment by edges (k,)."""
+        """Returns (n,) which nodes edges (k,) cut off from most of their piece of the garment."""
         n, edges = self._elements.node_count, self._elements.edge
         astray = np.zeros(n, dtype=np.bool_)
         if not len(edge):
@@ -199,7 +200,7 @@ class Tangles:
         return size[left] < largest[whole]
 
     def _piercings(self, x: FloatArray, marked: BoolArray) -> IntArray:
-        """Returns (k,2) edges and triangles that pierce, of those whose nodes are all marked."""
+        """Returns (k,2) piercing edges and triangles, among those with all nodes marked."""
         e = self._elements
         edge = np.flatnonzero(marked[e.edge].all(axis=1))
         triangle = np.flatnonzero(marked[e.triangle].all(axis=1))
@@ -209,7 +210,7 @@ class Tangles:
 
     @cached_property
     def _reach(self) -> list[IntArray]:
-        """Who belongs together; few garments ever ask."""
+        """Rings of each node; computed on demand, because few garments need them."""
         return within_rings(self._elements, self._rings)
 
     def _grown(self, marked: BoolArray, rings: int) -> BoolArray:
@@ -228,13 +229,13 @@ class Tangles:
 
 
 def _back_through(tangle: Tangle, pairs: Pairs) -> _Ways:
-    """Returns how astray nodes, and triangles of them, go back through what they are near to."""
+    """Returns the ways of stray nodes, and of their triangles, back through the layer near them."""
     p = tangle.passing
     node, triangle = p.astray[pairs.node[:, 0]], p.astray[pairs.node[:, 1:]].any(axis=1)
-    # both astray are on their right sides of each other
+    # if both parts are astray, they are on their right sides of each other
     chosen = (pairs.kind == NODE_TRIANGLE) & (node != triangle) & p.around[pairs.node].all(axis=1)
     nodes, weights = pairs.node[chosen], pairs.weights[chosen]
-    # five nodes as of edge and triangle, one of which has no weight
+    # five nodes, as for edge and triangle; one has no weight
     return _Ways(
         np.concatenate([nodes, nodes[:, :1]], axis=1),
         np.concatenate([weights, np.zeros((len(nodes), 1))], axis=1),
@@ -283,10 +284,10 @@ def _barycentric(point: FloatArray, corner: FloatArray) -> FloatArray:
 
 @nb.njit(cache=True, nogil=True)
 def _project(node, weights, direction, push, wanted, passes, dx):  # type: ignore[no-untyped-def]
-    """Moves `dx` (n,3), m, in place until each way goes as far as is wanted, (m,) m.
+    """Moves `dx` (n,3), m, in place until each way reaches the wanted distance (m,), m.
 
-    One way after the other: each is a projection onto a half-space, so that ways which cannot be
-    gone together move what they share to and fro, but never further.
+    Ways are treated one after the other, each by a projection onto a half-space. So conflicting
+    ways move their shared nodes to and fro, but never further.
     """
     for _ in range(passes):
         for m in range(wanted.shape[0]):

@@ -1,4 +1,4 @@
-"""Who belongs to whom on the mesh, as compressed rows; from the mesh alone."""
+"""Neighbourhoods of nodes on the mesh, as compressed rows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Topology:
         edge: (E,2) nodes.
         joined_start, joined: nodes that share an edge with a node.
         around_start, around: triangles around a node.
-        ring_start, ring: nodes too close on the mesh to be told apart, itself included, sorted.
+        ring_start, ring: nodes too close on the mesh to be another layer, itself included, sorted.
     """
 
     node_count: int

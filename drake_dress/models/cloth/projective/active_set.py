@@ -1,7 +1,7 @@
 """One round of the active set of contact with friction, as kernels over the nodes.
 
-`bind` acts on positions, before the forces are known; `classify` on modes, by these forces. The
-state of the nodes belongs to `iterated_contact.IteratedContact`, which says what the round is for.
+`bind` changes positions, before the forces are known; `classify` changes modes, by these forces.
+The state of the nodes belongs to `iterated_contact.IteratedContact`; its module has the method.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
-# Gaps and displacements are told from zero at this share of the tolerance.
+# Share of the tolerance at which gaps and displacements are distinguished from zero.
 _SHARP = 0.01
 # A slipping node whose displacement falls below the tolerance, or to this share in an iteration, is
-# tried as sticking: as slipping it would come to rest in the limit only.
+# tried as sticking: as slipping it would come to rest only in the limit.
 _STOPPING = 0.7
-# A node that was tried so often in a step keeps slipping, with c finite; one that landed so often
-# lands slipping.
+# After this many trials of sticking in a step a node keeps slipping, with finite c; after this many
+# landings it lands slipping.
 _MOST_FLIPS = 4
-# With each landing in a step the bounds that tell contact from none widen so much, up to the
-# tolerance: a node that hardly touches would come and go for ever.
+# Factor by which each landing in a step widens the bounds between contact and none, up to the
+# tolerance. Otherwise a node that hardly touches would come and go for ever.
 _WIDENING = 2.0
 
 
@@ -39,9 +39,9 @@ def leaps(mode: IntArray, gap: FloatArray, motion: FloatArray, least: float) -> 
 
 @nb.njit(cache=True, nogil=True)
 def due(x: FloatArray, checked: FloatArray, gap: FloatArray, mode: IntArray) -> BoolArray:
-    """Returns (n,) where the gap found at `checked` (n,3), inf for never, may mislead at `x` (n,3).
+    """Returns (n,) which gaps, found at `checked` (n,3), inf for never, may mislead at `x` (n,3).
 
-    A free node need not be looked at before it may have used up half of its gap.
+    A free node needs no check before it may have used up half of its gap.
     """
     out = np.zeros(x.shape[0], dtype=np.bool_)
     for i in range(x.shape[0]):
@@ -81,28 +81,28 @@ def bind(  # type: ignore[no-untyped-def]
     landings,
     friction,
 ):
-    """Closes gaps along normals, takes tangential motion from sticking nodes, notes w_T.
+    """Closes gaps along normals, removes tangential motion of sticking nodes, records w_T.
 
     Args:
         x: (n,3) positions, changed in place, m.
         carried: (n,3) start of the step, carried with the surfaces, m.
         height: (n,) gap there, m.
-        gap: (n,) of the iterate, m.
+        gap: (n,) gap of the iterate, m.
         target: (n,) gap to reach, m.
         slope: (n,) and
         normal: (n,3): the gradient of the gap is slope · normal.
         tolerance: accuracy of positions, m.
         landing_slip: tangential displacement above which a node lands sliding, m.
-        mode: (n,) changed in place, as all that follows.
-        stopped: (n,) whether it was stopped at a surface on its way.
-        fresh: (n,) whether it landed just now.
-        base: (n,3) from where w is measured, m.
+        mode: (n,) changed in place, as all that follow.
+        stopped: (n,) whether the node was stopped at a surface on its path.
+        fresh: (n,) whether it has just landed.
+        base: (n,3) point from which w is measured, m.
         slid: (n,3) w_T, m.
-        landings: (n,) in this step.
-        friction: (n,3) h² N.
+        landings: (n,) number of landings in this step.
+        friction: (n,3) friction, h² N.
 
     Returns:
-        How many landed.
+        Number of nodes that landed.
     """
     landed = 0
     for i in range(x.shape[0]):
@@ -114,7 +114,7 @@ def bind(  # type: ignore[no-untyped-def]
         if m == 3 or (m == 0 and not lands):
             continue
         if m == 0:
-            # it touches where the straight way from its start enters the surface
+            # the node touches where its straight path enters the surface
             share = 1.0
             if gap[i] < height[i]:
                 share = min(1.0, height[i] / (height[i] - gap[i]))
@@ -165,26 +165,26 @@ def classify(  # type: ignore[no-untyped-def]
     resistance,
     friction,
 ):
-    """Takes off, sticks and slips by the residual (n,3), h² N, and sets friction; see `bind`.
+    """Updates modes and friction from the residual (n,3), h² N; see `bind`.
 
     Args:
-        residual: (n,3) of the equations of motion without contact, h² N.
-        normal: (n,3) of the surfaces.
+        residual: (n,3) residual of the equations of motion without contact, h² N.
+        normal: (n,3) normals of the surfaces.
         mu: (n,) Coulomb coefficient.
-        adhesion: (n,) pull that a contact bears, h² N.
+        adhesion: (n,) tension that a contact bears, h² N.
         tolerance: accuracy of positions, m.
         weight: (n,) tolerance times mass, kg m: a force h² N that moves a node by the tolerance.
-        mode: (n,) changed in place, as all that follows.
-        fresh: (n,) whether it landed just now.
+        mode: (n,) changed in place, as all that follow.
+        fresh: (n,) whether the node has just landed.
         slid: (n,3) w_T, m.
         last_slid: (n,) its size in the last iteration, m.
         flips: (n,) how often sticking was tried in this step.
-        landings: (n,) in this step.
+        landings: (n,) number of landings in this step.
         resistance: (n,) c, h² N/m.
-        friction: (n,3) h² N.
+        friction: (n,3) friction, h² N.
 
     Returns:
-        How many changed.
+        Number of nodes that changed.
     """
     changed = 0
     for i in range(mode.shape[0]):

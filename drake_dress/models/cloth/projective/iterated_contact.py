@@ -1,24 +1,24 @@
-"""Contact with dry friction that is found anew at every iterate of an implicit step.
+"""Contact with dry friction, detected at every iterate of an implicit step.
 
-All is judged at the end of the step: obstacles stand where their velocities take them, gaps and
-normals are those of the iterate, and the displacement w of a node relative to the surface is
-measured from where the surface has carried it, for one that lands from where its way enters the
-surface, so that
+Everything is evaluated at the end of the step: obstacles have moved with their velocities, and gaps
+and normals are those of the iterate. The displacement w of a node relative to the surface starts
+where the surface has carried the node. For a node that lands, it starts where its path enters the
+surface. The modes are
 
     free     gap ≥ 0,  r = 0
     stick    gap = 0,  w_T = 0,  ‖r_T‖ ≤ μ r_N
     slip     gap = 0,  r_T = −μ r_N w_T / ‖w_T‖
 
 with r the residual of the equations of motion. Each iteration applies one round of an active set:
-nodes that have entered a surface are put onto it, nodes that it would have to pull take off, those
-whose friction leaves the cone slip. Friction of slipping nodes enters as a resistance c w_T,
-c = μ r_N / ‖w_T‖ of the last iterate: for a given r_N its energy lies above that of dry friction
-and touches it there (as Weiszfeld's iteration does), so that iterating is a descent and does not
-swing from side to side however small w_T is.
+nodes that have entered a surface are put onto it, nodes that it would have to pull take off, and
+nodes with friction beyond the cone slip. Friction of slipping nodes enters as a resistance c w_T,
+c = μ r_N / ‖w_T‖ of the last iterate. For a given r_N its energy lies above that of dry friction
+and touches it there (as in Weiszfeld's iteration), so that the iteration descends and does not
+oscillate, however small w_T is.
 
-An iterate may be far from the last one, so free nodes that move far are followed on their way, in
-the frame of the body that was nearest: one that sits between two bodies which move apart by more
-than their own size in a step may be missed by the second.
+An iterate may be far from the last one, so free nodes that move far are followed on their path, in
+the frame of the body that was nearest. If a node sits between two bodies that move apart by more
+than their own size in a step, contact with the second may be missed.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from drake_dress.models.cloth.influences import ContactLaw
 from drake_dress.models.cloth.projective import active_set
 from drake_dress.models.cloth.state import ClothState
 
-# A node deeper than its margin leaves at most this fast, m/s: faster, it would be thrown.
+# Largest velocity that pushes a node out to its margin, m/s; a larger one would throw it.
 _LARGEST_PUSH = 0.2
 # Tangential speed above which a node lands sliding, m/s.
 _LANDING_SLIP_SPEED = 5e-3
-# Gap up to which a node keeps the contact of the step before, m.
+# Gap up to which a node keeps the contact of the previous step, m.
 _KEPT_GAP = 1e-3
-# A free node that moves less than this in an iteration cannot leap over anything, m.
+# Motion in an iteration, m, below which a free node cannot leap over anything.
 _LARGEST_LEAP = 5e-3
-# Legs in which a leap is followed at most: a leap's share below which surfaces may be missed.
+# Maximum number of legs in which a leap is followed; surfaces within one leg may be missed.
 _LEGS = 32
 
 
@@ -51,9 +51,9 @@ class IteratedContact:
     """The contacts of one step.
 
     Args:
-        state: of the garment before the step.
+        state: state of the garment before the step.
         held: (k,) nodes whose motion is prescribed; they feel no contact.
-        obstacles: now, with velocities.
+        obstacles: obstacles at the start of the step, with velocities.
         mass: (n,) kg.
         time_step: h, s.
         law: friction and adhesion.
@@ -61,9 +61,9 @@ class IteratedContact:
         tolerance: wanted accuracy of positions, m.
 
     Attributes:
-        mode: (n,) FREE, STICK, SLIP or HELD, now.
-        owner: (n,) nearest obstacle, -1 without.
-        normal: (n,3) of the surface there.
+        mode: (n,) FREE, STICK, SLIP or HELD, current.
+        owner: (n,) nearest obstacle, -1 without one.
+        normal: (n,3) normal of the surface there.
         resistance: (n,) c of slipping nodes, h² N/m.
         friction: (n,3) friction on slipping nodes, h² N.
     """
@@ -115,7 +115,7 @@ class IteratedContact:
         self._take_up(state, law)
 
     def _take_up(self, state: ClothState, law: ContactLaw) -> None:
-        """Keeps the contact of the step before where it still is, with its friction."""
+        """Keeps the contacts of the previous step that still exist, with their friction."""
         touching = (state.mode == STICK) | (state.mode == SLIP)
         same = self.owner == state.owner
         kept = touching & (self._gap < _KEPT_GAP) & (self.mode == FREE) & same
@@ -131,24 +131,24 @@ class IteratedContact:
             self.friction[slip] = (bound / size)[:, None] * along
 
     def place(self, guess: FloatArray, steady: FloatArray) -> FloatArray:
-        """Returns where the iteration starts, (n,3): on the way to `guess`, before any surface.
+        """Returns the initial iterate (n,3): on the path to `guess`, before any surface.
 
-        Nodes that a surface could reach are carried with it first; those that slip start at
-        `steady` (n,3), their motion as before.
+        Nodes that a surface could reach are carried with it first. Slipping nodes start at `steady`
+        (n,3), with unchanged motion.
         """
         if not self.active:
             return guess.copy()
         start = np.where((self.mode == HELD)[:, None], guess, self.carried)
         motion = guess - start
         motion[self.mode == STICK] = 0.0
-        # gravity is borne: those that slip go on as before
+        # the surface bears gravity, so slipping nodes keep their velocity
         slip = self.mode == SLIP
         motion[slip] = steady[slip] - start[slip]
         self.shorten(start, motion)
         return start + motion
 
     def shorten(self, x: FloatArray, motion: FloatArray) -> None:
-        """Ends the `motion` (n,3) of free nodes from `x`, in place, at the first surface.
+        """Truncates the `motion` (n,3) of free nodes from `x`, in place, at the first surface.
 
         They land there with the next `bind`.
         """
@@ -170,7 +170,7 @@ class IteratedContact:
                 rows = going[hit]
                 motion[far[rows]] = way[rows, None] * ahead[rows]
                 self._stopped[far[rows]] = True
-            # a cubic spline of distances may rise by more than 1 m a metre: half of the gap is safe
+            # a cubic spline of distances may have a slope above 1: half of the gap is safe
             going, gap = going[~hit], near.gap[~hit]
             way[going] += np.maximum(0.5 * gap, length[going] / _LEGS)
             going = going[way[going] < length[going]]
@@ -178,7 +178,7 @@ class IteratedContact:
                 return
 
     def refresh(self, x: FloatArray) -> None:
-        """Finds gaps and normals where the last ones may no longer decide anything."""
+        """Updates gaps and normals of nodes for which the last ones may mislead."""
         due = np.flatnonzero(active_set.due(x, self._checked, self._gap, self.mode))
         if not len(due):
             return
@@ -216,10 +216,10 @@ class IteratedContact:
         )
 
     def classify(self, residual: FloatArray) -> int:
-        """Sets modes and friction by the force that contact would need; returns how many changed.
+        """Sets modes and friction by the required contact force; returns how many changed.
 
         Args:
-            residual: (n,3) of the equations of motion without contact, h² N.
+            residual: (n,3) residual of the equations of motion without contact, h² N.
         """
         if not self.active:
             return 0
@@ -243,7 +243,7 @@ class IteratedContact:
         )
 
     def constrained(self) -> BoolArray:
-        """Returns (n,) which nodes have no freedom at all."""
+        """Returns (n,) which nodes have no free direction."""
         masked: BoolArray = (self.mode == STICK) | (self.mode == HELD)
         return masked
 
@@ -262,7 +262,7 @@ class IteratedContact:
         return out
 
     def _carry(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
-        """Returns `x` with each node that a surface could reach carried by the nearest."""
+        """Returns `x` with each node that a surface could reach carried by the nearest one."""
         v, omega = obstacles.twists()
         if not v.any() and not omega.any():
             return x.copy()
@@ -282,7 +282,7 @@ class IteratedContact:
 
 
 def advanced(obstacles: Obstacles, h: float) -> tuple[Obstacles, FloatArray]:
-    """Returns the obstacles `h` s later and how each has turned, (count,3,3)."""
+    """Returns the obstacles `h` s later and the rotation of each, (count,3,3)."""
     v, omega = obstacles.twists()
     if not v.any() and not omega.any():
         return obstacles, np.tile(np.eye(3), (len(v), 1, 1))

@@ -1,12 +1,12 @@
 """Solves with a constant matrix P on the motions that contact leaves free.
 
-Nodes that are held or stick are rows left out of the factor of P. Nodes that slip keep two
-directions, which a factor cannot leave out alone, and feel the resistance c of friction on the
-diagonal: conjugate gradients on Π (P + c) Π, preconditioned by Π P⁻¹ Π, take its place. They are
-stopped early: a fixed-point iteration corrects what they leave.
+The factor of P leaves out the rows of held and sticking nodes. Slipping nodes keep two directions,
+which a factor cannot represent, and add the resistance c of friction to the diagonal. With slipping
+nodes, conjugate gradients on Π (P + c) Π, preconditioned by Π P⁻¹ Π, replace the direct solve. They
+stop early, because the fixed-point iteration corrects the remaining error.
 
-A factor that leaves out other nodes than it should still is a preconditioner. It is renewed once it
-has cost as many solves as a new one would, so that the price is at most twice the least possible.
+A factor that leaves out other nodes than it should is still a preconditioner. It is renewed once it
+has cost as many solves as a new one would, so that the cost is at most twice the least possible.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.projective.iterated_contact import IteratedContact
 from drake_dress.models.cloth.vectors import dot
 
-# Relative residual at which conjugate gradients stop, and their most iterations.
+# Relative residual at which conjugate gradients stop, and their maximum iterations.
 _TOLERANCE = 0.3
 _MOST_ITERATIONS = 60
-# Slipping nodes whose resistance is so many times their diagonal entry are left out of the factor.
+# Ratio of resistance to diagonal entry above which a slipping node is left out of the factor.
 _STIFF = 1.0
-# What a factor costs, in solves.
+# Cost of a factor, in solves.
 _SOLVES_PER_FACTOR = 15
 
 
@@ -38,7 +38,7 @@ class ProjectedSystem:
         matrix: (n,n) symmetric positive definite.
 
     Attributes:
-        solves: triangular solves since `start_counting`; factors: made since then.
+        solves: number of triangular solves since `start_counting`; factors: made since then.
     """
 
     def __init__(self, matrix: sp.csc_matrix) -> None:
@@ -55,7 +55,7 @@ class ProjectedSystem:
         self.solves = self.factors = 0
 
     def go_on(self, memory: IntArray) -> None:
-        """Goes on with the factor that was in use when `memory` (n+1,) was returned."""
+        """Restores the factor that was in use when `memory` (n+1,) was returned."""
         left_out = memory[1:] == 1
         if memory[0] < 0:
             self._factor = None
@@ -64,7 +64,7 @@ class ProjectedSystem:
         self._excess = max(0, int(memory[0]))
 
     def memory(self) -> IntArray:
-        """Returns (n+1,) what `go_on` takes; see `ClothState.solver`."""
+        """Returns (n+1,) the input of `go_on`; see `ClothState.solver`."""
         found = np.full(len(self._diagonal) + 1, -1, dtype=np.int32)
         if self._factor is not None:
             found[0], found[1:] = self._excess, self._factor.masked
@@ -84,7 +84,7 @@ class ProjectedSystem:
         return z
 
     def _renewed(self, masked: BoolArray) -> tuple[Factor, bool]:
-        """Returns a factor and whether it leaves out just the nodes `masked` (n,)."""
+        """Returns a factor and whether it leaves out exactly the nodes `masked` (n,)."""
         if self._factor is not None:
             exact = np.array_equal(masked, self._factor.masked)
             if exact or self._excess < _SOLVES_PER_FACTOR:

@@ -1,25 +1,25 @@
-"""Projective Dynamics (Bouaziz et al. 2014), the scheme that the others are compared with.
+"""Projective Dynamics (Bouaziz et al. 2014), the reference for the other schemes.
 
 A step of implicit Euler minimises
 
     E(x) = 1/(2h²) ‖x − y‖²_M + ψ(x),    y = x_n + h v_n + h² g,
 
 with ψ the energy of `forces.internal_force`. With p the projections of the elements (the isometry
-nearest to F, the curvature vector at its rest length) ψ is ½ Σ w ‖A x − p‖², so that the local step
-"find p" and the global step "solve P x = M y + h² Σ w Aᵀp" are together
+nearest to F, the curvature vector at its rest length) ψ is ½ Σ w ‖A x − p‖². Together, the local
+step "find p" and the global step "solve P x = M y + h² Σ w Aᵀp" are
 
     x ← x − P⁻¹ h² ∇E(x),    P = M + h² Σ w AᵀA,
 
 because h² ∇E(x) = P x − M y − h² Σ w Aᵀp. P is constant: one factor serves all iterations. E never
-rises, as the quadratic with p held lies above it. `quasi_newton` uses P⁻¹ as the first guess of
+rises, as the quadratic with fixed p lies above it. `quasi_newton` uses P⁻¹ as the first guess of
 L-BFGS, with a line search on E (Liu, Bouaziz and Kavan 2017).
 
 Damping adds β/(2h) (x − x_n)ᵀ K₊(x_n) (x − x_n) to E, with the filtered stiffness that
-`ImplicitCloth` damps with, and hβ Σ w AᵀA to P.
+`ImplicitCloth` uses for damping, and hβ Σ w AᵀA to P.
 
-Contact is found at every iterate (`iterated_contact.py`) and leaves nodes without some of their
-freedom (`projected_system.py`). The iteration stops at an estimate of how far the fixed point still
-is (`stopping_rule.py`).
+Contact is detected at every iterate (`iterated_contact.py`) and removes some of the nodes' degrees
+of freedom (`projected_system.py`). The iteration stops by an estimate of the distance to the fixed
+point (`stopping_rule.py`).
 """
 
 from __future__ import annotations
@@ -60,25 +60,25 @@ from drake_dress.models.cloth.state import (
 from drake_dress.models.cloth.vectors import dot, largest_length
 
 _WINDOW = 5
-# Decrease that a line search asks for, as a share of what the slope promises.
+# Decrease that a line search requires, as a share of what the slope predicts.
 _ARMIJO = 1e-4
 _MOST_HALVINGS = 12
-# E is known to about this share of its parts: a rise within it is rounding.
+# Relative rounding error of E: a rise within it is tolerated.
 _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
 class ProjectiveInfo:
-    """How a step was solved.
+    """Information on the solve of a step.
 
     Attributes:
-        iterations: global steps.
+        iterations: number of global steps.
         remaining: estimated distance to the fixed point, m, the largest over the nodes.
-        converged: whether that is within the tolerance.
-        contraction: ρ it was estimated with.
-        refactored: factors made.
-        solves: triangular solves, with those of conjugate gradients.
-        changes: nodes whose contact changed in the last iteration.
+        converged: whether that satisfied the stopping rule.
+        contraction: ρ of that estimate.
+        refactored: number of factors made.
+        solves: number of triangular solves, with those of conjugate gradients.
+        changes: number of nodes whose contact changed in the last iteration.
     """
 
     iterations: int
@@ -92,16 +92,16 @@ class ProjectiveInfo:
 
 @dataclass(frozen=True)
 class ProjectiveSettings:
-    """How Projective Dynamics iterates, and what has contact.
+    """Settings of Projective Dynamics.
 
     Attributes:
         tolerance: estimated distance to the fixed point at which a step is finished, m.
-        max_iterations: global steps, at most. The info says if they were not enough.
+        max_iterations: maximum number of global steps. The info says if they were not enough.
         quasi_newton: L-BFGS instead of the plain iteration.
-        predicted: whether each step starts from the linearly implicit one. If that is close, few
+        predicted: whether each step starts from the linearly implicit step. If that is close, few
             iterations are left.
-        sample_elements: whether edge midpoints and face centroids have contact, too, from their
-            places at the start of a step.
+        sample_elements: whether edge midpoints and face centroids have contact, too, with their
+            depths at the start of a step.
     """
 
     tolerance: float = 1e-5
@@ -124,8 +124,8 @@ class ProjectiveDynamicsCloth(SteppedCloth):
         time_step: h, s.
         held: (k,) nodes whose motion is prescribed.
         gravity: (3,) m/s².
-        additions: what effects add to the garment.
-        settings: how it iterates.
+        additions: permanent additions of effects.
+        settings: solver settings.
     """
 
     def __init__(
@@ -225,9 +225,9 @@ class ProjectiveDynamicsCloth(SteppedCloth):
         held_velocity: FloatArray,
         equations: _Equations,
     ) -> tuple[FloatArray, FloatArray]:
-        """Returns where iterations start, and where steady motion leads, (n,3) m.
+        """Returns the initial iterate, and the result of steady motion, (n,3) m.
 
-        A falling garment falls on, a hanging one goes on as before.
+        A falling garment continues to fall, a hanging one keeps its velocity.
         """
         h = self.time_step
         fall, steady = inertial.copy(), state.x + h * state.v
@@ -238,12 +238,12 @@ class ProjectiveDynamicsCloth(SteppedCloth):
     def _iterate(
         self, x: FloatArray, contact: IteratedContact, equations: _Equations
     ) -> tuple[FloatArray, FloatArray, ProjectiveInfo]:
-        """Returns the positions (n,3) of least energy, m, its gradient there, and how it was found.
+        """Returns the positions (n,3) of least energy, m, the gradient there, and the info.
 
         Args:
-            x: (n,3) where iterations start, m; changed in place.
-            contact: of the step.
-            equations: of the step.
+            x: (n,3) initial iterate, m; changed in place.
+            contact: contact of the step.
+            equations: equations of the step.
         """
         history = self._history
         if history is not None:
@@ -287,7 +287,7 @@ class ProjectiveDynamicsCloth(SteppedCloth):
         return x, gradient, info
 
     def _margins(self, x: FloatArray, obstacles: Obstacles) -> FloatArray:
-        """Returns (n,) the distance that nodes keep, so that elements between them keep theirs."""
+        """Returns (n,) the margins of the nodes, m, so that elements between them keep theirs."""
         margin = np.full(len(x), self.material.margin)
         if self._settings.sample_elements:
             e = self.elements
@@ -316,9 +316,9 @@ class ProjectiveDynamicsCloth(SteppedCloth):
         contact: IteratedContact,
         history: CurvatureHistory,
     ) -> None:
-        """Halves `motion` in place until E with the work of friction falls as its slope says.
+        """Halves `motion` in place until E with the work of friction falls as its slope predicts.
 
-        If it never does, the history is at fault: the plain motion takes its place.
+        If it never does, the history is cleared and replaced by the plain motion.
         """
         force = gradient - contact.friction
         slope = dot(force, motion)
@@ -338,7 +338,7 @@ class ProjectiveDynamicsCloth(SteppedCloth):
 def _remember(
     history: CurvatureHistory, s: FloatArray, y: FloatArray, contact: IteratedContact
 ) -> None:
-    """Adds a motion and the change of the gradient over it, (n,3) each, as far as they are free."""
+    """Adds the free parts of a motion and of the gradient's change over it, (n,3) each."""
     y += contact.resistance[:, None] * s
     project(s, contact.mode, contact.normal)
     project(y, contact.mode, contact.normal)
@@ -346,7 +346,7 @@ def _remember(
 
 
 class _Equations:
-    """What a step minimises, and its gradient."""
+    """The function that a step minimises, and its gradient."""
 
     def __init__(
         self,
@@ -363,7 +363,7 @@ class _Equations:
         self._fibres = cloth.additions.fibres
         self._damping = cloth.time_step * m.damping
         self._bending = cloth._bending
-        # a line search ends where the next iteration starts
+        # cached, because the next iteration starts where a line search ends
         self._at = np.full_like(x, np.nan)
         self._energy_there, self._damped_there = np.nan, np.empty(0)
         if self._damping > 0.0:

@@ -1,9 +1,9 @@
-"""The limited-memory BFGS direction about a given first guess of the inverse Hessian.
+"""The limited-memory BFGS direction for a given first guess of the inverse Hessian.
 
 With pairs s = change of x, y = change of the gradient over the last iterations, the two-loop
 recursion (Nocedal and Wright, "Numerical Optimization", alg. 7.4) turns a gradient into a
-direction; between the loops stands the first guess, which is the caller's: Projective Dynamics
-takes the factor of its constant matrix (Liu, Bouaziz and Kavan 2017, "Quasi-Newton methods for
+direction. Between the loops it applies the first guess, which the caller gives: Projective Dynamics
+uses the factor of its constant matrix (Liu, Bouaziz and Kavan 2017, "Quasi-Newton methods for
 real-time simulation of hyperelastic materials").
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.vectors import dot
 
-# A pair is kept if s·y is at least this share of ‖s‖ ‖y‖: without curvature it has no inverse.
+# A pair is kept if s·y is above this share of ‖s‖ ‖y‖: without curvature it has no inverse.
 _LEAST_CURVATURE = 1e-8
 
 
@@ -25,7 +25,7 @@ class CurvatureHistory:
     """The last pairs and the direction that they give.
 
     Args:
-        window: pairs kept.
+        window: number of pairs kept.
         node_count: n.
     """
 
@@ -40,7 +40,7 @@ class CurvatureHistory:
         self._order.clear()
 
     def add(self, s: FloatArray, y: FloatArray) -> None:
-        """Takes in the pair (n,3), (n,3) of the last iteration; the oldest makes room for it."""
+        """Adds the pair (n,3), (n,3) of the last iteration; drops the oldest if full."""
         along, s2, y2 = _pair_products(s, y)
         if along <= _LEAST_CURVATURE * np.sqrt(s2 * y2):
             return
@@ -52,7 +52,7 @@ class CurvatureHistory:
     def direction(
         self, gradient: FloatArray, first_guess: Callable[[FloatArray], FloatArray]
     ) -> FloatArray:
-        """Returns −B⁻¹ gradient (n,3); `first_guess` maps (n,3) to the initial B⁻¹ times it."""
+        """Returns −B⁻¹ gradient (n,3); `first_guess` multiplies (n,3) by the initial B⁻¹."""
         order = np.array(self._order, dtype=np.int64)
         q = -gradient
         alpha = np.zeros(len(order))

@@ -1,7 +1,7 @@
-"""When a fixed-point iteration is done: at an estimate of how far the fixed point still is.
+"""Stopping rule of a fixed-point iteration: an estimate of the distance to the fixed point.
 
-If updates d shrink by ρ an iteration, ‖d‖ ρ / (1 − ρ) is left. A small update alone says little:
-where ρ is 0.99, a hundred times as much is to come.
+If updates d shrink by ρ per iteration, the distance that remains is ‖d‖ ρ / (1 − ρ). A small update
+alone says little: if ρ is 0.99, a hundred times as much is to come.
 """
 
 from __future__ import annotations
@@ -10,23 +10,24 @@ from collections import deque
 
 import numpy as np
 
-# An update of so small a share of the tolerance is rounding; contraction is below 1 minus that.
+# An update below this share of the tolerance counts as rounding: what remains is within the
+# tolerance for any contraction below 1 minus this share.
 _NEGLIGIBLE = 1e-7
-# Spans of updates over which a rate of contraction is taken: at least, at most.
+# Spans of updates over which contraction is measured: their least number, and the longest one.
 _LEAST_SPANS = 4
 _LONGEST_SPAN = 20
 
 
 class StoppingRule:
-    """Estimates from the last updates how far the fixed point is.
+    """Estimates the distance to the fixed point from the last updates.
 
-    The rate is the largest over several spans of updates that end now, and the estimate has to hold
-    twice: fast modes die first, so that early rates are too good, and L-BFGS takes updates of very
-    unequal size. What it cannot see is a motion that has yet to begin: near a saddle, where cloth
-    is about to buckle, updates shrink before they grow.
+    The rate is the largest over several spans that end at the last update, and the estimate has to
+    hold twice in a row. Fast modes decay first, so that early rates are too good, and L-BFGS makes
+    updates of very unequal size. The rule cannot detect a motion that has yet to begin: near a
+    saddle, where cloth is about to buckle, updates shrink before they grow.
 
     Args:
-        tolerance: m.
+        tolerance: accepted distance to the fixed point, m.
     """
 
     def __init__(self, tolerance: float) -> None:
@@ -37,13 +38,13 @@ class StoppingRule:
         self.remaining = np.inf
 
     def restart(self) -> None:
-        """Forgets all updates: other contacts, another contraction."""
+        """Forgets all updates, because other contacts have another contraction."""
         self._size.clear()
         self._within = 0
         self.remaining, self.contraction = np.inf, 1.0
 
     def add(self, size: float) -> None:
-        """Takes in the largest motion of a node in the last iteration, m."""
+        """Adds the largest motion of a node in the last iteration, m."""
         self._size.append(size)
         spans = np.arange(1, len(self._size))
         self.remaining, self.contraction = np.inf, 1.0
@@ -57,5 +58,5 @@ class StoppingRule:
         self._within = self._within + 1 if self.remaining <= self._tolerance else 0
 
     def reached(self) -> bool:
-        """Returns whether the estimate is within the tolerance."""
+        """Returns whether the estimate was within the tolerance twice in a row, or is 0."""
         return self.remaining == 0.0 or self._within >= 2

@@ -1,1 +1,1 @@
-"""How the linear system of a step is solved: one file a scheme, one interface (interface.py)."""
+"""Schemes that solve the linear system of a step: one per file, one interface (interface.py)."""

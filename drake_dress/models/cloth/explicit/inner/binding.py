@@ -1,9 +1,9 @@
 """The forces that bind nodes in contact: S λ = lack on the rows that their modes bind.
 
-S = E P⁻¹ Eᵀ gives the motion of the nodes under forces on them. A sticking node has three unknowns,
-a slipping one the size ν of its normal force: its force is ν times `along`, its row the motion
-along `across`. Forward `along` is n + μ d and `across` is n, backward it is the other way round;
-where they are the same the system is symmetric.
+S = E P⁻¹ Eᵀ gives the motion of the nodes under forces on them. A sticking node has three unknowns.
+A slipping node has one, its normal force ν: its force is ν times `along`, its row the motion along
+`across`. In the forward problem `along` is n + μ d and `across` is n; in the backward problem they
+are exchanged. If they are the same, the system is symmetric.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from drake_dress.models.cloth.filtered_cg import matrix_product
 from drake_dress.models.cloth.matrices import Csr
 from drake_dress.models.cloth.vectors import add, dot, turn
 
-# Vectors that GMRES keeps before it starts anew.
+# Basis vectors that GMRES keeps before it restarts.
 _RESTART = 60
-# Whether all of P is looked at, P or its block between the nodes, the nodes, a factor and scratch.
+# Whether all of P is used, P or its block between the nodes, the nodes, a factor and scratch.
 Conditioner = tuple[Any, ...]
 
 
 def by_neighbours(matrix: Csr, factor: Factor, nodes: IntArray) -> Conditioner:
-    """Returns the preconditioner P_cc: what moves nodes (c,) while all others stay.
+    """Returns the preconditioner P_cc: forces that move nodes (c,) while all others stay.
 
     Args:
         matrix: P.
-        factor: any; it is not looked at.
+        factor: any; its values are not used.
         nodes: (c,).
     """
     block = _block(matrix.indptr, matrix.indices, matrix.data, nodes)
@@ -41,14 +41,14 @@ def by_neighbours(matrix: Csr, factor: Factor, nodes: IntArray) -> Conditioner:
 
 
 def by_all(matrix: Csr, factor: Factor, nodes: IntArray) -> Conditioner:
-    """Returns the preconditioner P_cc − P_cf P_ff⁻¹ P_fc: what moves nodes while others follow.
+    """Returns the preconditioner P_cc − P_cf P_ff⁻¹ P_fc: forces on nodes while others follow.
 
-    The inverse of S, were all directions of the nodes bound; where the normals are all alike the
+    It is the inverse of S if all directions of the nodes are bound. If all normals are equal, the
     solver needs one iteration.
 
     Args:
         matrix: P.
-        factor: with `nodes` and all that stay left out.
+        factor: factor without `nodes` and all nodes that stay.
         nodes: (c,).
     """
     n = len(matrix.indptr) - 1
@@ -65,16 +65,16 @@ def bind(  # type: ignore[no-untyped-def]
     """Returns force (c,3), motion S λ (c,3), ν (c,) of slipping nodes, and iterations done.
 
     Args:
-        part: of the factor, for the nodes.
-        conditioner: of `by_neighbours` or `by_all`.
+        part: result of `Factor.part` for the nodes.
+        conditioner: result of `by_neighbours` or `by_all`.
         mode: (c,) STICK takes all of `lack`, SLIP one row, others none.
         normal: (c,3) unit.
         push: (c,3) friction of slipping nodes per normal force, or (0,3) for none.
         backward: solve the transposed system.
-        lack: (c,3) the motion that is asked for.
+        lack: (c,3) motion to reach.
         guess: (c,3) forces to start from, without friction, or (0,3).
-        tolerance: relative, of what is lacking, in the preconditioner's norm.
-        most: iterations.
+        tolerance: relative to `lack`, in the preconditioner's norm.
+        most: upper limit of iterations.
     """
     c = mode.shape[0]
     oblique = False
@@ -121,7 +121,7 @@ def bind(  # type: ignore[no-untyped-def]
 def _conjugate_gradients(  # type: ignore[no-untyped-def]
     system, lack, unknown, moved, started, tolerance, most
 ):
-    """Improves `unknown` and its motion in place; returns the iterations."""
+    """Improves `unknown` and its motion in place; returns the number of iterations."""
     part, conditioner, mode, normal, along, across = system
     residual = np.empty_like(unknown)
     conditioned = np.empty_like(unknown)
@@ -165,9 +165,9 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
 ):
     """The same for along ≠ across: GMRES (Saad and Schultz 1986).
 
-    Preconditioned from the right, in the inner product of the preconditioner, so that the residual
-    is measured as by conjugate gradients. Vectors are as short as there are nodes in contact: all
-    are kept.
+    It is preconditioned from the right, in the inner product of the preconditioner, so that the
+    residual is measured as in conjugate gradients. Vectors are only as long as the contact problem,
+    so all of them are kept up to a restart.
     """
     part, conditioner, mode, normal, along, across = system
     size = unknown.shape[0]
@@ -248,7 +248,7 @@ def _generalised_residuals(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, forceinline=True)
 def _condition(conditioner, mode, normal, residual, out, z, force):  # type: ignore[no-untyped-def]
-    """Writes the forces that nearly take the motions `residual`; `z`, `force` (c,3) are scratch."""
+    """Writes approximate forces for the motions `residual`; `z`, `force` (c,3) are scratch."""
     around, (indptr, indices, data), nodes, blocks, permutation, moved, others, work = conditioner
     _expand(residual, mode, normal, z)
     if not around:
@@ -305,7 +305,7 @@ def _reduce(z, mode, direction, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def subtract_columns(indptr, indices, data, nodes, z, out):  # type: ignore[no-untyped-def]
-    """Takes P E `z` (k,3) off `out` (n,3), in place, for a symmetric CSR matrix P."""
+    """Subtracts P E `z`, z (k,3), from `out` (n,3) in place, for a symmetric CSR matrix P."""
     for k in range(nodes.shape[0]):
         i = nodes[k]
         for q in range(indptr[i], indptr[i + 1]):

@@ -1,8 +1,8 @@
 """A = M + h² K₊, by conjugate gradients with the factor of P as preconditioner.
 
 One iteration with P resists rotation as if it were stretch; A does not. Few iterations are enough
-(benchmarks/cloth), and the scheme stays bounded because K₊ is positive semi-definite. Solved to a
-tolerance, the map from rhs to z is symmetric up to that tolerance, so the adjoint is another solve.
+(benchmarks/cloth), and the scheme stays bounded because K₊ is positive semi-definite. The map from
+rhs to z is symmetric up to the tolerance of the solver, so the adjoint is another solve.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class ConjugateGradients(FilteredScheme):
         p: (n,n) P.
         held: (k,) nodes with prescribed motion.
         tolerance: relative residual, in the preconditioner's norm, at which iterations stop.
-        max_iterations: of conjugate gradients for each solve.
+        max_iterations: upper limit of iterations per solve.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class ConjugateGradientSystem(FilteredSystem):
         normal: FloatArray,
         target: FloatArray,
     ) -> FloatArray:
-        """Starts from the unknown's last solution."""
+        """Warm starts from the unknown's last solution."""
         nodes = self._nodes
         z = unknown.z.copy()
         stick, slip = mode == STICK, mode == SLIP

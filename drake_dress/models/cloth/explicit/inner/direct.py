@@ -11,16 +11,16 @@ from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.explicit.inner.filtered import Filtered
 from drake_dress.models.cloth.explicit.inner.solved import FilteredScheme, FilteredSystem, Solved
 
-# Of passes with friction; solves themselves are exact.
+# Tolerance of passes with friction; the solves themselves are exact.
 _TOLERANCE = 1e-13
 
 
 class Direct(FilteredScheme):
-    """The limit; see `InnerIteration`.
+    """The limit of the iterations; see `InnerIteration`.
 
     Args:
         matrix: A(x).
-        p: (n,n) P, for its size.
+        p: (n,n) P; only its size matters.
         held: (k,) nodes with prescribed motion.
     """
 
@@ -47,7 +47,7 @@ class DirectSystem(FilteredSystem):
         change: tuple[FloatArray, FloatArray],
         guess: FloatArray | None = None,
     ) -> tuple[Solved, Solved]:
-        """See `StepSystem`; there is nothing to guess."""
+        """See `StepSystem`; `guess` is not used."""
         return self._free(*motion), self._free(*change)
 
     def _free(self, rhs: FloatArray, held: FloatArray) -> Solved:
@@ -78,7 +78,7 @@ class DirectSystem(FilteredSystem):
         slip: IntArray,
         normal: FloatArray,
     ) -> FloatArray:
-        """Solves on the rows that are free: all of a node, or two tangents of one that slips."""
+        """Solves on the free rows: all three of a free node, two tangents of a slipping one."""
         key = (stick.tobytes(), slip.tobytes(), normal.tobytes())
         if key not in self._factors:
             basis = self._free_rows(stick, slip, normal)
@@ -99,7 +99,7 @@ class DirectSystem(FilteredSystem):
         row = (3 * free[:, None] + np.arange(3)).ravel()
         column = np.arange(len(row))
         value = np.ones(len(row))
-        # Two columns of the Householder reflection that turns the normal to an axis.
+        # Two columns of the Householder reflection that maps the normal to an axis.
         helper = normal.copy()
         sign = np.where(normal[:, 2] >= 0.0, 1.0, -1.0)
         helper[:, 2] += sign

@@ -1,7 +1,7 @@
-"""A = M + h² K₊, the system that the iterations beyond the first solve.
+"""A = M + h² K₊, the system of all schemes except `OneStep`.
 
-K₊ is the positive semi-definite part of the stretch stiffness at the positions of the step, and the
-exact bending of a flat garment. P bounds A from above.
+K₊ is the positive semi-definite part of the stretch stiffness at the positions of the step, plus
+the exact bending of a flat garment. P bounds A from above.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Filtered:
         self._area = elements.node_area
 
     def system(self, p: sp.csc_matrix) -> SystemMatrix:
-        """Returns A with its solver, `p` (n,n) the matrix whose factor preconditions."""
+        """Returns A with its solver; the factor of `p` (n,n) is the preconditioner."""
         return SystemMatrix(Csr.of(self.linear), 1.0 / p.diagonal(), self.elements, self.scale)
 
     def assemble(self, block: FloatArray) -> sp.csc_matrix:
@@ -70,7 +70,7 @@ class Filtered:
         return sp.csc_matrix(stretch + sp.kron(self.linear, sp.eye(3)))
 
     def block(self, x: FloatArray) -> FloatArray:
-        """Returns what depends on the positions `x` (n,3), m."""
+        """Returns the data that depends on the positions `x` (n,3), m."""
         return prepare_filtered(self.elements, self.stretch, x)
 
     def derivative(self, x: FloatArray, w: FloatArray, z: FloatArray) -> FloatArray:
@@ -78,7 +78,7 @@ class Filtered:
         return self.scale * filtered_derivative(self.elements, self.stretch, x, w, z)
 
     def share(self, name: str, block: FloatArray, z: FloatArray) -> FloatArray:
-        """Returns ∂A/∂θ z (n,3), θ a value of `Material` by its name."""
+        """Returns ∂A/∂θ z (n,3), θ the value of `Material` with this name."""
         out = np.zeros_like(z)
         if name == "surface_density":
             out += self._area[:, None] * z

@@ -1,17 +1,17 @@
-"""What every inner iteration offers to a step and to its adjoint.
+"""Interface of the inner iterations to a step and to its adjoint.
 
 A step solves A z = rhs twice, for the motion and for the change of velocity, with A = M + h² K of
-the scheme. Nodes in the grippers move as prescribed from the start. Nodes in contact are bound by
-`hold`: sticking ones move by a target, slipping ones do so along their normal, and the forces that
-this takes are what comes out. The adjoint of a step is made of the same solves, since every scheme
-here is symmetric: the map from rhs to the free part of z is.
+the scheme. Nodes in the grippers have prescribed values from the start. `hold` binds nodes in
+contact: sticking ones move by a target, slipping ones do so only along their normal. It returns the
+forces that this takes. The adjoint of a step consists of the same solves, because in every scheme
+here the map from rhs to the free part of z is symmetric.
 
 Schemes differ in A and in how far they iterate:
 
     one_step.py              A = P, exact: the paper's scheme with one iteration
     stationary.py            A = M + h² K₊, K iterations with P as the paper prints them
     conjugate_gradients.py   the same, by conjugate gradients with P as preconditioner
-    direct.py                the limit of all of them, by a direct factor; for tests
+    direct.py                the limit of these iterations, by a direct factor; for tests
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
-# One of the solutions of a step, of a type that its scheme chooses; its `free` (n,3) is what it is
-# without contact.
+# A solution of a step, of a type that its scheme chooses; its `free` (n,3) is the solution without
+# contact.
 Unknown = Any
 
 
@@ -31,7 +31,7 @@ class StepSystem(Protocol):
     """The system of one step; made by `InnerIteration.at`, used for that step and its adjoint.
 
     Attributes:
-        iterations: of linear solves so far, forward and backward.
+        iterations: number of linear-solver iterations so far, forward and backward.
     """
 
     iterations: int
@@ -47,11 +47,11 @@ class StepSystem(Protocol):
         Args:
             motion: right-hand side (n,3) and values at the held nodes (k,3) of Δx.
             change: those of Δv.
-            guess: (n,3) of Δx, for schemes that improve one until it is good enough.
+            guess: (n,3) initial guess of Δx, for iterative schemes.
         """
 
     def touch(self, nodes: IntArray) -> None:
-        """Says which nodes (c,) later calls of `hold` may bind."""
+        """Sets the nodes (c,) that later calls of `hold` may bind."""
 
     def hold(
         self,
@@ -63,18 +63,19 @@ class StepSystem(Protocol):
         guess: FloatArray | None = None,
         backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
-        """Binds nodes of an unknown, instead of what an earlier call bound.
+        """Binds nodes of an unknown, in place of those that an earlier call bound.
 
-        A slipping node is bound with ν (n + push), push = μ d its friction, so that n·z = n·target.
-        Backward it is the other way round: ν n so that (n + push)·z = (n + push)·target.
+        A slipping node is bound by the force ν (n + push), push = μ d its friction, so that
+        n·z = n·target. The transposed problem has the force ν n, so that
+        (n + push)·z = (n + push)·target.
 
         Args:
-            unknown: whose solution is bound.
+            unknown: unknown to bind.
             mode: (c,) of the touched nodes: STICK takes all of `target`, SLIP one row, FREE none.
             normal: (c,3) unit.
             target: (c,3) in the unknown's unit.
-            push: (c,3) friction of slipping nodes per normal force, across the normal.
-            guess: (c,3) of ν n or of the sticking force, a start for iterations.
+            push: (c,3) friction of slipping nodes per normal force, tangential to the surface.
+            guess: (c,3) initial guess of ν n or of the sticking force.
             backward: solve the transposed problem.
 
         Returns:
@@ -87,24 +88,24 @@ class StepSystem(Protocol):
     def finish(
         self, motion: Unknown, change: Unknown, less: Unknown | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Returns the solutions (n,3) of motion (with that of `less` taken off) and change."""
+        """Returns the solutions (n,3) of motion (less that of `less`) and change."""
 
     def blank(self) -> Unknown:
         """Returns an unknown whose right-hand side and held values are zero."""
 
     def pairs(self, forward: Unknown, backward: Unknown) -> list[tuple[FloatArray, FloatArray]]:
-        """Returns (w, z) so that z_forward changes by −Σ wᵀ δA z where A does, seen by `backward`.
+        """Returns pairs (w, z): a change δA changes the loss of `backward` by −Σ wᵀ δA z.
 
         Args:
-            forward: as a step solved it.
-            backward: as its adjoint did, with the derivative of a loss by `forward` as right-hand
-                side.
+            forward: unknown that the step solved.
+            backward: unknown that its adjoint solved, with the derivative of a loss by `forward` as
+                right-hand side.
         """
 
     def by_directions(
         self, forward: Unknown, backward: Unknown, target: FloatArray, slip: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Returns the derivative (c,3) by the row n and by the binding n + push of slipping nodes.
+        """Returns the derivatives (c,3) by row n and by binding n + push of slipping nodes.
 
         Args:
             forward: as for `pairs`, with nodes bound by `hold`.
@@ -114,10 +115,10 @@ class StepSystem(Protocol):
         """
 
     def again(self, unknown: Unknown) -> Unknown:
-        """Returns another unknown with the right-hand side and held values of one."""
+        """Returns a new unknown with the right-hand side and held values of `unknown`."""
 
     def by_parameter(self, name: str, forward: Unknown, backward: Unknown) -> float:
-        """Returns how a loss changes by a value of `Material` through the system alone.
+        """Returns the derivative of a loss by a value of `Material`, through the system alone.
 
         Args:
             name: `stretch_stiffness`, `bending_stiffness` or `surface_density`.
@@ -126,7 +127,7 @@ class StepSystem(Protocol):
         """
 
     def share(self, name: str, z: FloatArray) -> FloatArray:
-        """Returns ∂A/∂θ z (n,3), θ a value of `Material` by its name."""
+        """Returns ∂A/∂θ z (n,3), θ the value of `Material` with this name."""
 
     def product(self, z: FloatArray) -> FloatArray:
         """Returns A z (n,3)."""
@@ -136,7 +137,7 @@ class StepSystem(Protocol):
 
 
 class InnerIteration(Protocol):
-    """A scheme; made once a garment, material, step size and grasp."""
+    """A scheme, made once per garment, material, step size and grasp."""
 
     depends_on_position: bool  # whether A does
 
@@ -157,13 +158,13 @@ def directions_of_exact(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns `StepSystem.by_directions` of a scheme that solves exactly.
 
-    From A z = rhs + ν b, a·(z − target) = 0 and the transposed pair.
+    Follows from A z = rhs + ν b, a·(z − target) = 0 and the transposed pair.
 
     Args:
         multiplier: (c,) ν.
         z: (c,3) at the nodes.
-        back_multiplier: (c,) that of the adjoint.
-        back_z: (c,3) that of the adjoint.
+        back_multiplier: (c,) ν of the adjoint.
+        back_z: (c,3) z of the adjoint.
         target: (c,3) of the forward solve.
         slip: (c,) which nodes slip.
     """

@@ -1,8 +1,8 @@
 """Friction of slipping nodes by fixed-point iteration, for schemes whose solver is symmetric.
 
-Forward the friction of the last multipliers is a known force, backward the motion along the
-friction shifts the target along the normal: each pass is a solve without friction, and the passes
-contract by about μ.
+In the forward problem, the friction of the last multipliers is a known force. In the backward
+problem, the motion along the friction shifts the target along the normal. Each pass is a solve
+without friction, and the passes contract by about μ.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import SLIP
 
 _MOST_PASSES = 60
-# With solves this coarse one pass with friction is as good as more.
+# Tolerance of the solves above which one pass with friction is as good as more.
 _COARSE = 1e-3
-# Passes end when forces change by so many times the tolerance of the solves: these start where the
-# last one ended and so do what is left. They also end when they come no closer.
+# Passes end when forces change by less than this many tolerances of the solves: each solve is warm
+# started from the last and reduces the rest. They also end when a change is more than this share
+# of the one before (_NO_CLOSER).
 _COARSER = 10.0
 _NO_CLOSER = 0.7
 
-# target (c,3) and force (c,3) to binding (c,3) and motion (c,3)
+# Maps target (c,3) and force (c,3) to binding (c,3) and motion (c,3).
 PlainHold = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 
@@ -38,13 +39,13 @@ def hold_obliquely(
     """Returns force (c,3), motion (c,3) and multipliers (c,) of `StepSystem.hold`.
 
     Args:
-        plain: binds without friction.
+        plain: function that binds without friction.
         mode: (c,) of the nodes.
         normal: (c,3) unit.
         target: (c,3).
         push: (c,3) friction per normal force, or None.
         backward: solve the transposed problem.
-        tolerance: of the change of forces from pass to pass, relative.
+        tolerance: relative tolerance of the change of forces between passes.
     """
     nothing = np.zeros_like(target)
     binding, z = plain(target, nothing)

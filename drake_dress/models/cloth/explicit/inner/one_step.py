@@ -1,9 +1,9 @@
-"""A = P: the paper's scheme with one iteration, exact, contact included.
+"""A = P: the paper's scheme with one iteration, solved exactly, contact included.
 
-P = M + h² Σ w AᵀA never changes, so its factor with the grippers' nodes left out is made once.
-Contact adds unknown forces λ at its nodes. Their motion is E z_free + S λ, S = E P⁻¹ Eᵀ: P_ic⁻¹ of
-the paper, of which nothing is formed. Conjugate gradients find λ, with S applied by the few columns
-of the factor that the contact nodes reach and the sparse block P_cc as preconditioner.
+P = M + h² Σ w AᵀA never changes, so its factor without the grippers' nodes is made once. Contact
+adds unknown forces λ at its nodes. Their motion is E z_free + S λ, S = E P⁻¹ Eᵀ: P_ic⁻¹ of the
+paper, which is never formed. Conjugate gradients find λ (GMRES with friction). S is applied by the
+few columns of the factor that the contact nodes reach; the sparse block P_cc is the preconditioner.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from drake_dress.models.cloth.factor.masked import Factor, SymbolicFactor
 from drake_dress.models.cloth.filtered_cg import matrix_product
 from drake_dress.models.cloth.matrices import Csr
 
-# Contacts from which a factor of its own costs less than iterations, and slipping nodes from which
-# another one does as preconditioner, measured at 6,000 nodes.
+# Number of contacts above which a separate factor costs less than iterations, and of slipping nodes
+# above which another factor is the cheaper preconditioner, measured at 6,000 nodes.
 MANY, MANY_SLIPPING = 1500, 1500
 _NO_NODES = np.zeros(0, dtype=np.int32)
 _NO_PUSH = np.zeros((0, 3))
@@ -36,10 +36,10 @@ _NO_PUSH = np.zeros((0, 3))
 
 @dataclass
 class ForcedUnknown:
-    """Solution without contact (n,3).
+    """Solution without contact (n,3), and how contact changes it.
 
-    Where nodes are bound: the forces (c,3) that change it, their multipliers ν (c,) where nodes
-    slip, the solution at the nodes (c,3), and by how much it changed everywhere (n,3), if known.
+    If nodes are bound: the forces (c,3) on them, their normal forces ν (c,), the solution at the
+    nodes (c,3), and the change of the solution everywhere (n,3), if known.
     """
 
     free: FloatArray
@@ -54,12 +54,12 @@ class OneStep:
 
     Args:
         p: (n,n) P, symmetric positive definite.
-        shares: its derivatives by values of `Material`, by their names.
+        shares: its derivatives by values of `Material`, by name.
         held: (k,) nodes with prescribed motion.
-        tolerance: of the motion of nodes in contact, relative to how far they are moved.
-        max_iterations: of conjugate gradients and of GMRES.
-        many: contacts from which sticking nodes are left out of a factor of their own.
-        many_slipping: slipping nodes from which a factor without them preconditions.
+        tolerance: of the motion of nodes in contact, relative to how far contact moves them.
+        max_iterations: upper limit for conjugate gradients and for GMRES.
+        many: number of contacts above which a separate factor leaves out the sticking nodes.
+        many_slipping: number of slipping nodes above which a factor without them preconditions.
     """
 
     depends_on_position = False
@@ -90,7 +90,7 @@ class OneStep:
         self.node_count = n
 
     def derivative(self, x: FloatArray, w: FloatArray, z: FloatArray) -> FloatArray:
-        """Returns zero (n,3): P is the same for all positions."""
+        """Returns zero (n,3): P does not depend on positions."""
         return np.zeros_like(x)
 
     def at(self, x: FloatArray) -> OneStepSystem:
@@ -113,7 +113,7 @@ class OneStepSystem:
         change: tuple[FloatArray, FloatArray],
         guess: FloatArray | None = None,
     ) -> tuple[ForcedUnknown, ForcedUnknown]:
-        """See `StepSystem`; there is nothing to guess."""
+        """See `StepSystem`; `guess` is not used."""
         s, m = self._scheme, self._scheme.matrix
         rhs = []
         for right, held in (motion, change):
@@ -173,9 +173,9 @@ class OneStepSystem:
         push: FloatArray | None,
         backward: bool,
     ) -> tuple[FloatArray, FloatArray]:
-        """Does the same by a factor that leaves the sticking nodes out.
+        """Does the same with a factor that leaves the sticking nodes out.
 
-        What is sought is the correction y of the free solution: P y is zero but at bound nodes.
+        It solves for the correction y of the free solution: P y is zero except at bound nodes.
         """
         s, m, nodes = self._scheme, self._scheme.matrix, self._nodes
         stick, slip = np.flatnonzero(mode == STICK), np.flatnonzero(mode == SLIP)
@@ -221,7 +221,7 @@ class OneStepSystem:
         return force, unknown.at_nodes
 
     def _factor_without(self, nodes: IntArray) -> Factor:
-        """Returns the factor of P without held and given nodes; the last ones are kept."""
+        """Returns the factor of P without held and given nodes; cached for the step."""
         if not len(nodes):
             return self._scheme.factor
         key = nodes.tobytes()

@@ -1,4 +1,4 @@
-"""What the schemes on A = M + h² K₊ have in common: all but how they solve."""
+"""What the schemes on A = M + h² K₊ have in common: everything except the solver."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from drake_dress.models.cloth.explicit.inner.oblique import hold_obliquely
 class Solved:
     """An unknown with its right-hand side (n,3), held values (k,3) and solution (n,3).
 
-    `multiplier` (c,) is what binds nodes in contact along their normals.
+    `multiplier` (c,) holds the normal forces that bind nodes in contact.
     """
 
     rhs: FloatArray
@@ -31,13 +31,13 @@ class Solved:
 
 
 class FilteredScheme:
-    """What a scheme keeps for all steps; see `InnerIteration`.
+    """Data that a scheme keeps for all steps; see `InnerIteration`.
 
     Args:
         matrix: A(x).
         p: (n,n) P.
         held: (k,) nodes with prescribed motion.
-        tolerance: of forces, relative, at which passes with friction end.
+        tolerance: relative tolerance of forces in the passes with friction.
     """
 
     depends_on_position = True
@@ -60,8 +60,8 @@ class FilteredSystem(ABC):
     """(M + h² K₊) z = rhs of one step; see `StepSystem`.
 
     Args:
-        scheme: that made it.
-        block: of `Filtered.block`.
+        scheme: scheme that made it.
+        block: result of `Filtered.block`.
     """
 
     def __init__(self, scheme: FilteredScheme, block: FloatArray) -> None:
@@ -93,7 +93,7 @@ class FilteredSystem(ABC):
         guess: FloatArray | None = None,
         backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`; there is nothing to guess."""
+        """See `StepSystem`; `guess` is not used."""
 
         def plain(target: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
             rhs = unknown.rhs.copy()
@@ -155,7 +155,7 @@ class FilteredSystem(ABC):
     def _binding(
         self, product: FloatArray, rhs: FloatArray, mode: IntArray, normal: FloatArray
     ) -> FloatArray:
-        """Returns (c,3) what binds the touched nodes: A z − rhs, of slipping ones along n."""
+        """Returns (c,3) the forces on bound nodes: A z − rhs, for slipping nodes along n."""
         binding: FloatArray = product[self._nodes] - rhs[self._nodes]
         slip = mode == SLIP
         n = normal[slip]
@@ -166,7 +166,7 @@ class FilteredSystem(ABC):
     def _prescribed(
         self, held: FloatArray, mode: IntArray, normal: FloatArray, target: FloatArray
     ) -> FloatArray:
-        """Returns (n,3) what is prescribed, zero elsewhere."""
+        """Returns (n,3) the prescribed values, zero elsewhere."""
         fixed = np.zeros((self._base.node_count, 3))
         fixed[self._base.held] = held
         stick, slip = mode == STICK, mode == SLIP

@@ -1,9 +1,9 @@
 """A = M + h² K₊, by K iterations with P (Eq. iterative-solver).
 
-z ← z + P⁻¹ (rhs − A z) starts from zero with prescribed nodes in place. As 0 ≤ A ≤ P, iterates are
-bounded by the solution, and K iterations are a symmetric polynomial in P⁻¹A: the adjoint is the
-same K iterations. Contact is held in every one of them, exactly, as `OneStep` does; through
-slipping contact there is no derivative.
+The iteration z ← z + P⁻¹ (rhs − A z) starts from zero, with prescribed nodes at their values. As
+0 ≤ A ≤ P, iterates are bounded by the solution. K iterations are a symmetric polynomial in P⁻¹A, so
+the adjoint is the same K iterations. Each iteration enforces contact exactly, as `OneStep` does.
+There is no derivative through slipping contact.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drake_dress.models.cloth.explicit.inner.solved import FilteredScheme, Filte
 
 @dataclass
 class Iterates(Solved):
-    """An unknown with the corrections `steps` and what they were added to, K of each (n,3)."""
+    """An unknown with its corrections `steps` and the `iterates` they add to, K of each (n,3)."""
 
     steps: list[FloatArray] = field(default_factory=list)
     iterates: list[FloatArray] = field(default_factory=list)
@@ -64,7 +64,7 @@ class StationarySystem(FilteredSystem):
         change: tuple[FloatArray, FloatArray],
         guess: FloatArray | None = None,
     ) -> tuple[Iterates, Iterates]:
-        """See `StepSystem`; there is nothing to guess."""
+        """See `StepSystem`; `guess` is not used."""
         return self._free(*motion), self._free(*change)
 
     def touch(self, nodes: IntArray) -> None:
@@ -82,7 +82,7 @@ class StationarySystem(FilteredSystem):
         guess: FloatArray | None = None,
         backward: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
-        """See `StepSystem`; there is nothing to guess."""
+        """See `StepSystem`; `guess` is not used."""
         if backward and push is not None and push.any():
             raise ValueError(
                 "the stationary scheme has no derivative through slipping contact: "
@@ -91,10 +91,10 @@ class StationarySystem(FilteredSystem):
         return super().hold(unknown, mode, normal, target, push, guess, backward)
 
     def pairs(self, forward: Iterates, backward: Iterates) -> list[tuple[FloatArray, FloatArray]]:
-        """See `StepSystem`: every iteration read A once.
+        """See `StepSystem`: every iteration uses A once.
 
-        What prescribed nodes pull with stands in the first iterate; the adjoint's own start is
-        zero where nothing is prescribed, and what it is elsewhere multiplies A on the last iterate.
+        The first iterate contains the prescribed values. The adjoint starts from zero except at
+        prescribed values; these multiply A times the last iterate.
         """
         found = list(zip(reversed(backward.steps), forward.iterates, strict=True))
         if backward.iterates and np.any(backward.iterates[0]):
@@ -142,7 +142,7 @@ class StationarySystem(FilteredSystem):
         z: FloatArray,
         contact: tuple[IntArray, FloatArray] | None,
     ) -> None:
-        """Runs K iterations from `z`; (mode, normal) of the touched nodes where they are bound."""
+        """Runs K iterations from `z`; `contact` is (mode, normal) of bound nodes, if any."""
         still = np.zeros((len(self._held), 3))
         blank = np.zeros_like(rhs)
         unknown.steps, unknown.iterates = [], []
