@@ -12,7 +12,7 @@ from rich.console import Console
 from drake_dress.diagrams.arms import ArmReachError
 from drake_dress.diagrams.assemble import simulated_station
 from drake_dress.diagrams.hardware_station import NoBusError, open_bus
-from drake_dress.diagrams.lab_diagram import Lab, make_lab
+from drake_dress.diagrams.lab_diagram import LabDiagram, make_lab
 from drake_dress.diagrams.run import NOT_DRESSED, concluded
 from drake_dress.diagrams.run_log import open_run_log
 from drake_dress.diagrams.scenario import Scenario, apply_variation
@@ -80,7 +80,7 @@ def run_lab(
         return concluded(out, wall_time, report, signal)
 
 
-def _rehearsed(lab: Lab, realtime_rate: float) -> Simulator:
+def _rehearsed(lab: LabDiagram, realtime_rate: float) -> Simulator:
     """Returns the lab's simulator; what steps first anywhere is compiled, which takes a minute."""
     simulator = Simulator(lab.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
@@ -91,7 +91,11 @@ def _rehearsed(lab: Lab, realtime_rate: float) -> Simulator:
 
 
 def _play(
-    lab: Lab, simulator: Simulator, scenario: Scenario, writer: RunLogWriter, interrupt: Interrupt
+    lab: LabDiagram,
+    simulator: Simulator,
+    scenario: Scenario,
+    writer: RunLogWriter,
+    interrupt: Interrupt,
 ) -> tuple[bool, str | None, float]:
     """Runs until commands have ended.
 

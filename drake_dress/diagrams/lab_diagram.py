@@ -57,7 +57,7 @@ _LEAP = 0.3
 
 
 @dataclass(frozen=True)
-class Lab:
+class LabDiagram:
     """A lab's diagram, and what its loop looks at."""
 
     diagram: Diagram
@@ -73,7 +73,7 @@ def make_lab(
     lcm: DrakeLcm,
     writer: RunLogWriter | None,
     take: Take | None = None,
-) -> Lab:
+) -> LabDiagram:
     """Returns a station behind its messages.
 
     Args:
@@ -100,7 +100,7 @@ def make_lab(
         make.record(writer)
     diagram = make.builder.Build()
     diagram.set_name("lab")
-    return Lab(diagram, station, make.watch, make.player, lcm)
+    return LabDiagram(diagram, station, make.watch, make.player, lcm)
 
 
 class _LabMaker(Wiring):

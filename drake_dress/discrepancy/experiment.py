@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.lab import Numerics, SimulatedLab
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
 from drake_dress.discrepancy.workers import Workers
@@ -150,7 +150,9 @@ class Experiment:
         self.numerics = levels(
             Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance)
         )
-        self.labs = {level: Lab.of(scenario, base, n) for level, n in self.numerics.items()}
+        self.labs = {
+            level: SimulatedLab.of(scenario, base, n) for level, n in self.numerics.items()
+        }
         self.samples = [_samples(r, period) for r in self.recordings]
         self._count = workers or worker_count()
         self._workers: Workers | None = None

@@ -14,7 +14,7 @@ import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.discrepancy.hidden_effect import NOTHING, draw_hidden
-from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.lab import Numerics, SimulatedLab
 from drake_dress.discrepancy.motions import ARM_UP, MOTIONS, USUAL, Stage
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
@@ -137,15 +137,15 @@ def make_dataset(
     return Dataset([measured(r, session.sensors, rng) for r in clean], tuple(hidden))
 
 
-def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> Lab:
+def truth(scenario: Scenario, base: Path, effects: Sequence[Effect] = ()) -> SimulatedLab:
     """Returns the lab behind the data: the scenario's, with other numerics and with effects."""
     p = scenario.plant
     numerics = Numerics(_FINER * p.spacing, _SHORTER * p.time_step, "projective_dynamics")
-    lab = Lab.of(scenario, base, numerics)
+    lab = SimulatedLab.of(scenario, base, numerics)
     return replace(lab, effects=(*lab.effects, *effects))
 
 
-def stage(lab: Lab) -> Stage:
+def stage(lab: SimulatedLab) -> Stage:
     """Returns the positions at which a lab's motions take place."""
     joints = lab.person([]).posed
     shoulder, hand = joints[0], joints[2]
@@ -169,12 +169,14 @@ def stage(lab: Lab) -> Stage:
     )
 
 
-def raised_arm(lab: Lab) -> Lab:
+def raised_arm(lab: SimulatedLab) -> SimulatedLab:
     """Returns the lab with the person's left arm raised sideways."""
     return replace(lab, arms={**lab.arms, "left": ArmPose(abduction=_RAISED)})
 
 
-def unseen(lab: Lab, motion: str, path: FloatArray, time: FloatArray, nodes: IntArray) -> Recording:
+def unseen(
+    lab: SimulatedLab, motion: str, path: FloatArray, time: FloatArray, nodes: IntArray
+) -> Recording:
     """Returns a recording of a motion in which no marker was seen.
 
     Args:
@@ -191,7 +193,7 @@ def unseen(lab: Lab, motion: str, path: FloatArray, time: FloatArray, nodes: Int
 
 
 def record(
-    lab: Lab, motion: str, duration: float, sensors: Sensors, rng: np.random.Generator
+    lab: SimulatedLab, motion: str, duration: float, sensors: Sensors, rng: np.random.Generator
 ) -> Recording:
     """Returns a simulated recording without noise.
 

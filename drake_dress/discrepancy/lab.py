@@ -56,7 +56,7 @@ class Numerics:
 
 
 @dataclass(frozen=True)
-class Lab:
+class SimulatedLab:
     """Everything that does not change between recordings.
 
     Attributes:
@@ -76,7 +76,7 @@ class Lab:
     effects: tuple[Effect, ...] = ()
 
     @staticmethod
-    def of(scenario: Scenario, base: Path, numerics: Numerics | None = None) -> Lab:
+    def of(scenario: Scenario, base: Path, numerics: Numerics | None = None) -> SimulatedLab:
         """Returns the lab of a scenario.
 
         Args:
@@ -88,7 +88,7 @@ class Lab:
         numerics = numerics or Numerics(
             p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance
         )
-        return Lab(
+        return SimulatedLab(
             build_garment(scenario.garment, numerics.spacing, base),
             Material(**vars(p.material)),
             numerics,

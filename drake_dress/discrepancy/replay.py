@@ -21,7 +21,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 import scipy.sparse.linalg as sparse_linalg
 
-from drake_dress.discrepancy.lab import Lab
+from drake_dress.discrepancy.lab import SimulatedLab
 from drake_dress.discrepancy.recording import Recording, smoothed
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -95,7 +95,7 @@ class Replayer:
         recording: inputs and markers.
     """
 
-    def __init__(self, lab: Lab, recording: Recording) -> None:
+    def __init__(self, lab: SimulatedLab, recording: Recording) -> None:
         self.lab, self.recording = lab, recording
         r = recording
         self._map = sp.csr_array(attach(lab.garment, r.marker_rest_position))
@@ -404,7 +404,7 @@ def _steps_at(time: FloatArray | None, begin: float, time_step: float) -> npt.ND
     return np.array(np.rint((np.asarray(time) - begin) / time_step), dtype=int)
 
 
-def _interpolation(lab: Lab, markers: sp.csr_array) -> FloatArray:
+def _interpolation(lab: SimulatedLab, markers: sp.csr_array) -> FloatArray:
     """Returns W (n,m), which spreads markers' innovations over the garment; zero at held nodes.
 
     Optimal interpolation with the covariance (A + ℓ² L)⁻¹ A (A + ℓ² L)⁻¹, with A the node areas and

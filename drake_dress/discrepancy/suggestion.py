@@ -12,7 +12,7 @@ from drake_dress.discrepancy.experiment import levels
 from drake_dress.discrepancy.explanation import Explanation
 from drake_dress.discrepancy.generate import stage as stage_of
 from drake_dress.discrepancy.generate import unseen
-from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.lab import Numerics, SimulatedLab
 from drake_dress.discrepancy.motions import MOTIONS
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Replayer
@@ -62,7 +62,7 @@ def suggest(
     beside = [e for e in explanation.effects if e not in rivals]
     p = scenario.plant
     numerics = levels(Numerics(p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance))
-    lab = Lab.of(scenario, base, numerics["screening"])
+    lab = SimulatedLab.of(scenario, base, numerics["screening"])
     scores = {}
     for name in MOTIONS:
         stage(f"simulating {name} under both candidates")
@@ -75,7 +75,8 @@ def suggest(
     best = max(scores, key=lambda n: scores[n])
     return (
         f"To tell {plain(first.NAME)} from {plain(second.NAME)}, {_WORDS.get(best, best)} "
-        f"(motion {best}): there the two differ by {np.sqrt(scores[best]):.1f} times the noise."
+        f"(motion {best}): there the two differ by "
+        f"{np.sqrt(scores[best]):.1f} times typical noise (1 mm, 0.05 N)."
     )
 
 
@@ -96,7 +97,7 @@ def _rivals(explanation: Explanation) -> tuple[Effect, Effect] | None:
     return (doubted.effect, best.effect) if best and best.effect else None
 
 
-def _blank(lab: Lab, motion: str) -> Recording:
+def _blank(lab: SimulatedLab, motion: str) -> Recording:
     time = np.arange(round(_DURATION * _RATE) + 1) / _RATE
     path = MOTIONS[motion](stage_of(lab), _DURATION, np.random.default_rng(0))
     nodes = np.linspace(0, len(lab.garment.rest_position) - 1, _MARKERS).astype(np.int32)

@@ -27,7 +27,7 @@ from drake_dress.diagrams.hardware_station import (
     listen,
     make_hardware_station,
 )
-from drake_dress.diagrams.lab_diagram import Lab, make_lab
+from drake_dress.diagrams.lab_diagram import LabDiagram, make_lab
 from drake_dress.diagrams.planning import ControlSetup
 from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
 from drake_dress.diagrams.scenario.schema import LabFault
@@ -64,7 +64,7 @@ class Pair:
         setup = read_setup(scenario, SOURCE)
         lcm = DrakeLcm("memq://")
         self.simulated = simulated_station(setup)
-        self.lab: Lab = make_lab(setup, self.simulated, lcm, writer=None)
+        self.lab: LabDiagram = make_lab(setup, self.simulated, lcm, writer=None)
         at = setup.as_estimated().station
         person = described_person(at)
         p = replace(hardware_parameters(scenario.station, at), wall=False)

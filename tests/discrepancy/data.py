@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.discrepancy.generate import Sensors, measured, record
-from drake_dress.discrepancy.lab import Lab, Numerics
+from drake_dress.discrepancy.lab import Numerics, SimulatedLab
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.models.effects.effect import Effect
 
@@ -32,7 +32,7 @@ def recordings(
 ) -> list[Recording]:
     """Returns what a lab with effects records; its simulation is the scenario's."""
     rng = np.random.default_rng(seed)
-    lab = Lab.of(quick_scenario(), SCENARIO.parent, numerics)
-    lab = Lab(**{**vars(lab), "effects": tuple(effects)})
+    lab = SimulatedLab.of(quick_scenario(), SCENARIO.parent, numerics)
+    lab = SimulatedLab(**{**vars(lab), "effects": tuple(effects)})
     found = [record(lab, name, duration, SENSORS, rng) for name in motions]
     return [measured(r, SENSORS, rng) for r in found] if noise else found

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drake_dress.discrepancy.generate import Dataset, Session, make_dataset
-from drake_dress.discrepancy.lab import Lab
+from drake_dress.discrepancy.lab import SimulatedLab
 from drake_dress.errors import UserError
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.mass import SurfaceDensity
@@ -38,7 +38,7 @@ def test_an_effect_that_is_given_acts_on_what_is_measured_and_a_seed_draws_the_s
     effect = SurfaceDensity(added=0.3)
     first, again = made([effect]), made([effect])
     assert first.hidden == (effect,)
-    lab = Lab.of(quick_scenario(), SCENARIO.parent)
+    lab = SimulatedLab.of(quick_scenario(), SCENARIO.parent)
     area = lab.cloth([]).elements.triangle_area.sum()
     assert weight(first) == pytest.approx((lab.material.surface_density + 0.3) * area * G, rel=0.03)
     one, two = first.recordings[0], again.recordings[0]

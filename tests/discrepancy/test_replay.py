@@ -1,6 +1,6 @@
 import numpy as np
 
-from drake_dress.discrepancy.lab import Lab
+from drake_dress.discrepancy.lab import SimulatedLab
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.replay import Prediction, Replayer
 from drake_dress.models.effects.grip import GripperLatency
@@ -11,7 +11,7 @@ from tests.present import present
 
 
 def replayer(recording: Recording) -> Replayer:
-    return Replayer(Lab.of(quick_scenario(), SCENARIO.parent), recording)
+    return Replayer(SimulatedLab.of(quick_scenario(), SCENARIO.parent), recording)
 
 
 def off(prediction: Prediction, recording: Recording) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drake_dress.discrepancy.experiment import Told
-from drake_dress.discrepancy.lab import Lab
+from drake_dress.discrepancy.lab import SimulatedLab
 from drake_dress.discrepancy.recording import Recording
 from drake_dress.discrepancy.residual_map import KINDS, Spot, limbs_touched, spots, worst
 from drake_dress.discrepancy.whitening import whiten
@@ -15,11 +15,11 @@ _NOISE = 1e-3
 
 
 @pytest.fixture(scope="module")
-def lab() -> Lab:
-    return Lab.of(quick_scenario(), SCENARIO.parent)
+def lab() -> SimulatedLab:
+    return SimulatedLab.of(quick_scenario(), SCENARIO.parent)
 
 
-def recording(lab: Lab, joints: FloatArray | None = None) -> Recording:
+def recording(lab: SimulatedLab, joints: FloatArray | None = None) -> Recording:
     """Returns markers that stay where they are: on the right forearm, on the left upper arm,
     and far from everyone; the first two are 1 cm over the skin."""
     posed = lab.person(()).posed
@@ -45,7 +45,7 @@ def recording(lab: Lab, joints: FloatArray | None = None) -> Recording:
     )
 
 
-def test_markers_are_of_the_limb_whose_skin_they_are_near(lab: Lab) -> None:
+def test_markers_are_of_the_limb_whose_skin_they_are_near(lab: SimulatedLab) -> None:
     person = lab.person(())
     samples = np.arange(0, 41, 10)
     r = recording(lab)
@@ -57,13 +57,13 @@ def test_markers_are_of_the_limb_whose_skin_they_are_near(lab: Lab) -> None:
     assert limbs_touched(r, samples, person)[1, 0] == -1
 
 
-def test_limbs_are_where_their_joints_were_measured(lab: Lab) -> None:
+def test_limbs_are_where_their_joints_were_measured(lab: SimulatedLab) -> None:
     person = lab.person(())
     away = np.tile(person.posed + np.array([0.0, 0.0, 0.5]), (41, 1, 1))
     assert (limbs_touched(recording(lab, away), np.arange(41), person) == -1).all()
 
 
-def test_what_is_off_on_one_limb_is_told_of_that_limb_marker_and_time(lab: Lab) -> None:
+def test_what_is_off_on_one_limb_is_told_of_that_limb_marker_and_time(lab: SimulatedLab) -> None:
     r = recording(lab)
     samples = [np.arange(41)]
     forces, touching = np.zeros((41, 2, 3)), np.ones(41)

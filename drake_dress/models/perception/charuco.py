@@ -103,8 +103,8 @@ class CameraCalibration:
         intrinsics: intrinsics that were given or found.
         residuals: of each picture, root mean square over its corners, px.
         rms: root mean square over all corners, px.
-        position_std: standard deviation of the translation of X_CW (3,), m.
-        rotation_std: standard deviation of the rotation vector of X_CW (3,), rad.
+        position_std: standard deviation of p_WC (3,), m.
+        rotation_std: standard deviation of the camera's rotation about the world's axes (3,), rad.
     """
 
     camera: FloatArray
@@ -183,7 +183,8 @@ def calibrate(
     of_each = np.split(rest.reshape(-1, 2), np.cumsum(counts)[:-1])
     freedom = max(1, len(rest) - len(first))
     covariance = np.linalg.pinv(found.jac.T @ found.jac) * float(rest @ rest) / freedom
-    std = np.sqrt(np.diag(covariance))
+    to_world = _camera_derivative(found.x[:6])
+    std = np.sqrt(np.diag(to_world @ covariance[:6, :6] @ to_world.T))
     return CameraCalibration(
         camera=np.asarray(np.linalg.inv(_pose(found.x[:6])), dtype=np.float64),
         board=_pose(found.x[6:]),
@@ -193,6 +194,25 @@ def calibrate(
         position_std=std[3:6],
         rotation_std=std[:3],
     )
+
+
+def _camera_derivative(x: FloatArray) -> FloatArray:
+    """Returns (6,6) how X_WC moves with the parameters of X_CW: rotation about W's axes, p_WC.
+
+    By central differences; `x` (6,) is the rotation vector and the translation of X_CW.
+    """
+    about = np.linalg.inv(_pose(x))
+    columns = []
+    for step in 1e-6 * np.eye(6):
+        moved = []
+        for sign in (1.0, -1.0):
+            camera = np.linalg.inv(_pose(x + sign * step))
+            # of a small rotation, which Rodrigues rounds to none: its skew part
+            skew = camera[:3, :3] @ about[:3, :3].T
+            turn = 0.5 * (skew - skew.T)[[2, 0, 1], [1, 2, 0]]
+            moved.append(np.concatenate([turn, camera[:3, 3]]))
+        columns.append((moved[0] - moved[1]) / 2e-6)
+    return np.stack(columns, axis=1)
 
 
 def _first_guess(
