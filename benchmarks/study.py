@@ -1,4 +1,4 @@
-"""Runs the cases of a long study side by side; what is done is kept, and not run again."""
+"""Runs the cases of a long study in parallel; results are kept and not run again."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ C = TypeVar("C", bound=_Named)
 
 
 def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> None:
-    """Adds an option for each keyword, that takes some of its names; all by default."""
+    """Adds an option for each keyword that takes some of its names; default: all."""
     for option, names in known.items():
         parser.add_argument(
             f"--{option}",
@@ -44,7 +44,7 @@ def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> No
 
 
 def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int = 2) -> None:
-    """Adds the options that `carry_out` reads; `jobs` run side by side by default."""
+    """Adds the options that `carry_out` reads; by default `jobs` cases run in parallel."""
     parser.add_argument(
         "--jobs",
         type=at_least_one,
@@ -70,7 +70,7 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
 
 
 def dressed(summary: dict[str, Any]) -> str:
-    """Returns how a dressing ended, in a few words."""
+    """Returns a short text on how a dressing ended."""
     return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"
 
 
@@ -84,17 +84,17 @@ def carry_out(
     tell: Callable[[dict[str, Any]], str] = dressed,
     said: str = "",
 ) -> tuple[list[dict[str, Any]], int | None]:
-    """Runs what is missing and prints the tables.
+    """Runs the missing cases and prints the tables.
 
     Args:
-        options: those of `add_study_options`.
-        benchmark: its name.
-        case_type: makes a case of its fields in a file.
-        cases: of the study.
-        run: a case, with the folder to keep it in and further settings.
-        tables: of results.
-        tell: how a case ended, from its summary, in a few words.
-        said: above the tables, such as which seeds they are of.
+        options: Options of `add_study_options`.
+        benchmark: Name of the benchmark.
+        case_type: Creates a case from its fields in a file.
+        cases: Cases of the study.
+        run: Runs a case, given the folder to keep it in and further settings.
+        tables: Returns the tables of the results.
+        tell: Returns a short text on how a case ended, from its summary.
+        said: Text above the tables, such as the seeds used.
 
     Returns:
         The results, and the exit status if a signal ended the study.
@@ -123,13 +123,13 @@ def carry_out(
 
 
 def exit_status(results: Sequence[dict[str, Any]], stopped: int | None) -> int:
-    """Returns the status of the signal that ended the study, 1 if a run could not be used, or 0."""
+    """Returns the status of the signal that ended the study, 1 if a run gave no result, or 0."""
     return int(any("problem" in result for result in results)) if stopped is None else stopped
 
 
 @contextmanager
 def place_of(case: _Named, folder: Path | None) -> Iterator[Path]:
-    """Provides the folder of a case: of its name in `folder`, or one that is kept no longer."""
+    """Yields the folder of a case: named after it in `folder`, or a temporary one."""
     if folder is not None:
         yield folder / case.name
         return
@@ -145,15 +145,15 @@ def run_case(
     seed: int | None = None,
     look: Callable[[Path], dict[str, Any]] = lambda out: {},
 ) -> dict[str, Any]:
-    """Returns what one `drake-dress run` came to: case, summary, and what else is looked at.
+    """Executes one `drake-dress run`; returns its case, summary and further results.
 
     Args:
-        case: a dataclass with a name.
-        scenario: file.
-        folder: in which it is kept under the case's name; None to keep nothing.
-        settings: KEY=VALUE for the scenario.
-        seed: of the run; None for the scenario's own.
-        look: what to take from the folder that it wrote.
+        case: Dataclass with a name.
+        scenario: Scenario file.
+        folder: Folder in which the run is kept under the case's name; None to keep nothing.
+        settings: KEY=VALUE settings of the scenario.
+        seed: Seed of the run; None for the scenario's own.
+        look: Returns further results from the run's output folder.
     """
     with place_of(case, folder) as out:
         status, problem = run_scenario(scenario, out, settings, seed, report=folder is not None)
@@ -165,7 +165,7 @@ def run_case(
 
 @dataclass(frozen=True)
 class _Run(Generic[C]):
-    """Runs a case, here or on a node; of one that succeeded files may be left out."""
+    """Runs a case, here or on a node; may delete the files of a successful one."""
 
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
     settings: Sequence[str]
@@ -183,7 +183,7 @@ class _Run(Generic[C]):
 def _completed(
     run: _Run[C], cases: Sequence[C], options: argparse.Namespace, stop: Interrupt
 ) -> Iterator[tuple[C, dict[str, Any]]]:
-    """Yields each case with its result as soon as it is done, on this machine or on a cluster."""
+    """Yields each case with its result once it is done, on this machine or on a cluster."""
     keep: Path | None = options.keep
     if options.ray is None:
         yield from completed(lambda case: run(case, keep), cases, options.jobs, stop)
@@ -215,7 +215,7 @@ def _run_all(
         for number, (case, result) in enumerate(_completed(run, new, options, stop), 1):
             kept[case.name] = result
             if path is not None:
-                # what failed to run is run again
+                # do not keep runs without a result, so that they are run again
                 write_results(path, {name: r for name, r in kept.items() if "summary" in r})
             ended = result.get("problem") or tell(result["summary"])
             print(f"{number}/{len(new)} {case.name}: {ended}", flush=True)
