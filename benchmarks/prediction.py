@@ -288,7 +288,7 @@ class Moment:
     def with_garment(
         self, cloth: ExplicitBiasCloth, h: float
     ) -> tuple[list[FloatArray], tuple[float, float]]:
-        """Returns the predicted garment, and the time per predicted second: alone, with gradient."""
+        """Returns the predicted garment, and the time per predicted second, also with gradient."""
         steps = round(AFTER[-1] / h)
         at = h * np.arange(steps + 1, dtype=float)
         obstacles = person_obstacles(self._run.person, self.joints(at), h)

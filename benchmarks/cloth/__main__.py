@@ -20,14 +20,14 @@ from benchmarks.parser import OneLineParser, at_least_one, output_file, output_f
 from drake_dress.file_output import write_text
 from drake_dress.interrupt import caught_interrupt
 
-# In the order of the paper, then what it does not have.
+# The paper's scenes in its order, then additional ones.
 SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying", "layers")
 _PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
 _QUICK_LIMIT = 1.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measures and prints; returns the exit status: 0, 2 for bad arguments, 130 after Ctrl-C."""
+    """Measures and prints; returns 0, 2 on bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     names = options.only or list(SCENES)
     about = _about()
@@ -143,7 +143,7 @@ def _limit(options: argparse.Namespace) -> float:
 
 
 def _about() -> dict[str, Any]:
-    """Returns versions, processor and threads."""
+    """Returns versions, processor and numbers of cores and threads."""
     about: dict[str, Any] = {"python": platform.python_version(), "processor": _processor()}
     about["cores"] = os.cpu_count()
     about["threads"] = "one for every engine; peers on the CPU"
@@ -169,7 +169,7 @@ def _processor() -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Returns `value` as JSON has it: NaN and infinity become null."""
+    """Returns `value` in JSON types; NaN and infinity become None."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -29,8 +29,8 @@ COATS = {
     "armhole_girth: 0.60, cuff_girth: 0.36, front_opening: 0.34}",
     "overcoat": "{preset: overcoat, shoulder_width: 0.52, front_opening: 0.34}",
 }
-# What the seed draws: all measures, as in scenarios/dummy_varied.yaml, or the few drawn for the first
-# figures, when coat_scale did not change explicitly given measures.
+# What the seed draws: all measures, as in scenarios/dummy_varied.yaml, or the few drawn for the
+# first figures, when coat_scale did not change explicitly given measures.
 _SAME = "plant_stiffness: 0.3, plant_friction: 0.3, start_offset: 0.03}"
 VARIATIONS = {
     "all": "{arm_angle_deg: 10.0, coat_scale: 0.05, coat_measures: 0.03, person_scale: 0.05, "
