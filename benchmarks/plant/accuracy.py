@@ -62,8 +62,8 @@ class Setting:
         return mesh, plant_integrator(p)
 
 
-# The reference for all settings: half the spacing of `fine` and a quarter of its time step, with the
-# plain law. Coats cannot be finer than this.
+# The reference for all settings: half the spacing of `fine` and a quarter of its time step, with
+# the plain law. Coats cannot be finer than this.
 REFERENCE = Setting("reference", 0.01, 0.001)
 
 

@@ -51,7 +51,7 @@ class StationWatch(LeafSystem):
         - source_stopped (one for each)
 
     Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) for each source, flags
-    of `models.supervision.fault.Fault`. ended_by: (1,) number of the source that ends the run, -1
+    of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
     if none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it reports
     that it does not follow commands. In addition to the ports, `events` returns the changes in a
     context, and `dropped` the number of repeated and late messages of each source.
