@@ -123,7 +123,7 @@ class WorkerPool(Executor):
 
 
 def start_process(process: BaseProcess) -> None:
-    """Starts a process with signals blocked until it ignores them.
+    """Starts a process that receives no signal before it ignores signals.
 
     Ctrl-C and `timeout` send signals to all processes of a group. Arguments of the process should
     be small: if they exceed the pipe's buffer and the reader ends, this process waits forever.
