@@ -1,7 +1,7 @@
 """Runs cases on a Ray cluster: an existing one, or one that is started on this machine.
 
-The checkout is sent to the nodes, so that all of them run the same code; what it needs has to be
-installed there. A node that is lost costs the runs that it was at: they are begun again elsewhere.
+The checkout is sent to the nodes, so that all run the same code; its dependencies must be installed
+there. If a node is lost, its unfinished runs are restarted on other nodes.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ C = TypeVar("C")
 R = TypeVar("R")
 
 _ROOT = Path(__file__).parents[1]
-# What nodes need not have of a checkout.
+# Parts of a checkout that nodes do not need.
 _LEFT = [".git", ".venv", "out", "docs", "**/__pycache__", ".hypothesis", ".mypy_cache"]
-# Nodes that a run may be lost with before it counts as one that cannot be done.
+# Number of lost nodes after which a run counts as impossible.
 _MOST_LOST = 10
-# Between looks for the signal that ends a study, s.
+# Period of checking for a signal that ends the study, s.
 _LOOK = 1.0
 HERE = "local"
-# For an answer of a cluster's address, s.
+# Timeout for connecting to a cluster, s.
 _PATIENCE = 5.0
 
 
@@ -40,22 +40,22 @@ def completed_on(
     stop: Interrupt,
     bring: Callable[[C, Mapping[str, bytes]], None] | None = None,
 ) -> Iterator[tuple[C, R]]:
-    """Yields each case once with what it came to, as soon as it is done anywhere.
+    """Yields each case with its result as soon as it is done on any node.
 
     Args:
-        address: of the cluster; `auto` for the one that this machine belongs to, `local` to start
-            one here.
-        run: a case, with a folder for its files.
-        cases: that are run, a core each.
-        stop: after it is set nothing more is yielded.
-        bring: is called with the files that a case left in its folder, by their paths there; None
-            if nobody wants them.
+        address: Address of the cluster; `auto` for the one that this machine belongs to, `local` to
+            start one here.
+        run: Runs a case, given a folder for its files.
+        cases: Cases to run, each on one core.
+        stop: Once it is set, no more results are yielded.
+        bring: Called with a case's files, by their paths in its folder; None if the files are not
+            needed.
 
     Raises:
         UserError: Ray is not installed, or there is no cluster.
     """
     ray = connected(address)
-    # a node that is lost does not count as a failure of the run
+    # losing a node does not count as a failure of the run
     task = ray.remote(_run).options(num_cpus=1, max_retries=_MOST_LOST)
     try:
         pending = {task.remote(run, case, bring is not None): case for case in cases}
@@ -68,7 +68,7 @@ def completed_on(
                     bring(case, files)
                 yield case, result
     finally:
-        # what runs is not waited for
+        # does not wait for unfinished runs
         ray.shutdown()
 
 
@@ -78,7 +78,7 @@ def connected(address: str) -> Any:
     Raises:
         UserError: Ray is not installed, or there is no cluster at the address.
     """
-    # no report of use to anybody, and no word on what is not asked for
+    # disables usage reports and the notice about them
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
@@ -91,7 +91,7 @@ def connected(address: str) -> Any:
     where: dict[str, Any] = {"address": address}
     if address == HERE:
         where = {"include_dashboard": False, "_node_ip_address": "127.0.0.1"}
-    # Ray would end this process at once, with nothing said and nothing kept
+    # Ray's own handler would end this process without a message and without keeping results
     handler = signal.getsignal(signal.SIGTERM)
     try:
         ray.init(**where, runtime_env=environment, log_to_driver=False, logging_level=logging.ERROR)
@@ -104,7 +104,7 @@ def connected(address: str) -> Any:
 
 
 def _prove(address: str) -> None:
-    """Raises UserError where nobody listens; Ray would try again for minutes."""
+    """Raises UserError if nothing listens at the address; Ray would retry for minutes."""
     if address in ("auto", HERE):
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")
@@ -118,7 +118,7 @@ def _prove(address: str) -> None:
 
 
 def _run(run: Callable[[C, Path], R], case: C, wanted: bool) -> tuple[R, dict[str, bytes]]:
-    """Runs a case on a node; returns its files, too, if they are wanted."""
+    """Runs a case on a node; also returns its files if `wanted`."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         result = run(case, folder)

@@ -1,13 +1,13 @@
-"""Derivatives of contact steps against finite differences, over random states.
+"""Compares derivatives of contact steps with finite differences in random states.
 
     python benchmarks/contact_derivatives.py --states 1000
 
-A state is a sheet of random fabric that random grippers pull over random limbs that move. A random
+In each state, random grippers pull a sheet of random fabric over random moving limbs. A random
 linear loss of positions, velocities and gripper forces after one step is differentiated along
 random directions of position, velocity and gripper motion: by the adjoint, by differences with
-contact types held, and by differences of the true map, in which contact types may change. Printed
-are, for each step size, the smallest cosine and the largest relative error against the first, and
-the distribution of the cosine against the second.
+fixed contact types, and by differences of the true map, in which contact types may change. The
+table gives, for each step size, the smallest cosine and the largest relative error of the adjoint
+against the first differences, and the distribution of the cosine against the second.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from drake_dress.models.cloth.material import Material
 
 STEPS = (0.001, 0.005, 0.01, 0.05, 0.1)
 _DIRECTIONS = 8
-# Short, because forces have kinks (where a hinge has lost its direction): m.
+# Short, because forces have kinks (where a hinge has lost its direction), m.
 _DIFFERENCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One state: contact counts, and the adjoint against differences along the directions."""
+    """One state: contact counts, and the adjoint compared with finite differences."""
 
     time_step: float
     seed: int
@@ -47,7 +47,7 @@ class Comparison:
 
 
 def compare(seed: int, time_step: float) -> Comparison | None:
-    """Returns the comparison in a random state; None where the garment touches nothing."""
+    """Returns the comparison in a random state; None if there is no contact."""
     rng = np.random.default_rng([seed, int(1e6 * time_step)])
     cloth, x, v, motion, limbs = _random_state(rng, time_step)
     tape = cloth.step(x, v, motion, limbs)[3]
@@ -67,7 +67,7 @@ def compare(seed: int, time_step: float) -> Comparison | None:
     held: list[float] = []
     true: list[float] = []
     for _ in range(_DIRECTIONS):
-        # A step moves nodes by h v: directions of like effect in x, v and the grippers' motion.
+        # A step moves nodes by h v: scale v so that x, v and gripper motion have similar effects.
         d = [rng.normal(size=a.shape) for a in (x, v, motion)]
         d[1] /= time_step
         slopes = zip((g.x, g.v, g.held_motion), d, strict=True)
@@ -141,7 +141,7 @@ def _cosine(a: list[float], b: list[float]) -> float:
 
 
 def run(states: int) -> list[Comparison]:
-    """Compares in `states` states with contact, spread over the step sizes."""
+    """Compares in `states` states with contact, distributed over the step sizes."""
     found: list[Comparison] = []
     seed = 0
     while len(found) < states:
@@ -176,7 +176,7 @@ def print_table(found: list[Comparison]) -> None:
 
 
 def main() -> int:
-    """Runs the comparison; returns 1 if a bound is broken."""
+    """Runs the comparison; returns 1 if a bound is exceeded."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--states", type=int, default=1000)
     parser.add_argument("--json", type=output_file, help="write all comparisons here")

@@ -1,9 +1,9 @@
-"""Dresses one scenario under many seeds and prints how each run ended.
+"""Dresses one scenario with many seeds and prints the result of each run.
 
     python benchmarks/dress_seeds.py scenarios/dummy_varied.yaml --seeds 0-9
 
-Every run is a `drake-dress run` of its own; its log, report and replay stay in OUT/seed_N. What had
-ended is in the table after Ctrl-C, too. The exit status is 1 if a run could not be used at all.
+Every run is a separate `drake-dress run`; its log, report and replay stay in OUT/seed_N. After
+Ctrl-C the table contains the finished runs. The exit status is 1 if a run gave no result.
 """
 
 from __future__ import annotations

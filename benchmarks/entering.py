@@ -1,11 +1,12 @@
-"""Whether the controller's garment foresees that a second hand goes in.
+"""Tests whether the controller's garment predicts that the second hand enters its armhole.
 
     python -m benchmarks.entering out/*/run.h5
 
-From moments of runs, one a second, at which one sleeve is on its arm and the other armhole is near
-its hand, the controller's garment is led for 2 s by the grippers as the run led them: past arms
-that move as they did, and past arms that stay as they were, which is what the controller expects of
-them. How often it has the hand in then is held against whether it was; and where the armhole was.
+The start times, one per second, are those at which one sleeve is on its arm and the other armhole
+is near its hand. From each, the controller's garment is simulated for 2 s with the recorded motion
+of the grippers: once with the recorded motion of the arms, and once with arms at rest, which the
+controller assumes. The prediction that the hand is in, and the position of the armhole, are
+compared with the run.
 """
 
 from __future__ import annotations
@@ -30,15 +31,15 @@ from drake_dress.models.dressing.sight import distance_to_opening
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog
 
-# How far is looked ahead, and the time between moments, s.
+# Prediction horizon, and time between start times, s.
 _AHEAD, _BETWEEN = 2.0, 1.0
-# A hand this close to the surface that spans its armhole is one that may go in, m.
+# Distance of a hand to the surface spanning its armhole below which it may enter, m.
 _NEAR = 0.12
 
 
 @dataclass(frozen=True)
 class Ahead:
-    """A garment 2 s after a moment: is the hand in, where is its armhole, (3,) m."""
+    """A garment 2 s after a start time: whether the hand is in, and the armhole centre (3,), m."""
 
     within: bool
     armhole: FloatArray
@@ -46,7 +47,7 @@ class Ahead:
 
 @dataclass(frozen=True)
 class Entry:
-    """What came after a moment, and what was foreseen past arms that move and arms that stay."""
+    """The actual outcome, and the predictions with moving arms and with arms at rest."""
 
     really: Ahead
     moving: Ahead
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def table(found: Sequence[Entry]) -> Table:
-    """Returns how often it is foreseen that hands are in, of those that are and those that not."""
+    """Returns how often hands are predicted to be in, for hands that are in and that are not."""
     into = [e for e in found if e.really.within]
     out = [e for e in found if not e.really.within]
     rows = []
@@ -92,7 +93,7 @@ def table(found: Sequence[Entry]) -> Table:
 
 
 def entries(path: Path, log: RunLog) -> Iterator[Entry]:
-    """Yields what came and what was foreseen after each moment of a run."""
+    """Yields the outcome and the predictions for each start time of a run."""
     _, policy = logged_policy(log)
     run = read_run(path, 1)
     seen = barycentric_transfer(run.mesh, policy.mesh)
@@ -123,7 +124,7 @@ def _entry(moment: Moment, policy: DressingPolicy, side: int) -> Entry:
 
 
 def _led(moment: Moment, policy: DressingPolicy, joints: FloatArray) -> FloatArray:
-    """Returns the controller's garment (n,3), m, led by grippers past arms at joints (N+1,6,3)."""
+    """Returns the controller's predicted garment (n,3), m, for joints (N+1,6,3) of the person."""
     cloth, h = policy.controller.cloth, policy.parameters.time_step
     obstacles = person_obstacles(policy.person, joints, h)
     x, v = moment.plant(0.0), moment.velocity()

@@ -1,14 +1,14 @@
-"""What lets a hand go into its armhole: moments of runs, and how soon after them it went in.
+"""Finds which quantities correlate with a hand entering its armhole soon afterwards.
 
     python -m benchmarks.hands out/*/run.h5
 
-From runs that dressed and such that did not, six times a second and from the first second on until
-a hand is in: where the hand is to its armhole, how the coat hangs, where the arms are. For each of
-these quantities the moments are put in order and split into sixths; told are the bounds of each
-sixth and the share of its moments after which the hand went in within `--within` seconds. First
-hands and second ones apart, for the coat of a second one hangs on the other arm; while neither is
-in, the one counts that goes in first, or came nearest to it. A quantity by which the share goes
-from none to half is worth a look; that a controller should change it does not follow.
+Successful and failed runs are sampled six times per second, from the first second until a hand is
+in: the hand relative to its armhole, the shape of the coat, the position of the arms. For each
+quantity the samples are sorted and split into sixths. The tables give the bounds of each sixth and
+the share of its samples after which the hand entered within `--within` seconds. First and second
+hands are separate, since the coat of a second hand hangs on the other arm. While neither is in, the
+hand counts that enters first, or came nearest to it. A quantity over which the share rises from
+zero to one half is worth examining; it does not follow that a controller should change it.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
-# Between moments, and from the start to the first one, s.
+# Sampling period, and time of the first sample, s.
 _STEP, _FROM = 1.0 / 6.0, 1.0
-# A hand is in where s stays above this for so long, s.
+# A hand is in if s stays above this value for this time, s.
 _IN, _STAYS = 0.02, 0.5
 _PARTS = 6
-# A hand this close to the surface that spans its armhole touches it, m; how soon it goes in then,
-# and how long it has to be away to touch anew, s.
+# Distance to the surface spanning the armhole below which a hand touches it, m. Time within which
+# it should enter then, which is also the least time between two touches, s.
 _TOUCH, _SOON = 0.03, 2.0
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A hand that is not in, at a moment.
+    """A sample of a hand that is not in.
 
     Attributes:
-        run: whose it is. time: s. side: of the hand.
-        second: whether the other one is in.
-        wait: time until it goes in, s; None if it never does.
-        touches: whether it begins to touch the opening.
-        values: quantity, with its unit, to its value.
+        run: Path of the run. time: Time, s. side: Side of the hand.
+        second: Whether the other hand is in.
+        wait: Time until it enters, s; None if it never does.
+        touches: Whether it begins to touch the opening.
+        values: Name of a quantity, with its unit, to its value.
     """
 
     run: str
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def tables(found: Sequence[Moment], within: float) -> Iterator[Table]:
-    """Yields shares by sixths for first and second hands, at any moment and where they touch."""
+    """Yields shares by sixths for first and second hands, for all samples and for touches."""
     for second, which in ((False, "First hand"), (True, "Second hand")):
         of = [m for m in found if m.second == second]
         touching = [m for m in of if m.touches]
@@ -115,7 +115,7 @@ def _shares(title: str, of: Sequence[Moment], within: float) -> Table:
 
 
 def moments(log: RunLog, run: str) -> list[Moment]:
-    """Returns the moments of a run."""
+    """Returns the samples of a run."""
     time = log.time
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
     is_in = [_stays(time, s[:, i] > _IN) for i in (0, 1)]
@@ -150,7 +150,7 @@ def moments(log: RunLog, run: str) -> list[Moment]:
 
 
 def _gone_about(found: Sequence[Moment]) -> str:
-    """Returns the side of the hand that goes in first, or that came nearest to it."""
+    """Returns the side of the hand that enters first, or came nearest to it."""
     free = [m for m in found if not m.second]
     if not free:
         return ""
@@ -168,14 +168,14 @@ def quantities(
     grippers: Sequence[FloatArray],
     reach: float,
 ) -> dict[str, float]:
-    """Returns what may matter for a hand.
+    """Returns the quantities that may matter for a hand.
 
     Args:
-        i: 0 the left hand, 1 the right one.
+        i: 0 for the left hand, 1 for the right one.
         joints: (6,3) shoulder, elbow, hand of left, then of right, m.
-        sleeves: left and right.
-        grippers: (3,) each, m.
-        reach: between both armholes at rest, m.
+        sleeves: States of the left and the right sleeve.
+        grippers: Positions (3,) of the left and the right gripper, m.
+        reach: Distance of the armholes at rest, m.
     """
     sleeve, other, hand = sleeves[i], sleeves[1 - i], joints[3 * i + 2]
     forearm = joints[3 * i + 1] - hand
@@ -201,7 +201,7 @@ def _degrees(cosine: float) -> float:
 
 
 def _stays(time: FloatArray, holds: np.ndarray) -> np.ndarray:
-    """Returns (T,) where something holds from then on for a while, or did and still does."""
+    """Returns (T,) whether `holds` is true within a period of at least `_STAYS`."""
     stays = np.zeros(len(time), dtype=bool)
     changes = np.flatnonzero(np.diff(holds, prepend=False, append=False))
     for begin, end in changes.reshape(-1, 2):

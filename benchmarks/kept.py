@@ -1,4 +1,4 @@
-"""Results of benchmarks that are kept in a file, from which a long study is resumed."""
+"""Results of benchmarks kept in a file, from which a long study is resumed."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from drake_dress.file_output import write_text
 def read_results(
     path: Path, name_of: Callable[[dict[str, Any]], str], benchmark: str
 ) -> dict[str, dict[str, Any]]:
-    """Returns the results that a file holds by their case's name; none if there is no file.
+    """Returns the results in a file by name of the case; empty if there is no file.
 
     Args:
-        path: of the file.
-        name_of: case's name, from the fields that a result has under "case".
-        benchmark: for errors.
+        path: Path of the file.
+        name_of: Returns a case's name from the fields under "case" of a result.
+        benchmark: Name of the benchmark, for errors.
 
     Raises:
-        UserError: it cannot be read, or holds something else.
+        UserError: The file cannot be read, or has other content.
     """
     if not path.exists():
         return {}
@@ -52,7 +52,7 @@ def write_results(
 
 
 def seed_range(text: str) -> range:
-    """Returns the seeds that A-B or A means, for argparse."""
+    """Parses a range of seeds, A-B or A; an argparse type."""
     first, _, last = text.partition("-")
     last = last or first
     if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):

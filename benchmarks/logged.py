@@ -1,4 +1,4 @@
-"""Logs of runs, and the scenario and the controller that they were made with."""
+"""Logs of runs, with their scenarios and controllers."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from drake_dress.diagrams.setup import read_setup
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.report.log import RunLog
 
-# What is measured by a clock, and so differs from run to run.
+# Datasets of measured times, which differ from run to run.
 _MEASURED = ("solve_time",)
 
 
 def numbers_that_differ(one: h5py.File, other: h5py.File) -> tuple[int, list[str]]:
-    """Returns how many datasets a log has, and which of them another log has not, bit for bit.
+    """Returns the number of datasets in a log, and the names of those that differ in another.
 
-    What is measured by a clock is left out.
+    The comparison is bit for bit. Measured times are excluded.
     """
     names = _datasets(one)
     different = [name for name in names if not _same(one, other, name)]
@@ -46,7 +46,7 @@ def _same(one: h5py.File, other: h5py.File, name: str) -> bool:
 
 
 def opened(paths: Sequence[Path]) -> Iterator[tuple[Path, RunLog]]:
-    """Yields each log, open, and tells on stderr of each that has been read."""
+    """Yields each opened log, and reports progress on stderr."""
     for k, path in enumerate(paths):
         with RunLog.open(path) as log:
             yield path, log
@@ -62,7 +62,7 @@ def logged_scenario(log: RunLog) -> Scenario:
 
 
 def logged_policy(log: RunLog) -> tuple[Scenario, DressingPolicy]:
-    """Returns the scenario of a run and what planned in it, as the present code has both."""
+    """Returns the scenario of a run and its policy, both as built by the current code."""
     scenario = logged_scenario(log)
     setup = read_setup(scenario, Path(log.file.filename))
     return scenario, setup.policy(described_person(setup.station))

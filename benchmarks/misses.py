@@ -1,11 +1,11 @@
-"""How often a hand is missed before it is in.
+"""Counts how often a sleeve misses a hand before the hand enters it.
 
     python -m benchmarks.misses out/*/run.h5
 
-The stages are played again over what the controller saw in each run, as often as it looked, by the
-present code. Told is, for first and second hands apart: of those that were missed so often, how
-many went in before they were missed once more. What is done about misses belongs where that share
-has fallen; done before, it is done to hands that go in without it.
+The current code replays the stage logic on the controller's observations of each run, at the
+controller's rate. For first and second hands separately, the table gives the share of hands with k
+misses that enter before the next miss. Corrective action belongs where that share has fallen;
+earlier, it would affect hands that enter without it.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from drake_dress.errors import UserError
 from drake_dress.models.dressing.stages import StageState
 from drake_dress.report.log import RunLog
 
-# From here on misses are told together.
+# Counts of misses from this one on share a row.
 _MANY = 6
 
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand of a run that was gone about.
+    """A hand that a sleeve approached in a run.
 
     Attributes:
-        second: whether the other one was in.
-        missed: how often it was, before it was in or the run had ended.
-        entered: whether it was in.
+        second: Whether the other hand was already in.
+        missed: Number of misses before it entered or the run ended.
+        entered: Whether it entered.
     """
 
     second: bool
@@ -45,7 +45,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Look:
-    """What a look at garment and person came to: who is in, and how often hands were missed."""
+    """Result of one observation: which arms are in, and the number of misses of each hand."""
 
     linked: tuple[bool, bool]
     attempts: tuple[int, int]
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def looks(log: RunLog) -> list[Look]:
-    """Returns what each look of the controller of a run came to."""
+    """Returns the result of each observation of the controller in a run."""
     scenario, policy = logged_policy(log)
     garment = log.file["/estimate/garment/position"]
     person = log.file["/estimate/human/joint_position"]
@@ -83,9 +83,9 @@ def looks(log: RunLog) -> list[Look]:
 
 
 def hands(course: Sequence[Look]) -> list[Hand]:
-    """Returns the first hand of a run and, if that was in, the second one.
+    """Returns the first hand of a run and, if it entered, the second one.
 
-    Where they change places, for the one that was in slipped out, the misses of both count.
+    If the first hand slips out and the hands swap roles, the misses of both count.
     """
     first = next((look for look in course if any(look.linked)), None)
     if first is None:
@@ -97,7 +97,7 @@ def hands(course: Sequence[Look]) -> list[Hand]:
 
 
 def table(found: Sequence[Hand]) -> Table:
-    """Returns how many went in before the next miss, of those that were missed so often."""
+    """Returns, by number of misses, how many hands entered before the next miss."""
     most = max((hand.missed for hand in found), default=0)
     rows = []
     for least in range(_MANY + 1):

@@ -1,4 +1,4 @@
-"""Arguments of a benchmark."""
+"""Command-line arguments of benchmarks."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ UNUSABLE = 2
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line; `prog` is `drake-dress bench NAME`."""
+    """An argument parser with one-line errors; `prog` is `drake-dress bench NAME`."""
 
     def error(self, message: str) -> NoReturn:
-        """Ends with the message in one line."""
+        """Exits with the message in one line."""
         self.exit(UNUSABLE, f"{self.prog.replace(' ', ': ', 1)}: {message}\n")
 
 
 def bench_parser(name: str, text: str | None) -> OneLineParser:
-    """Returns the parser of `drake-dress bench NAME`, whose help is `text` as it stands."""
+    """Returns the parser of `drake-dress bench NAME`, whose help shows `text` verbatim."""
     return OneLineParser(
         prog=f"drake-dress bench {name}",
         description=text,
@@ -32,7 +32,7 @@ def bench_parser(name: str, text: str | None) -> OneLineParser:
 
 
 def exit_with(main: Callable[[], int]) -> NoReturn:
-    """Ends with the status of a benchmark's `main`, and with one line where input is unusable."""
+    """Exits with the status of a benchmark's `main`; prints one line on unusable input."""
     try:
         sys.exit(main())
     except UserError as error:
@@ -41,7 +41,7 @@ def exit_with(main: Callable[[], int]) -> NoReturn:
 
 
 def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
-    """Returns what parses names from `known` with commas between, for argparse."""
+    """Returns an argparse type for comma-separated names from `known`."""
 
     def parse(text: str) -> list[str]:
         names = text.split(",")
@@ -54,7 +54,7 @@ def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
 
 
 def number_between(low: float, high: float) -> Callable[[str], float]:
-    """Returns what parses a number from `low` to `high`, for argparse."""
+    """Returns an argparse type for a number from `low` to `high`."""
 
     def parse(text: str) -> float:
         try:
@@ -69,14 +69,14 @@ def number_between(low: float, high: float) -> Callable[[str], float]:
 
 
 def seed_number(text: str) -> int:
-    """Returns what may begin a draw, for argparse."""
+    """Parses a random seed; an argparse type."""
     if not text.isdecimal() or int(text) >= 2**63:
         raise argparse.ArgumentTypeError(f"{text!r} is no seed, expected 0 to 2^63 - 1")
     return int(text)
 
 
 def at_least_one(text: str) -> int:
-    """Returns a count, for argparse."""
+    """Parses a count of at least 1; an argparse type."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no count, expected 1 or more")
     return int(text)

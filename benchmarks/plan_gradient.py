@@ -1,11 +1,11 @@
-"""Whether the gradient of a plan tells the way down, at moments of runs.
+"""Tests whether the gradient of a plan is a descent direction, at several times of runs.
 
     python -m benchmarks.plan_gradient out/dummy_standing-seed0/run.h5
 
-At each moment the global controller's cost is differenced over 1 cm/s of each velocity to both
-sides, what a plan may well change. Held against it, by step of the plan, are the exact gradient
-and the one with contact frozen: the cosine between them and the ratio of their sizes. Then both
-make a plan, from what the grippers did; told is which share of the cost they take away.
+At each time, central differences of the global controller's cost are computed with 1 cm/s in each
+velocity, a typical change of a plan. The exact gradient and the one with frozen contact are
+compared with them, by step of the plan: cosine and ratio of norms. Then a plan is made with each
+gradient, starting from the recorded gripper motion; the table gives the relative cost reduction.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
-# Half of what velocities are differenced over, m/s.
+# Half width of the central differences, m/s.
 _REACH = 0.01
 _KINDS = {"exact": False, "contact frozen": True}
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What a plan is made from.
+    """Inputs of a plan.
 
-    Garment (n,3), its velocity, targets, person, start (N,2,3), the person's left (N,3).
+    Garment (n,3), its velocity, targets, person, initial plan (N,2,3), the person's left (N,3).
     """
 
     x: FloatArray
@@ -55,7 +55,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Found:
-    """Of one moment: nodes in contact; by kind of gradient cosines (N,), ratios (N,), descent."""
+    """Results at one time: nodes in contact; cosines (N,), ratios (N,), descent by gradient."""
 
     touching: int
     cosine: dict[str, FloatArray]
@@ -64,7 +64,7 @@ class Found:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints the table; returns the exit status."""
+    """Evaluates the runs and prints the tables; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("log", type=Path, nargs="+", metavar="run.h5")
     parser.add_argument("--moments", type=int, default=20, help="of each run")
@@ -115,7 +115,7 @@ def _moment(policy: DressingPolicy, log: RunLog, time: float) -> Moment:
         axis=1,
     )
     start = np.diff(way, axis=0) / p.time_step
-    # what was not under way yet goes on as it was
+    # steps that were not planned yet repeat the first step after the committed ones
     start[p.committed_steps + 1 :] = start[p.committed_steps]
     speed = np.linalg.norm(start, axis=2, keepdims=True)
     start *= np.minimum(1.0, p.max_speed / np.maximum(speed, 1e-12))

@@ -1,12 +1,12 @@
-"""How well the controller's garment foresees a dressing: step size, iterations and mesh.
+"""Prediction error of the controller's garment, by time step, iterations and mesh.
 
     python -m benchmarks.prediction out/dummy_standing-seed0/run.h5
 
-From moments of a run on, the controller's garment is led by the grippers as the run led them, past
-the person as it was: what is left is the garment's own error. After 1, 2 and 3 s the centre and
-direction of both armholes are held against those of the plant. Cost is the time of a second
-foreseen, forward, and with the gradient by the grippers. The first row is a garment that moves as
-its grippers do.
+From several times of a run, the controller's garment is simulated with the recorded motion of the
+grippers and the person, so that the remaining error is the garment model's own. After 1, 2 and 3 s
+the centre and direction of both armholes are compared with the plant's. Cost is the computing time
+per predicted second, for the rollout alone and with the gradient with respect to the grippers. The
+first row is a baseline in which each armhole moves with its gripper.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
 AFTER = (1.0, 2.0, 3.0)
-# The garment is seen so long before and after a moment for its velocity, s.
+# Half width of the central difference for the garment's velocity, s.
 SEEN = 1.0 / 30.0
 _GRIPPERS = "as the grippers"
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A garment that foresees: step, s, inner iterations, mesh spacing, m."""
+    """A garment model that predicts: time step, s, inner iterations, mesh spacing, m."""
 
     time_step: float
     iterations: int
@@ -59,13 +59,13 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """For tables."""
+        """Name for tables."""
         return f"h = {self.time_step:g} s, {self.iterations} it., {100 * self.spacing:.1f} cm"
 
 
 @dataclass(frozen=True)
 class Foresight:
-    """Errors of a variant (moments · 2, 3) after 1, 2 and 3 s; times of a second foreseen, s."""
+    """Errors of a variant (moments · 2, 3) after 1, 2, 3 s; time per predicted second, s."""
 
     name: str
     position: list[list[float]]
@@ -76,12 +76,12 @@ class Foresight:
 
 @dataclass(frozen=True)
 class Run:
-    """A run that is foreseen.
+    """A run to predict.
 
     Attributes:
-        scenario: resolved. mesh: the plant's garment. path: of the log.
-        moments: (k,) s from which on it is foreseen.
-        person: as the controller knows it.
+        scenario: The resolved scenario. mesh: The plant's garment. path: Path of the log.
+        moments: (k,) start times of the predictions, s.
+        person: The controller's model of the person.
     """
 
     scenario: Scenario
@@ -92,7 +92,7 @@ class Run:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Foresees the runs with each variant and prints a table; returns the exit status."""
+    """Predicts the runs with each variant and prints a table; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("log", type=Path, nargs="+", metavar="run.h5")
     parser.add_argument("--steps", type=_numbers, default=[0.05, 0.1, 0.2, 0.5, 1.0], metavar="S,…")
@@ -121,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def table(found: Sequence[Foresight]) -> Table:
-    """Returns medians over moments and sleeves, and what they cost."""
+    """Returns medians over start times and sleeves, and the computing times."""
     rows = []
     for f in found:
         p, d = np.median(f.position, axis=0), np.median(f.direction, axis=0)
@@ -141,7 +141,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def read_run(path: Path, count: int) -> Run:
-    """Returns the run of a log, and `count` moments of it that leave 3 s to foresee."""
+    """Returns the run of a log, with `count` start times that leave 3 s to predict."""
     with RunLog.open(path) as log:
         scenario = logged_scenario(log)
         mesh = build_garment(scenario.garment, scenario.plant.spacing, path.parent)
@@ -211,13 +211,13 @@ def _cloth(run: Run, belief: GarmentMesh, variant: Variant) -> ExplicitBiasCloth
 
 
 def _errors(a: SleeveState, b: SleeveState) -> tuple[float, float]:
-    """Returns the distance of two sleeves' centres, m, and the angle between them, °."""
+    """Returns the distance of two sleeves' centres, m, and the angle between sleeves, °."""
     angle = np.degrees(np.arccos(np.clip(a.v_c @ b.v_c, -1.0, 1.0)))
     return float(np.linalg.norm(a.p_c - b.p_c)), float(angle)
 
 
 class Moment:
-    """What was, and what came, seen with the controller's mesh."""
+    """One start time: the recorded run around it, mapped to the controller's mesh."""
 
     def __init__(
         self, run: Run, belief: GarmentMesh, seen: sp.csr_array, log: RunLog, time: float
@@ -227,7 +227,7 @@ class Moment:
         self._signs = [loop_orientation(belief, side) for side in SIDES]
 
     def plant(self, after: float) -> FloatArray:
-        """Returns the plant's garment (m,3) at the controller's nodes, m."""
+        """Returns the plant's garment (m,3) at the controller's nodes, `after` s later, m."""
         t = self._log.time
         k = int(np.clip(np.searchsorted(t, self._time + after), 1, len(t) - 1))
         share = (self._time + after - t[k - 1]) / (t[k] - t[k - 1])
@@ -238,12 +238,12 @@ class Moment:
         return found
 
     def velocity(self) -> FloatArray:
-        """Returns that of the plant's garment (m,3) at the controller's nodes, m/s."""
+        """Returns the plant garment's velocity (m,3) at the controller's nodes, m/s."""
         found: FloatArray = (self.plant(SEEN) - self.plant(-SEEN)) / (2.0 * SEEN)
         return found
 
     def motion(self, after: FloatArray) -> FloatArray:
-        """Returns (k - 1,held,3) how what is held went between k times, m."""
+        """Returns the displacement (k - 1,held,3) of the held nodes between k times, m."""
         counts = [len(self._belief.grasp[side]) for side in SIDES]
         return np.repeat(np.diff(self.grippers(after), axis=0), counts, axis=1)
 
@@ -252,7 +252,7 @@ class Moment:
         return sleeve_state(x, self._belief.loops[f"{SIDES[side]}_armhole"], self._signs[side])
 
     def grippers(self, after: FloatArray) -> FloatArray:
-        """Returns (k,2,3) where grippers were, m."""
+        """Returns the recorded positions (k,2,3) of the grippers, m."""
         t = self._log.time
         return np.stack(
             [
@@ -269,14 +269,14 @@ class Moment:
         )
 
     def joints(self, after: FloatArray) -> FloatArray:
-        """Returns (k,6,3) where joints were, m."""
+        """Returns the recorded positions (k,6,3) of the person's joints, m."""
         t, q = self._log.time, self._log.joint_position
         flat = q.reshape(len(t), 18)
         found = [np.interp(self._time + after, t, flat[:, c]) for c in range(18)]
         return np.stack(found, axis=1).reshape(-1, 6, 3)
 
     def with_grippers(self) -> list[FloatArray]:
-        """Returns the garment as if each armhole went with its gripper."""
+        """Returns the garment with each armhole displaced like its gripper."""
         way = self.grippers(np.array([0.0, *AFTER]))
         found = []
         for now in way[1:]:
@@ -289,7 +289,7 @@ class Moment:
     def with_garment(
         self, cloth: ExplicitBiasCloth, h: float
     ) -> tuple[list[FloatArray], tuple[float, float]]:
-        """Returns the garment as foreseen, and times of a second of it: alone, with gradient."""
+        """Returns the predicted garment, and the time per predicted second, also with gradient."""
         steps = round(AFTER[-1] / h)
         at = h * np.arange(steps + 1, dtype=float)
         obstacles = person_obstacles(self._run.person, self.joints(at), h)

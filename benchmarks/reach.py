@@ -1,8 +1,8 @@
-"""`python -m benchmarks.reach LOG…`: how far arms fall behind grippers that floated.
+"""`python -m benchmarks.reach LOG…`: tracking error of arms that follow floating grippers.
 
-Follows the grippers of logged dressings with two arms, in numbers alone, for each placement of
-their bases. A placement is good where arms are never far behind: what they do not reach, the
-controller cannot dress with. Logs are of `drake-dress run` with floating grippers, `run.h5`.
+For each placement of the bases, two arms follow the grippers of logged dressings, in kinematics
+only. A placement is good if the tracking error is always small: the controller cannot dress with
+positions that the arms do not reach. Logs are `run.h5` of `drake-dress run` with floating grippers.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ _STEP = 0.02
 
 @dataclass(frozen=True)
 class Recorded:
-    """Grippers of a dressing, and the person beside them, every `_STEP`.
+    """Grippers and person of a dressing, sampled every `_STEP`.
 
     Attributes:
-        name: of the log's folder.
-        grippers: (T,2,3) m. velocity: (T,2,3) m/s.
-        first, second: (T,K,3) ends of the person's capsules, m. radius: (K,) m.
-        scenario: of the dressing.
+        name: Name of the log's folder.
+        grippers: (T,2,3) positions, m. velocity: (T,2,3) velocities, m/s.
+        first, second: (T,K,3) ends of the person's capsules, m. radius: (K,) radii, m.
+        scenario: Scenario of the dressing.
     """
 
     name: str
@@ -52,13 +52,13 @@ class Recorded:
     scenario: Scenario
 
     def person(self, k: int) -> Capsules:
-        """Returns where the person is."""
+        """Returns the person's capsules at sample `k`."""
         return Capsules(self.first[k], self.second[k], self.radius)
 
 
 @dataclass(frozen=True)
 class Followed:
-    """How arms followed: lag (T,2), m; least distances between arms and to the person, m."""
+    """Result of arms that follow: lag (T,2), m; least distances between arms, to the person, m."""
 
     lag: np.ndarray
     between: float
@@ -66,7 +66,7 @@ class Followed:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints a table; returns 0, 2 for bad arguments."""
+    """Prints a table; returns 0, or 2 on bad arguments."""
     options = _parser().parse_args(arguments)
     placements = [
         Arms("panda", behind, spread, height, tilt)
@@ -80,10 +80,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def recorded(path: Path, log: RunLog) -> Recorded:
-    """Returns what a log holds of grippers and person.
+    """Returns the resampled grippers and person of a log.
 
     Raises:
-        UserError: its grippers are on arms already.
+        UserError: The log's grippers are not floating.
     """
     scenario = logged_scenario(log)
     if scenario.station.arms.model != "floating":
@@ -109,14 +109,14 @@ def recorded(path: Path, log: RunLog) -> Recorded:
 
 
 def follow(run: Recorded, arms: Arms) -> Followed:
-    """Returns how arms that stand so follow the grippers.
+    """Simulates arms with a given placement that follow the grippers of a run.
 
     Args:
-        run: whose grippers.
-        arms: where they stand.
+        run: Run with the grippers to follow.
+        arms: Placement of the arms.
 
     Raises:
-        ArmReachError: they do not reach where the run begins.
+        ArmReachError: The arms do not reach the start of the run.
     """
     stands = placement(arms, run.scenario.person)
     assert stands is not None
@@ -139,7 +139,7 @@ def follow(run: Recorded, arms: Arms) -> Followed:
 
 
 def table(runs: Sequence[Recorded], placements: Sequence[Arms]) -> Table:
-    """Returns a row a placement: lag over all runs, the worst run's, and least distances."""
+    """Returns one row per placement: lag over all runs, the worst run, and least distances."""
     rows: list[list[Any]] = []
     for arms in placements:
         name = (

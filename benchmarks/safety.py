@@ -1,18 +1,18 @@
-"""The safety governor against controllers and sensors that fail.
+"""Tests the safety governor with failing controllers and sensors.
 
     python benchmarks/safety.py --commands 10000 --seed 3
 
-Two grippers hold a garment, a tether each that pulls when it is stretched, on a diagram with the
-governor between them and a controller. Controller or sensors fail in every way of the list below,
-each for its share of the commands, with random numbers from the seed. What is measured is what
-comes out: position commands and the tethers' true forces.
+Each of two grippers is attached to a tether, which stands for the garment and pulls when it is
+stretched. The diagram has the governor between the grippers and a controller. Controller or sensors
+fail in every way listed below, each for its share of the commands, with random numbers from the
+seed. The outputs are measured: position commands and the tethers' true forces.
 
-Printed are for each failure the worst speed, the worst acceleration, by how much the worst speed
-against a force over the hard limit is more than braking allows, how far the command was before its
-gripper, and the worst force. That has a bound as long as sensors tell the truth or nothing: a
-command leads its gripper by max_lead at most, braking included, and the gripper goes on for one
-period before its force is seen, so no more than stiffness · (max_lead + gripper speed · period)
-comes on top of the hard limit. The exit status is 1 if any limit was broken.
+For each failure the table gives the worst speed, the worst acceleration, the excess of the speed
+against a force above the hard limit over what braking allows, the lead of the command over its
+gripper, and the worst force. The force is bounded if sensors report true values or none: a command
+leads its gripper by at most max_lead, braking included, and the gripper moves for one period before
+its force is measured. Therefore, it exceeds the hard limit by at most
+stiffness · (max_lead + gripper speed · period). The exit status is 1 if any limit was exceeded.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ START = np.array([[0.0, 0.25, 1.4], [0.0, -0.25, 1.4]])
 STIFFNESS, SLACK = 400.0, 0.03  # of a tether: N/m, m
 LIMITS = SafetyLimits(least_distance=0.1)
 
-# What a controller asks for: (generator, command, time) to velocities (2,3) and their stamp.
+# A controller's request: (generator, command, time) to velocities (2,3) and their time stamp.
 Ask = Callable[[np.random.Generator, int, float], tuple[np.ndarray, float]]
-# What sensors add to position and force: (generator, command) to (2,6).
+# Disturbance added to measured position and force: (generator, command) to (2,6).
 Disturb = Callable[[np.random.Generator, int], np.ndarray]
 
 
 class FailingController(LeafSystem):
-    """Asks for whatever `ask` draws, at the command rate.
+    """Requests the velocities that `ask` draws, at the command rate.
 
     .. pydrake_system::
 
@@ -80,13 +80,13 @@ class FailingController(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(PERIOD, 0.0, self._update)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        now = context.get_time() + PERIOD  # when it is seen
+        now = context.get_time() + PERIOD  # when the governor reads it
         velocity, stamp = self._ask(self._generator, round(now / PERIOD), now)
         discrete.set_value(0, np.concatenate([velocity.ravel(), [stamp]]))
 
 
 class FailingSensors(LeafSystem):
-    """Adds what `disturb` draws to positions and forces; NaN hides them.
+    """Adds the disturbance drawn by `disturb` to positions and forces; NaN hides them.
 
     .. pydrake_system::
 
@@ -100,7 +100,7 @@ class FailingSensors(LeafSystem):
         - right_gripper_position
         - right_gripper_force
 
-    The true values (6,): position, m, and force, N.
+    True values (6,): position, m, and force, N.
     """
 
     def __init__(self, disturb: Disturb, generator: np.random.Generator) -> None:
@@ -128,7 +128,7 @@ class FailingSensors(LeafSystem):
 
 
 class Tether(LeafSystem):
-    """A garment of one thread: pulls a gripper back to where it began, once it is stretched.
+    """A garment reduced to one thread: pulls a gripper back to its start once it is stretched.
 
     .. pydrake_system::
 
@@ -139,7 +139,7 @@ class Tether(LeafSystem):
         - position_and_force
 
     Args:
-        anchor: (3,) m.
+        anchor: (3,) anchor point, m.
     """
 
     def __init__(self, anchor: np.ndarray) -> None:
@@ -154,7 +154,7 @@ class Tether(LeafSystem):
 
 
 def tether_force(offset: np.ndarray) -> np.ndarray:
-    """Returns the force (3,), N, on a gripper that is `offset` (3,), m, from its anchor."""
+    """Returns the force (3,) on a gripper at `offset` (3,), m, from its anchor, N."""
     length = float(np.linalg.norm(offset))
     if length <= SLACK:
         return np.zeros(3)
@@ -239,7 +239,7 @@ def _all_lies(rng: np.random.Generator, k: int) -> np.ndarray:
 
 
 _POSITION, _FORCE = slice(0, 3), slice(3, 6)
-# The first two say nothing false: the force's bound holds with them.
+# The first two report no false values, so the force's bound holds with them.
 SENSORS: dict[str, Disturb] = {
     "force is NaN now and then": _hidden(_FORCE, 0.1),
     "position is NaN now and then": _hidden(_POSITION, 0.1),
@@ -253,17 +253,18 @@ _TRUTHFUL = ("force is NaN now and then", "position is NaN now and then")
 
 @dataclass(frozen=True)
 class Worst:
-    """The worst of one failure.
+    """Worst values for one failure.
 
     Attributes:
-        failure: in words.
-        commands: how many were given, of each gripper.
-        speed: of a command, m/s.
-        acceleration: of a command, m/s².
-        pull: speed against a measured force over the hard limit, beyond what braking leaves, m/s.
-        lead: of the command before the true gripper, m; None where positions were false.
-        force: true, N.
-        force_bound: N; None where sensors tell lies.
+        failure: Description of the failure.
+        commands: Number of commands for each gripper.
+        speed: Largest speed of a command, m/s.
+        acceleration: Largest acceleration of a command, m/s².
+        pull: Largest speed against a measured force above the hard limit, beyond what braking
+            allows, m/s.
+        lead: Largest distance from the true gripper to its command, m; None with false sensors.
+        force: Largest true force, N.
+        force_bound: Bound of the force, N; None with false sensors.
     """
 
     failure: str
@@ -276,10 +277,10 @@ class Worst:
     force_bound: float | None
 
     def broken(self) -> list[str]:
-        """Returns the names of the limits that did not hold."""
+        """Returns the names of the exceeded limits."""
         held = {
             "speed": self.speed <= LIMITS.max_speed * (1.0 + 1e-9),
-            # positions of metres are known to 1e-16, so their second difference to 1e-11
+            # positions in metres are exact to 1e-16, so their second differences to 1e-11
             "acceleration": self.acceleration <= LIMITS.max_braking * (1.0 + 1e-9),
             "pull": self.pull <= 1e-9,
             "lead": self.lead is None or self.lead <= LIMITS.max_lead * (1.0 + 1e-9),
@@ -289,7 +290,7 @@ class Worst:
 
 
 def measure(failure: str, ask: Ask, disturb: Disturb, commands: int, seed: int) -> Worst:
-    """Returns the worst of so many commands with a failing controller or failing sensors."""
+    """Returns the worst values over `commands` commands with a failing controller or sensors."""
     rng = np.random.default_rng([seed, *failure.encode()])
     builder = DiagramBuilder()
     controller = builder.AddSystem(FailingController(ask, rng))
@@ -344,8 +345,8 @@ def measure(failure: str, ask: Ask, disturb: Disturb, commands: int, seed: int) 
 def _worst_of_side(log: dict[str, np.ndarray]) -> tuple[float, float, float, float, float]:
     """Returns worst speed, acceleration, pull, lead and force of one gripper's logs.
 
-    A log holds values as they are before the update of its time: what the governor sees in row k
-    makes the command of row k + 1.
+    A log holds values before the update at its time: the governor's inputs in row k determine the
+    command in row k + 1.
     """
     velocity = np.diff(log["command"], axis=0) / PERIOD
     before = np.vstack([np.zeros((1, 3)), velocity[:-1]])
@@ -368,7 +369,7 @@ def _worst_of_side(log: dict[str, np.ndarray]) -> tuple[float, float, float, flo
 
 
 def run(commands: int, seed: int, tell: bool = False) -> list[Worst]:
-    """Returns the worst of each failure; `commands` are shared out among them."""
+    """Returns the worst values of each failure; `commands` are divided among the failures."""
     failures: list[tuple[str, Ask, Disturb]] = [
         *((f"request: {name}", ask, _nothing) for name, ask in REQUESTS.items()),
         *((name, REQUESTS["pulls away forever"], disturb) for name, disturb in SENSORS.items()),
@@ -384,7 +385,7 @@ def run(commands: int, seed: int, tell: bool = False) -> list[Worst]:
 
 
 def print_table(found: list[Worst]) -> None:
-    """Prints a row for each failure, with the limits on top."""
+    """Prints the limits, then a row for each failure."""
     bound = next(w.force_bound for w in found if w.force_bound is not None)
     print("| failure | commands | speed, m/s | acceleration, m/s² ", end="")
     print("| pull beyond braking, m/s | lead, mm | force, N | broken |")
@@ -405,7 +406,7 @@ def print_table(found: list[Worst]) -> None:
 
 
 def main() -> int:
-    """Runs all failures; returns 1 if a limit was broken."""
+    """Runs all failures; returns 1 if a limit was exceeded."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--commands", type=int, default=10000, help="in all (default 10000)")
     parser.add_argument("--seed", type=int, help="of all that is random; drawn if not given")

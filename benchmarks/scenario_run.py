@@ -1,4 +1,4 @@
-"""One `drake-dress run` in a process of its own, for benchmarks that need several."""
+"""Executes a `drake-dress run` in a separate process, for benchmarks that need several."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ def run_scenario(
     report: bool = True,
     one_process: bool = True,
 ) -> tuple[int, str]:
-    """Returns the exit status, and why the run could not be used (empty where it could).
+    """Returns the exit status, and why the run gave no result (empty if it gave one).
 
     Args:
-        scenario: file.
-        out: directory that it writes to.
-        overrides: KEY=VALUE for the scenario.
-        seed: of the run; None for the scenario's own.
-        report: whether report and replay are written beside log and summary.
-        one_process: whether it leaves other cores to runs beside it.
+        scenario: Scenario file.
+        out: Output directory.
+        overrides: KEY=VALUE settings of the scenario.
+        seed: Seed of the run; None for the scenario's own.
+        report: Whether to write report and replay in addition to log and summary.
+        one_process: Whether to use one process only, which leaves other cores to parallel runs.
     """
     command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
     command += ["--out", str(out)]

@@ -1,4 +1,4 @@
-"""The part of a document that a benchmark writes: what stands between two marks."""
+"""The section of a document that a benchmark writes, delimited by two marks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ END = "<!-- end -->"
 
 
 def begin(benchmark: str) -> str:
-    """Returns the mark before the part of a benchmark."""
+    """Returns the mark before a benchmark's section."""
     return f"<!-- bench {benchmark} -->"
 
 
 def add_into_option(parser: argparse.ArgumentParser, benchmark: str) -> None:
-    """Adds `--into`, the file in which a benchmark's tables stand between marks."""
+    """Adds `--into`, the file that has a benchmark's tables between marks."""
     parser.add_argument(
         "--into",
         type=Path,
@@ -27,20 +27,20 @@ def add_into_option(parser: argparse.ArgumentParser, benchmark: str) -> None:
 
 
 def write_between(path: Path, benchmark: str, text: str) -> None:
-    """Puts text between the two marks of a file.
+    """Writes text between the two marks of a file.
 
     Raises:
-        UserError: the file cannot be read, or lacks them.
+        UserError: The file cannot be read, or lacks the marks.
     """
     before, after = around(path, benchmark)
     write_text(path, f"{before}{begin(benchmark)}\n\n{text}\n\n{END}{after}")
 
 
 def around(path: Path, benchmark: str) -> tuple[str, str]:
-    """Returns what a file holds before and after the marks.
+    """Returns the content of a file before and after the marks.
 
     Raises:
-        UserError: the file cannot be read, or lacks them.
+        UserError: The file cannot be read, or lacks the marks.
     """
     try:
         content = path.read_text(encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Which seeds a study runs: given ones, or ones drawn for a purpose.
+"""The seeds of a study: given ones, or ones drawn for a purpose.
 
 Seeds 0 to 99 are for development, 100 to 999 for choosing between variants, 1000 and above for
-reporting. A figure that is reported comes from seeds that nobody looked at before; so they are
-drawn, from a root that is printed and with which they can be drawn again.
+reporting. Reported figures must come from seeds that nobody has looked at. Therefore, they are
+drawn; the root of the draw is printed, so that it can be repeated.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ _ROOTS = 10**6
 
 @dataclass(frozen=True)
 class Draw:
-    """So many seeds for a purpose of `PURPOSES`."""
+    """A number of seeds to draw for a purpose in `PURPOSES`."""
 
     purpose: str
     count: int
 
 
 def draw_seeds(draw: Draw, root: int) -> list[int]:
-    """Returns different seeds of a purpose, sorted; with the same root, the same.
+    """Returns distinct, sorted seeds for a purpose; equal roots give equal seeds.
 
-    More seeds of a root hold those that fewer are: a study can be made longer.
+    A larger draw with the same root contains the smaller one, so that a study can be extended.
     """
     among = PURPOSES[draw.purpose]
     rng = np.random.default_rng([root, among.start])
@@ -44,7 +44,7 @@ def draw_seeds(draw: Draw, root: int) -> list[int]:
 
 
 def draw_of(text: str) -> Draw:
-    """Returns the draw that PURPOSE:N means, for argparse."""
+    """Parses PURPOSE:N; an argparse type."""
     purpose, _, count = text.partition(":")
     if purpose not in PURPOSES or not count.isdecimal():
         raise argparse.ArgumentTypeError(
@@ -76,10 +76,10 @@ def add_seed_options(parser: argparse.ArgumentParser, default: Sequence[int]) ->
 
 
 def chosen_seeds(options: argparse.Namespace) -> tuple[Sequence[int], str]:
-    """Returns the seeds of a study, and what is to be said of them above its tables.
+    """Returns the seeds of a study, and a sentence on them to print above its tables.
 
     Raises:
-        UserError: a root without a draw.
+        UserError: A root is given without a draw.
     """
     if options.draw is None:
         if options.root is not None:

@@ -1,4 +1,4 @@
-"""Runs cases side by side in threads, until a signal ends the study."""
+"""Runs cases in parallel threads until a signal ends the study."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ R = TypeVar("R")
 def completed(
     run: Callable[[C], R], cases: Sequence[C], jobs: int, stop: Interrupt
 ) -> Iterator[tuple[C, R]]:
-    """Yields each case with what it came to, as soon as it is done.
+    """Yields each case with its result as soon as it is done.
 
-    After the first signal that ends a command no case begins, and what is done next is the last
-    that is yielded. A second one raises; cases that were not begun are not waited for then, either.
+    After the first ending signal no further case starts, and the next finished case is the last one
+    yielded. A second signal raises; cases that have not started are cancelled then, too.
     """
     with ThreadPoolExecutor(jobs) as pool:
         pending = {pool.submit(run, case): case for case in cases}

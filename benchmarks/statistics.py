@@ -1,4 +1,4 @@
-"""Intervals for what benchmarks count."""
+"""Confidence intervals of counted results."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ _Z = 1.645
 
 
 def wilson(right: int, count: int) -> tuple[float, float]:
-    """Returns the 90 % interval of a share, of which `right` in `count` were seen (Wilson 1927)."""
+    """Returns the 90 % interval of a share, of which `right` in `count` occurred (Wilson 1927)."""
     if count == 0:
         return 0.0, 1.0
     share = right / count
     middle = (share + _Z * _Z / (2 * count)) / (1 + _Z * _Z / count)
     spread = _Z / (1 + _Z * _Z / count)
     spread *= math.sqrt(share * (1 - share) / count + _Z * _Z / (4 * count * count))
-    # of none and of all they end there, but for rounding
+    # for none or all, the bound is exactly 0 or 1 except for rounding
     return (
         middle - spread if right > 0 else 0.0,
         middle + spread if right < count else 1.0,

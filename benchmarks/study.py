@@ -1,4 +1,4 @@
-"""Runs the cases of a long study side by side; what is done is kept, and not run again."""
+"""Runs the cases of a long study in parallel; results are kept and not run again."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ C = TypeVar("C", bound=_Named)
 
 
 def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> None:
-    """Adds an option for each keyword, that takes some of its names; all by default."""
+    """Adds an option for each keyword that takes some of its names; default: all."""
     for option, names in known.items():
         parser.add_argument(
             f"--{option}",
@@ -45,7 +45,7 @@ def add_choices(parser: argparse.ArgumentParser, **known: Collection[str]) -> No
 
 
 def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int = 2) -> None:
-    """Adds the options that `carry_out` reads; `jobs` run side by side by default."""
+    """Adds the options that `carry_out` reads; by default `jobs` cases run in parallel."""
     parser.add_argument(
         "--jobs",
         type=at_least_one,
@@ -71,7 +71,7 @@ def add_study_options(parser: argparse.ArgumentParser, benchmark: str, jobs: int
 
 
 def dressed(summary: dict[str, Any]) -> str:
-    """Returns how a dressing ended, in a few words."""
+    """Returns a short text on how a dressing ended."""
     return summary["reason"] or f"on in {summary['dressing_time_s']:.0f} s"
 
 
@@ -99,7 +99,7 @@ class Study(Generic[C]):
 def carry_out(
     options: argparse.Namespace, study: Study[C], cases: Sequence[C], said: str = ""
 ) -> tuple[list[dict[str, Any]], int | None]:
-    """Runs what is missing and prints the tables.
+    """Runs the missing cases and prints the tables.
 
     Args:
         options: those of `add_study_options`.
@@ -136,13 +136,13 @@ def carry_out(
 
 
 def exit_status(results: Sequence[dict[str, Any]], stopped: int | None) -> int:
-    """Returns the status of the signal that ended the study, 1 if a run could not be used, or 0."""
+    """Returns the status of the signal that ended the study, 1 if a run gave no result, or 0."""
     return int(any("problem" in result for result in results)) if stopped is None else stopped
 
 
 @contextmanager
 def place_of(case: _Named, folder: Path | None) -> Iterator[Path]:
-    """Provides the folder of a case: of its name in `folder`, or one that is kept no longer."""
+    """Yields the folder of a case: named after it in `folder`, or a temporary one."""
     if folder is not None:
         yield folder / case.name
         return
@@ -158,15 +158,15 @@ def run_case(
     seed: int | None = None,
     look: Callable[[Path], dict[str, Any]] = lambda out: {},
 ) -> dict[str, Any]:
-    """Returns what one `drake-dress run` came to: case, summary, and what else is looked at.
+    """Executes one `drake-dress run`; returns its case, summary and further results.
 
     Args:
-        case: a dataclass with a name.
-        scenario: file.
-        folder: in which it is kept under the case's name; None to keep nothing.
-        settings: KEY=VALUE for the scenario.
-        seed: of the run; None for the scenario's own.
-        look: what to take from the folder that it wrote.
+        case: Dataclass with a name.
+        scenario: Scenario file.
+        folder: Folder in which the run is kept under the case's name; None to keep nothing.
+        settings: KEY=VALUE settings of the scenario.
+        seed: Seed of the run; None for the scenario's own.
+        look: Returns further results from the run's output folder.
     """
     with place_of(case, folder) as out:
         status, problem = run_scenario(scenario, out, settings, seed, report=folder is not None)
@@ -178,7 +178,7 @@ def run_case(
 
 @dataclass(frozen=True)
 class _Run(Generic[C]):
-    """Runs a case, here or on a node; of one that succeeded files may be left out."""
+    """Runs a case, here or on a node; may delete the files of a successful one."""
 
     run: Callable[[C, Path | None, Sequence[str]], dict[str, Any]]
     settings: Sequence[str]
@@ -196,7 +196,7 @@ class _Run(Generic[C]):
 def _completed(
     run: _Run[C], cases: Sequence[C], options: argparse.Namespace, stop: Interrupt
 ) -> Iterator[tuple[C, dict[str, Any]]]:
-    """Yields each case with its result as soon as it is done, on this machine or on a cluster."""
+    """Yields each case with its result once it is done, on this machine or on a cluster."""
     keep: Path | None = options.keep
     if options.ray is None:
         yield from completed(lambda case: run(case, keep), cases, options.jobs, stop)

@@ -3,7 +3,7 @@
 from drake_dress.caches import prepare_caches
 from drake_dress.machine import limit_threads
 
-# Before any library that keeps a cache or starts threads is imported.
+# Must run before any import of a library that keeps a cache or starts threads.
 prepare_caches()
 limit_threads()
 

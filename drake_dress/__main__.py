@@ -1,4 +1,4 @@
-"""The command line."""
+"""The command line of `drake-dress`."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from drake_dress.streams import forgiving_streams, keep_standard_descriptors
 from drake_dress.yaml_text import plain_value
 
 FAILED, UNUSABLE = 1, 2
-# Ports that a program may open without being root.
+# Ports that a program may open without root rights.
 _PORTS = 1024, 65535
-# Simulated seconds per second; slower, and Ctrl-C would wait for minutes.
+# Simulated seconds per second; at lower rates Ctrl-C would take minutes.
 _RATES = 0.02, 1e3
-# Of a hidden effect, by what matters.
+# Range of the factor on a hidden effect's strength.
 _SIZES = 1e-3, 1e3
-# Beyond these a marker is anywhere in the room, m, and a gripper at what it can carry, N.
+# Larger noise is meaningless: the size of a room, m, and a gripper's payload, N.
 _MOST_MARKER_NOISE, _MOST_FORCE_NOISE = 1.0, 100.0
-# By name, what each measures; the first is the default.
+# Name to what it measures; the first is the default.
 BENCHMARKS = {
     "cloth": "accuracy and speed of the garment, beside other simulators where installed",
     "arms": "every scenario with floating grippers and with two arms; what the arms do",
@@ -70,7 +70,7 @@ exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input""
 
 
 _OF_SCENARIO = "a YAML file, or the name of a scenario that ships; see drake-dress scenarios"
-# What `add_subparsers` returns.
+# Return type of `add_subparsers`.
 _Verbs: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
@@ -84,8 +84,8 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command line; returns the exit status.
 
-    May be called any number of times in a process: handlers of signals, standard output and errors
-    are as before when it returns.
+    May be called any number of times in a process: on return, signal handlers and the standard
+    streams are restored.
     """
     if arguments is None:
         keep_standard_descriptors()
@@ -114,7 +114,7 @@ def _status(words: list[str]) -> int:
         if "\0" in word:
             raise UserError("command line", repr(word), "holds a NUL character, expected none")
     if words[:1] == ["bench"]:
-        # A benchmark has options of its own.
+        # Each benchmark parses its own options.
         return _bench(words[1:])
     options = _parser().parse_args(words)
     check_libraries()
@@ -438,7 +438,7 @@ def _bench(words: list[str]) -> int:
 
 
 def _plugins_of(words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Returns the values of `--plugin` in a benchmark's words, and the other words."""
+    """Splits a benchmark's arguments into the values of `--plugin` and all others."""
     parser = _Parser(add_help=False, allow_abbrev=False)
     _add_plugin(parser)
     options, others = parser.parse_known_args(words)
@@ -448,12 +448,12 @@ def _plugins_of(words: Sequence[str]) -> tuple[list[str], list[str]]:
 def _directory(
     out: str | None, default: Path, names: Sequence[str], inputs: Sequence[str | Path]
 ) -> Path:
-    """Returns where to write, once it has proved writable; it need not be there yet."""
+    """Returns the output directory after checking that it is writable; it need not exist."""
     return prove_directory("--out", default if out is None else out, names, inputs)
 
 
 def _number(text: str) -> int | float:
-    """Returns a number, which is read as a scenario's are."""
+    """Returns the number in `text`, parsed as in a scenario."""
     try:
         value = plain_value(text)
     except ValueError as error:
@@ -473,7 +473,7 @@ def _rate(text: str) -> float:
 
 
 def _between(low: float, high: float) -> Callable[[str], float]:
-    """Returns a reader of a number from `low` to `high`."""
+    """Returns a parser of numbers from `low` to `high`."""
 
     def number(text: str) -> float:
         value = float(_number(text))

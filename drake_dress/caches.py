@@ -1,9 +1,9 @@
-"""Folders for what libraries keep between runs, where the usual ones cannot be written to.
+"""Cache folders for libraries, if the usual ones are not writable.
 
-An installation and a home may be read-only (images of Apptainer and Docker, Nix, shared clusters),
-missing, or full. Then caches go to a folder of the user's own below the temporary one. All
-libraries in use, Numba, Warp, Matplotlib and Mesa among them, look at the environment for it, and
-processes that are started inherit it.
+An installation or home folder may be read-only (images of Apptainer and Docker, Nix, shared
+clusters), missing, or full. Caches then go to a private folder in the temporary directory. All
+libraries in use, including Numba, Warp, Matplotlib and Mesa, read the folder from the environment,
+which child processes inherit.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from collections.abc import MutableMapping
 from functools import lru_cache
 from pathlib import Path
 
-# Written to find out whether there is room: about as much as one compiled kernel.
+# Bytes written to test for free space: about the size of one compiled kernel.
 _PROBE = 1 << 16
-# Variables of libraries that name a folder of their own, which must be of use where it is set.
+# Environment variables for the cache folders of single libraries; if set, they must be usable.
 _OWN_FOLDERS = ("NUMBA_CACHE_DIR", "WARP_CACHE_PATH")
 
 
 def prepare_caches(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Points libraries to folders that can be written to. Changes nothing where they can be.
+    """Points libraries to writable cache folders; leaves usable folders as they are.
 
     Args:
-        environment: of the process.
+        environment: Environment of the process.
     """
     for name in _OWN_FOLDERS:
         if name in environment and not usable(Path(environment[name])):
@@ -35,7 +35,7 @@ def prepare_caches(environment: MutableMapping[str, str] = os.environ) -> None:
         cache = temporary_cache()
         if cache is not None:
             environment["XDG_CACHE_HOME"] = str(cache)
-    # Matplotlib keeps its settings in another folder, and complains where it cannot.
+    # Matplotlib keeps its settings in another folder, and warns if it is not writable.
     own = environment.get("MPLCONFIGDIR")
     config = _home_folder(environment, "XDG_CONFIG_HOME", ".config")
     settings = Path(own) if own else None if config is None else config / "matplotlib"
@@ -44,7 +44,7 @@ def prepare_caches(environment: MutableMapping[str, str] = os.environ) -> None:
 
 
 def user_cache() -> Path | None:
-    """Returns this program's own folder for what it keeps; None where nothing can be kept."""
+    """Returns this program's own cache folder; None if no folder is writable."""
     cache = _home_folder(os.environ, "XDG_CACHE_HOME", ".cache")
     if cache is not None and usable(cache / "drake_dress"):
         return cache / "drake_dress"
@@ -53,17 +53,17 @@ def user_cache() -> Path | None:
 
 @lru_cache(maxsize=1)
 def temporary_cache() -> Path | None:
-    """Returns a folder below the temporary one that nobody else can write to.
+    """Returns a folder in the temporary directory that only this user can write to.
 
-    It has the user's name and stays, so that kernels are not compiled in each run. Where somebody
-    else has made a folder of that name, or nothing can be written, there is none.
+    Its name contains the user ID and it persists, so that kernels are not compiled in each run.
+    Returns None if another user owns a folder of that name, or if nothing can be written.
     """
     try:
         parent = Path(tempfile.gettempdir())
-        # Python's last resort is the working directory, which is the user's.
+        # Python falls back to the working directory, which belongs to the user.
         if parent == Path.cwd():
             return None
-    except OSError:  # there is none, or the working directory is gone
+    except OSError:  # no temporary directory, or the working directory was deleted
         return None
     folder = parent / f"drake-dress-{os.getuid()}"
     try:
@@ -76,7 +76,7 @@ def temporary_cache() -> Path | None:
 
 
 def usable(folder: Path) -> bool:
-    """Returns whether a folder is there, or can be made, and has room."""
+    """Returns whether a folder exists or can be created, and has free space."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
@@ -88,10 +88,10 @@ def usable(folder: Path) -> bool:
 
 
 def _home_folder(environment: MutableMapping[str, str], name: str, usual: str) -> Path | None:
-    """Returns the folder that a variable names, or the usual one in the user's home."""
+    """Returns the folder named by a variable, or the usual one in the user's home."""
     if environment.get(name):
         return Path(environment[name])
     try:
         return Path.home() / usual
-    except RuntimeError:  # no HOME, and a user whom the system does not know
+    except RuntimeError:  # HOME is not set, and the system does not know the user
         return None

@@ -1,8 +1,8 @@
-"""Matplotlib, for pictures in files alone: no setting of the user's changes or fails them.
+"""Matplotlib for image files only, independent of the user's settings.
 
-Its import fails if `MPLBACKEND` names a window or notebook that is not installed, as in each
-command of a notebook; settings in a `matplotlibrc` may ask for LaTeX. Neither is of use here:
-figures are drawn on a canvas of their own.
+Importing Matplotlib fails if `MPLBACKEND` names a GUI or notebook backend that is not installed, as
+in commands run from a notebook. A `matplotlibrc` may require LaTeX. Neither is needed here: figures
+are drawn on their own canvas.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def load_matplotlib() -> None:
-    """Imports Matplotlib whatever `MPLBACKEND` says, which holds for others if it can."""
+    """Imports Matplotlib whatever `MPLBACKEND` says; then sets that backend if it is available."""
     if "matplotlib" in sys.modules:
         return
     backend = os.environ.pop("MPLBACKEND", None)
@@ -33,25 +33,25 @@ def load_matplotlib() -> None:
         if backend is not None:
             os.environ["MPLBACKEND"] = backend
     if backend:
-        # As Matplotlib does at its import, where it fails for a backend that is not installed.
+        # Matplotlib does this at import, which fails for a backend that is not installed.
         with suppress(Exception):
             matplotlib.rcParams["backend"] = backend
 
 
 @contextmanager
 def plain_settings() -> Iterator[None]:
-    """Has Matplotlib's own settings hold, not the user's; files are the same each time."""
+    """Uses Matplotlib's default settings, not the user's, so that files are reproducible."""
     load_matplotlib()
     import matplotlib
 
     settings = {k: v for k, v in matplotlib.rcParamsDefault.items() if "backend" not in k}
-    # Names inside a file are drawn by chance otherwise.
+    # Without a salt, identifiers in an SVG are random.
     with matplotlib.rc_context(settings | {"svg.hashsalt": "drake_dress"}):
         yield
 
 
 def new_figure(width: float, height: float, **options: Any) -> Figure:
-    """Returns an empty figure of so many inches, on a canvas of pixels."""
+    """Returns an empty figure on a raster canvas, size in inches."""
     load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -62,20 +62,20 @@ def new_figure(width: float, height: float, **options: Any) -> Figure:
 
 
 def as_svg(figure: Figure) -> bytes:
-    """Returns a figure as a file."""
+    """Returns a figure encoded as SVG."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
 
 
 def pixels(figure: Figure) -> npt.NDArray[np.uint8]:
-    """Returns (height, width, 4) RGBA of a figure."""
+    """Returns the RGBA pixels (height, width, 4) of a figure."""
     figure.canvas.draw()
     return np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]  # of Agg
 
 
 def as_png(picture: npt.NDArray[np.uint8]) -> bytes:
-    """Returns a picture (height, width, 3 or 4) as a file."""
+    """Returns an image (height, width, 3 or 4) encoded as PNG."""
     load_matplotlib()
     from matplotlib import image
 

@@ -1,19 +1,19 @@
-"""What the user gave cannot be used: told in one line, exit status 2."""
+"""Errors that the command line reports in one line, with their exit status."""
 
-# Most characters of a part of the line: a path, a key, what is wrong.
+# Maximum lengths of the parts of the line: path, key, message.
 _SOURCE, _KEY, _MESSAGE = 1000, 100, 300
 
 
 class UserError(ValueError):
-    """Unusable input, with the file (or argument) and the key where it was found.
+    """Unusable input, with its file (or argument) and key; exit status 2.
 
-    The line is readable whatever the input holds: white space is collapsed, control characters are
-    escaped, and the middle of a long part is left out.
+    The line is readable for any input: white space is collapsed, control characters are escaped,
+    and the middle of a long part is left out.
 
     Args:
-        source: file name or command-line argument the input came from.
-        key: dotted key, mesh element or field inside the source; may be empty.
-        message: what came and what was expected instead.
+        source: File name or command-line argument that the input came from.
+        key: Dotted key, mesh element or field inside the source; may be empty.
+        message: The value found, and what was expected instead.
     """
 
     def __init__(self, source: str, key: str, message: str) -> None:
@@ -25,11 +25,11 @@ class UserError(ValueError):
 
 
 class FailedError(RuntimeError):
-    """What was asked for ran and did not succeed, for a reason told in one line: exit status 1."""
+    """The command ran but failed, for a reason given in one line; exit status 1."""
 
 
 def _in_one_line(text: str, longest: int) -> str:
-    # far more than is shown need not be looked at
+    # cut first, so that very long text is cheap
     if len(text) > 4 * longest:
         text = f"{text[: 2 * longest]} {text[-2 * longest :]}"
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))

@@ -1,7 +1,7 @@
-"""Files that commands write: proved writable before work begins, and whole or not there.
+"""Output files of commands: checked for writability in advance, and written atomically.
 
-Minutes or hours of simulation stand between a command and what it writes. So a place that cannot
-be written to is told first, by writing there and taking back what was made.
+A command may simulate for minutes or hours before it writes. Therefore, a location that is not
+writable is reported first, by creating files there and removing them again.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from pathlib import Path
 
 from drake_dress.errors import UserError
 
-# What each command writes into its folder. Only these are ever removed there.
+# Files that each command writes into its folder. Only these are ever removed there.
 RUN_FILES = ("run.h5", "summary.json", "report.html", "replay.html")
 EXPLAIN_FILES = ("extended.yaml", "report.html", "explanation.json")
 DATASET_FILES = ("measured.h5", "answer.json")
-# A file system without locks; two runs there are not told apart.
+# The file system has no locks; two commands there cannot be detected.
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 def prove_directory(
     option: str, directory: str | Path, names: Sequence[str], inputs: Sequence[str | Path] = ()
 ) -> Path:
-    """Returns a folder, which need not be there yet, once files could be written in it.
+    """Checks that files can be written in a folder, and returns it; it need not exist.
 
-    What is made to find out is taken back.
+    Files and folders created for the check are removed.
 
     Args:
-        option: that names it, for messages.
-        directory: the folder.
-        names: of the files that will be written there.
-        inputs: files that are read, none of which may be written over.
+        option: Option that names the folder, for messages.
+        directory: The folder.
+        names: Names of the files that will be written there.
+        inputs: Input files, none of which may be overwritten.
 
     Raises:
-        UserError: it cannot be written to.
+        UserError: The folder is not writable.
     """
     if not str(directory):
         raise UserError(option, "", "is empty, expected a directory")
@@ -58,10 +58,10 @@ def prove_directory(
 
 
 def prove_file(option: str, file: str | Path, inputs: Sequence[str | Path] = ()) -> Path:
-    """Returns a file, which need not be there yet, once it could be written; see above.
+    """Checks that a file can be written, and returns it; like `prove_directory`.
 
     Raises:
-        UserError: it cannot be written.
+        UserError: The file cannot be written.
     """
     if not str(file):
         raise UserError(option, "", "is empty, expected a file")
@@ -77,7 +77,7 @@ def prove_file(option: str, file: str | Path, inputs: Sequence[str | Path] = ())
 
 
 def output_file(text: str) -> Path:
-    """Returns a file that has proved writable, for argparse: before hours of work, not after."""
+    """Returns a file after checking that it is writable; an argparse type."""
     try:
         return prove_file("", text)
     except UserError as error:
@@ -85,7 +85,7 @@ def output_file(text: str) -> Path:
 
 
 def output_folder(text: str) -> Path:
-    """Returns a folder in which files can be written, for argparse."""
+    """Returns a folder after checking that it is writable; an argparse type."""
     try:
         return prove_directory("", text, [])
     except UserError as error:
@@ -94,15 +94,15 @@ def output_folder(text: str) -> Path:
 
 @contextmanager
 def claimed(option: str, directory: Path, wait: bool = False) -> Iterator[None]:
-    """Makes a folder and keeps other commands from writing there meanwhile.
+    """Creates a folder and locks it against other commands inside the context.
 
     Args:
-        option: that names it, for messages.
-        directory: the folder.
-        wait: whether to wait for who has claimed it before; otherwise that is an error.
+        option: Option that names the folder, for messages.
+        directory: The folder.
+        wait: Whether to wait for another command that holds the lock, rather than to fail.
 
     Raises:
-        UserError: another command writes there.
+        UserError: Another command writes there.
     """
     made = not directory.exists()
     try:
@@ -129,24 +129,24 @@ def claimed(option: str, directory: Path, wait: bool = False) -> Iterator[None]:
 
 
 def remove_results(directory: Path, names: Sequence[str]) -> None:
-    """Removes what an earlier command left, so that it is not taken for what comes now.
+    """Removes the results of an earlier command, so that they are not taken for new ones.
 
     Raises:
-        OSError: it cannot be removed.
+        OSError: A file cannot be removed.
     """
     for name in names:
         (directory / name).unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a file so that it is whole or not there."""
+    """Writes a text file atomically."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Writes a file so that it is whole or not there; makes its folder.
+    """Writes a file atomically and creates its folder.
 
-    A pipe or device is written to as it is.
+    A pipe or device is written to directly.
     """
     if path.exists() and not path.is_file():
         path.write_bytes(data)
@@ -157,11 +157,11 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Provides the name of a file to write, which then takes the place of `path`.
+    """Yields the name of a temporary file to write, which then replaces `path`.
 
-    If that fails, nothing of it is left and `path` is as it was.
+    On failure the temporary file is removed and `path` is unchanged.
     """
-    # What a symbolic link means is replaced, not the link.
+    # Replace the target of a symbolic link, not the link.
     path = Path(os.path.realpath(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.parent / _short_name()
@@ -175,7 +175,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _prove(option: str, path: Path, inputs: Sequence[str | Path]) -> None:
-    """Makes a file beside `path`, and `path` itself if it is not there; removes both."""
+    """Creates a file next to `path`, and `path` if it does not exist; removes both."""
     for other in inputs:
         if path.exists() and os.path.exists(other) and os.path.samefile(path, other):
             raise UserError(option, str(path), "is read, too; expected another place")
@@ -190,7 +190,7 @@ def _prove(option: str, path: Path, inputs: Sequence[str | Path]) -> None:
         try:
             number = os.open(made, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666)
         except FileExistsError:
-            if made.is_symlink():  # to itself
+            if made.is_symlink():  # a link to itself
                 raise
             continue
         os.close(number)
@@ -199,7 +199,7 @@ def _prove(option: str, path: Path, inputs: Sequence[str | Path]) -> None:
 
 @contextmanager
 def _made(directory: Path) -> Iterator[None]:
-    """Has a folder there meanwhile; removes what was made for it."""
+    """Creates a folder for the duration of the context; removes the folders created."""
     made: list[Path] = []
     try:
         for folder in (*reversed(directory.parents), directory):
@@ -211,12 +211,12 @@ def _made(directory: Path) -> Iterator[None]:
         yield
     finally:
         for folder in reversed(made):
-            with suppress(OSError):  # another one may have begun to use it
+            with suppress(OSError):  # another process may have started to use it
                 folder.rmdir()
 
 
 def _short_name() -> str:
-    # A name of its own: that of the file may already be as long as names can be.
+    # Not derived from the file's name, which may already have the maximum length.
     return f".drake-dress-{secrets.token_hex(6)}.partial"
 
 

@@ -1,9 +1,9 @@
-"""Tells whether an HDF5 file is whole, from its first bytes, its length and its locks.
+"""Determines whether an HDF5 file is complete, from its superblock, length and locks.
 
-HDF5's own messages are words that change; the superblock does not. It stands at byte 0, or at 512,
-1024, 2048, … where a user block comes first, and holds the length that the file should have and,
-from version 2 on, flags of a writer that has not closed it (HDF5 File Format Specification,
-section II.A). A writer that lives holds a lock.
+The wording of HDF5's own messages changes between versions; the superblock does not. It is at byte
+0, or at 512, 1024, 2048, … after a user block. It contains the expected length of the file and,
+from version 2 on, flags of a writer that has not closed it (HDF5 File Format Specification, section
+II.A). A running writer holds a lock.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Where the address of the end of the file stands: after this many bytes and two addresses.
+# Offset of the end-of-file address, by version: this many bytes plus two addresses.
 _ADDRESSES_AT = {0: 24, 1: 28, 2: 12, 3: 12}
 _FLAGS_AT = 11  # from version 2 on
 _OPEN_FOR_WRITING = 0b101  # open for writing, or for writing while others read
-_UNDEFINED = 0xFF  # each byte of an address that is not set
-_LONGEST = 64  # bytes of a superblock that are looked at
+_UNDEFINED = 0xFF  # each byte of an undefined address
+_LONGEST = 64  # bytes of a superblock that are read
 
 
 class Hdf5State(enum.Enum):
-    """What became of a file.
+    """State of a file.
 
-    `KILLED` may be readable, up to what its writer flushed last. A file of the first format
-    (versions 0 and 1 of the superblock) has no flags: `SOUND` says that it has its length.
+    A `KILLED` file may be readable up to the last flush. Files with superblock versions 0 and 1
+    have no flags: for these, `SOUND` only means that the length is as expected.
     """
 
     SOUND = "is whole"
@@ -42,12 +42,12 @@ class Hdf5State(enum.Enum):
 
 @dataclass(frozen=True)
 class Hdf5File:
-    """What a file's bytes and locks say.
+    """State and size of a file.
 
     Attributes:
-        state: see there.
-        size: bytes that it has.
-        expected: bytes that its superblock says it has; None where it has none.
+        state: State of the file.
+        size: Size, bytes.
+        expected: Expected size from the superblock, bytes; None if unknown.
     """
 
     state: Hdf5State
@@ -56,17 +56,17 @@ class Hdf5File:
 
     @property
     def message(self) -> str:
-        """What to tell a user, with the sizes where it is cut short."""
+        """Message for the user, with the sizes if the file is truncated."""
         if self.state is Hdf5State.TRUNCATED and self.expected:
             return f"{self.state.value}: {_sizes(self.size, self.expected)}"
         return self.state.value
 
 
 def look_at(path: str | Path) -> Hdf5File:
-    """Returns what a file's bytes and locks say.
+    """Returns the state and size of a file.
 
     Raises:
-        OSError: it cannot be opened.
+        OSError: The file cannot be opened.
     """
     # A pipe without a writer would block.
     number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -85,13 +85,13 @@ def state_of(path: str | Path) -> Hdf5State:
     """Returns the state of a file.
 
     Raises:
-        OSError: it cannot be opened.
+        OSError: The file cannot be opened.
     """
     return look_at(path).state
 
 
 def _is_written(number: int) -> bool:
-    """Returns whether another one holds the lock that HDF5 takes for writing."""
+    """Returns whether another process holds the lock that HDF5 takes for writing."""
     try:
         fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except OSError as error:
@@ -117,7 +117,7 @@ def _read(number: int, size: int) -> Hdf5File:
 
 
 def _judged(block: bytes, size: int) -> Hdf5File:
-    """Returns what a superblock says of a file of a size."""
+    """Returns the state of a file from its superblock and its size."""
     version = block[8] if len(block) > 8 else None
     if version is None:
         return Hdf5File(Hdf5State.TRUNCATED, size)
@@ -132,7 +132,7 @@ def _judged(block: bytes, size: int) -> Hdf5File:
     killed = version >= 2 and bool(block[_FLAGS_AT] & _OPEN_FOR_WRITING)
     if end == bytes([_UNDEFINED]) * width:
         return Hdf5File(Hdf5State.KILLED, size)
-    # The library compares the length with the stored address as it stands, user block included.
+    # The library compares the file's length with the stored address, which includes the user block.
     expected = int.from_bytes(end, "little")
     if size < expected:
         return Hdf5File(Hdf5State.TRUNCATED, size, expected)
@@ -143,5 +143,5 @@ def _sizes(size: int, expected: int) -> str:
     if expected < 10_000:
         return f"{size} of {expected} bytes"
     unit, name = (1e3, "kB") if expected < 10_000_000 else (1e6, "MB")
-    # Rounded down, so that a file that lacks its last bytes does not look whole.
+    # Round down, so that a file that lacks its last bytes does not look complete.
     return f"{int(size / unit)} of {-int(-expected // unit)} {name}"

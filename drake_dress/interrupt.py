@@ -1,8 +1,7 @@
-"""Signals that end a command, as a flag: a loop ends between two steps and nothing is lost.
+"""Handles the signals that end a command, so that a loop ends between steps without data loss.
 
-Ctrl-C (SIGINT), SIGTERM (from `kill`, a cluster or a container that ends a job) and SIGHUP (a
-terminal that closes) are treated alike. The exit status is 128 plus the signal's number, as shells
-have it.
+Ctrl-C (SIGINT), SIGTERM (from `kill`, or a cluster or container that ends a job) and SIGHUP (a
+closed terminal) are treated alike. The exit status is 128 plus the signal's number, as in shells.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from typing import Any
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
-# s from a signal that came inside an import to the next look whether it is over.
+# Delay after which a signal that came during an import is sent again, s.
 _LATER = 0.05
 _IMPORTS = "<frozen importlib._bootstrap>"
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM or SIGHUP came where nothing catches it."""
+    """Raised by SIGTERM or SIGHUP, as KeyboardInterrupt is by SIGINT."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -34,10 +33,10 @@ class Terminated(KeyboardInterrupt):
 
 
 class Interrupt(threading.Event):
-    """Is set by the first signal that ends a command.
+    """Event that is set by the first signal that ends a command.
 
     Attributes:
-        number: of that signal; SIGINT while none came.
+        number: Number of that signal; SIGINT before any signal.
     """
 
     def __init__(self) -> None:
@@ -46,21 +45,21 @@ class Interrupt(threading.Event):
 
     @property
     def status(self) -> int:
-        """Exit status of a command that the signal ended."""
+        """Exit status of a command ended by the signal."""
         return 128 + self.number
 
     @property
     def word(self) -> str:
-        """What the signal did, for the user."""
+        """Word for the signal's effect, for the user."""
         return _WORDS[signal.Signals(self.number)]
 
     def error(self) -> KeyboardInterrupt:
-        """Returns the exception that the signal raises where nothing catches it."""
+        """Returns the exception for the signal."""
         return KeyboardInterrupt() if self.number == signal.SIGINT else Terminated(self.number)
 
 
 def interrupt_of(error: KeyboardInterrupt) -> Interrupt:
-    """Returns what an exception tells of the signal that raised it."""
+    """Returns the interrupt of the signal that raised an exception."""
     interrupt = Interrupt()
     interrupt.number = error.number if isinstance(error, Terminated) else signal.SIGINT
     return interrupt
@@ -68,12 +67,11 @@ def interrupt_of(error: KeyboardInterrupt) -> Interrupt:
 
 @contextmanager
 def caught_interrupt() -> Iterator[Interrupt]:
-    """Yields an event that the first signal sets; a second one interrupts as usual.
+    """Yields an event that the first signal sets; a second signal interrupts as usual.
 
-    Python raises KeyboardInterrupt wherever it happens to be, which may be a callback whose
-    exceptions are swallowed; a loop that looks at the event cannot miss it. Off the main thread,
-    where no handler can be set, the event stays unset. Signals that are ignored, such as SIGHUP
-    under nohup, stay so.
+    Python may raise KeyboardInterrupt in a callback whose exceptions are swallowed; a loop that
+    checks the event cannot miss it. Outside the main thread no handler can be set, and the event
+    stays unset. Ignored signals, such as SIGHUP under nohup, stay ignored.
     """
     event = Interrupt()
 
@@ -88,11 +86,11 @@ def caught_interrupt() -> Iterator[Interrupt]:
 
 @contextmanager
 def signals_raised() -> Iterator[None]:
-    """Has signals that end a command raise an exception, so that files are closed.
+    """Makes signals that end a command raise an exception, so that files are closed.
 
-    Inside an import they wait for its end: modules take an exception there for a failure of what
-    they load, and tell it as that. Where an exception is swallowed, as in `__del__` or when memory
-    is collected, it is raised again a little later.
+    During an import the signal is deferred, because modules would report the exception as a failed
+    import. If the exception is swallowed, as in `__del__` or during garbage collection, it is
+    raised again shortly afterwards.
     """
     over = False
 
@@ -105,7 +103,7 @@ def signals_raised() -> Iterator[None]:
         if over:
             return
         if _importing(frame):
-            # A thread of `threading` would take locks that the interrupted code may hold.
+            # `threading.Thread` would take locks that the interrupted code may hold.
             _thread.start_new_thread(send_later, (number,))
             return
         interrupt = Interrupt()
@@ -141,10 +139,10 @@ def _importing(frame: FrameType | None) -> bool:
 
 @contextmanager
 def signals_deferred() -> Iterator[None]:
-    """Has signals that end a command wait, where half of what is done would be worse than none.
+    """Defers signals that end a command during an operation that must not be left half done.
 
-    A process that is started meanwhile inherits that they wait. In this one another thread may
-    take a signal all the same, so handlers wait, too.
+    A process started in this context inherits the blocked signals. In this process another thread
+    may still receive a signal, so the handlers only record it.
     """
     came: list[int] = []
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
@@ -161,7 +159,7 @@ def signals_deferred() -> Iterator[None]:
 def _handled(
     handler: Callable[[int, Any], None], numbers: tuple[signal.Signals, ...] = _ENDING
 ) -> Iterator[Callable[[], None]]:
-    """Sets a handler; yields what gives the former ones back, which the end does at the latest."""
+    """Sets a handler; yields a function that restores the former ones, as the exit does."""
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
         return

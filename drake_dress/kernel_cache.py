@@ -1,9 +1,9 @@
-"""Numba keeps compiled kernels where it can, and compiles in memory where it cannot.
+"""Makes Numba's kernel cache fault-tolerant: without a usable cache it compiles in memory.
 
-Numba fails at `@njit(cache=True)` if neither the installation nor the user's cache can be written
-to, and fails later if the disk is full or a file of the cache is damaged. A cache only saves time:
-none of this may end a program. Numba has no setting for it, so what makes a dispatcher's cache is
-replaced; kernels of other packages in the process are kept as before.
+Numba fails at `@njit(cache=True)` if neither the installation nor the user's cache is writable, and
+fails later if the disk is full or a cache file is damaged. A cache only saves time: none of this
+may end a program. Numba has no setting for it, so the class that creates a dispatcher's cache is
+replaced. Kernels of other packages in the process are cached as before.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from numba.core import caching, dispatcher
 
 from drake_dress.caches import user_cache
 
-# Mypy knows only what a module exports.
+# The attribute is not exported, so mypy does not know it.
 _DISPATCHER: Any = dispatcher
 
 
-# Time after the first kernel that is not there, s, from which it is told, and between lines.
+# Time from the first missing kernel to the first message, and between messages, s.
 _PATIENCE, _AGAIN = 2.0, 15.0
 
 
 class Telling:
-    """Tells that kernels are compiled, where that takes long: once on a machine, mostly.
+    """Reports that kernels are being compiled if it takes long, usually once on a machine.
 
     Args:
-        out: where lines are written; stderr if None.
-        clock: s that go on.
+        out: Stream for the messages; stderr if None.
+        clock: Returns a monotonic time, s.
     """
 
     def __init__(
@@ -43,15 +43,15 @@ class Telling:
         self._due: float | None = None
 
     def begin(self) -> None:
-        """Notes that a kernel is to be compiled."""
+        """Records that the compilation of a kernel starts."""
         if self._due is None:
             self._due = self._clock() + _PATIENCE
 
     def end(self) -> None:
-        """Notes that one was, and tells so where it is time."""
+        """Records that a kernel was compiled, and prints a message if one is due."""
         self._count += 1
         now = self._clock()
-        # processes beside this one compile at the same time, and are silent
+        # worker processes compile at the same time and stay silent
         if self._due is None or now < self._due or multiprocessing.parent_process() is not None:
             return
         self._due = now + _AGAIN
@@ -63,12 +63,12 @@ _TELLING = Telling()
 
 
 class _Forgiving(caching.FunctionCache):
-    """Passes over what cannot be loaded or saved."""
+    """A cache that ignores failures to load or save."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             found = super().load_overload(sig, target_context)
-        # A damaged file raises whatever its bytes happen to mean.
+        # A damaged file may raise any exception.
         except Exception:
             found = None
         if found is None:
@@ -81,7 +81,7 @@ class _Forgiving(caching.FunctionCache):
             super().save_overload(sig, data)
         except Exception:
             try:
-                # An index that is damaged is begun anew.
+                # Start a new index, since the old one may be damaged.
                 self.flush()
                 super().save_overload(sig, data)
             except Exception:
@@ -89,7 +89,7 @@ class _Forgiving(caching.FunctionCache):
 
 
 class _TemporaryLocator(caching.UserWideCacheLocator):
-    """Keeps kernels in this program's own cache, the last place that is tried."""
+    """Keeps kernels in this program's own cache folder, which is tried last."""
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         super().__init__(py_func, py_file)
@@ -100,7 +100,7 @@ class _TemporaryLocator(caching.UserWideCacheLocator):
 
 
 def _cache(function: Callable[..., Any]) -> Any:
-    """Returns the cache of a function; one that keeps nothing where nothing can be kept."""
+    """Returns the cache of a function; a null cache if no folder is usable."""
     try:
         return _Forgiving(function)
     except RuntimeError:
@@ -108,7 +108,7 @@ def _cache(function: Callable[..., Any]) -> Any:
 
 
 def install() -> None:
-    """Has Numba use these caches; may be called again."""
+    """Makes Numba use these caches; may be called repeatedly."""
     locators = caching.CacheImpl._locator_classes
     if _TemporaryLocator not in locators:
         locators.append(_TemporaryLocator)

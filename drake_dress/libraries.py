@@ -1,4 +1,4 @@
-"""Tells in one line which library is missing, of the system or of Python."""
+"""Reports in one line which system library or Python package is missing."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import re
 
 from drake_dress.errors import UserError
 
-# What Drake and OpenCV load of the system, and the Debian package that has it; `.ci/run` and the
-# README name the same.
+# System libraries that Drake and OpenCV load, and their Debian packages; `.ci/run` and the README
+# list the same.
 SYSTEM_LIBRARIES = {
     "libX11.so.6": "libx11-6",
     "libGLX.so.0": "libglx0",
     "libOpenGL.so.0": "libopengl0",
     "libEGL.so.1": "libegl1",
 }
-# Modules that every command needs.
+# Modules required by every command.
 _NEEDED = ("numpy", "scipy", "yaml", "rich", "h5py", "trimesh", "rtree", "pydrake.common")
-# Modules that come with an extra.
+# Modules provided by an extra.
 EXTRAS = {
     "torch": "torch",
     "cv2": "vision",
@@ -32,25 +32,25 @@ _INSTALL = "expected all packages of drake_dress: pip install them again"
 
 
 def check_libraries() -> None:
-    """Imports what every command needs.
+    """Imports the modules required by every command.
 
     Raises:
-        UserError: one of these cannot be imported.
+        UserError: A module cannot be imported.
     """
     for name in _NEEDED:
         try:
             importlib.import_module(name)
-        # Modules that were built for others of another version raise whatever comes to them.
+        # Modules built against incompatible versions may raise any exception.
         except Exception as error:
             raise import_problem(error, name) from error
 
 
 def import_problem(error: Exception, module: str = "") -> UserError:
-    """Returns what to tell of a module that cannot be imported.
+    """Returns the error message for a module that cannot be imported.
 
     Args:
-        error: that its import raised.
-        module: that was asked for, where known.
+        error: Exception raised by the import.
+        module: Module that was imported, if known.
     """
     text = " ".join(str(error).split()) or type(error).__name__
     missing = _SHARED_OBJECT.search(text)

@@ -1,4 +1,4 @@
-"""What this process may use of the machine it runs on."""
+"""Resource limits of this process: cores, threads and garbage collection."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 def worker_count(groups: Path = _GROUPS, own: Path = _OWN_GROUPS) -> int:
-    """Returns how many processes may run at once: of the cores, those that this job may use.
+    """Returns the number of cores that this job may use, for as many parallel processes.
 
-    A cluster or container allows fewer than there are, by an affinity or by a quota of time.
+    A cluster or container may restrict the cores by CPU affinity or by a time quota.
 
     Args:
-        groups: where the kernel tells quotas of control groups (version 2, or 1 below `cpu`).
-        own: tells which groups this process is in.
+        groups: Folder with the quotas of control groups (version 2, or version 1 below `cpu`).
+        own: File that lists the control groups of this process.
     """
     try:
         cores = len(os.sched_getaffinity(0))
     except (AttributeError, OSError):
         cores = os.cpu_count() or 1
     quota = _quota(groups, own)
-    # A quota of 1.5 cores keeps two processes busy most of the time, but one is never held up.
+    # Round down: with a quota of 1.5 cores, two processes would be throttled; one never is.
     return max(1, cores if quota is None else min(cores, int(quota)))
 
 
 def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Has linear algebra use no more threads than this job may use cores.
+    """Limits the threads of linear algebra to the number of cores that this job may use.
 
-    Its libraries obey affinities by themselves, but no quota. What the user has set stays.
+    The libraries respect affinities by themselves, but not quotas. Variables set by the user are
+    kept.
 
     Args:
-        environment: of the process, before these libraries are imported.
+        environment: Environment of the process, before these libraries are imported.
     """
     count = worker_count()
     if count < len(os.sched_getaffinity(0)):
@@ -47,10 +48,10 @@ def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
 
 @contextlib.contextmanager
 def left_out_of_garbage() -> Iterator[None]:
-    """Has Python look for garbage only among what is made meanwhile.
+    """Restricts Python's garbage collection to objects created inside the context.
 
-    Compilers, libraries and diagrams are a million objects that stay: to look at them again and
-    again took 3 % of a run.
+    Compilers, libraries and diagrams have a million permanent objects: scanning them repeatedly
+    took 3 % of a run.
     """
     gc.collect()
     gc.freeze()
@@ -61,7 +62,7 @@ def left_out_of_garbage() -> Iterator[None]:
 
 
 def _quota(groups: Path, own: Path) -> float | None:
-    """Returns the least quota of this process's control groups, in cores; None if there is none."""
+    """Returns the smallest quota of this process's control groups, in cores; None without one."""
     try:
         lines = own.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
@@ -76,7 +77,7 @@ def _quota(groups: Path, own: Path) -> float | None:
             root = groups / "cpu"
         else:
             continue
-        # In a container, the path may be that of the host, and the root that of the container.
+        # In a container, the path may be the host's while the root is the container's.
         folder = root / path.strip("/")
         found += [
             share for f in (root, folder, *folder.parents) if (share := _share(f)) is not None
@@ -94,5 +95,5 @@ def _share(folder: Path) -> float | None:
             period = (folder / "cpu.cfs_period_us").read_text(encoding="ascii")
         share = float(quota) / float(period)
     except (OSError, ValueError, ZeroDivisionError):
-        return None  # "max" says that there is none
+        return None  # "max" means no quota
     return share if share > 0.0 else None

@@ -1,4 +1,4 @@
-"""How long plans take on this machine, as it was measured once."""
+"""The plan delay measured on this machine, kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from drake_dress.caches import user_cache
 from drake_dress.file_output import write_text
 from drake_dress.models.arrays import FloatArray
 
-# Share of the plans that are there within the time that is kept.
+# Share of the plans that are ready within the kept time.
 SHARE = 0.95
 _FILE = "plan_delay.json"
-# Solves from which their quantile says something.
+# Least number of solves for a meaningful quantile.
 LEAST = 40
 
 
 def keep_plan_delay(solve_time: FloatArray) -> tuple[float, Path]:
-    """Keeps within which time `SHARE` of the solves ended, s; returns it, and where it is kept.
+    """Keeps the `SHARE` quantile of the solve times, s; returns it and the path of the file.
 
     Args:
-        solve_time: (k,) s, of a run on this machine with nothing beside it.
+        solve_time: (k,) solve times of a run on this machine without other load, s.
 
     Raises:
-        ValueError: they are too few, or nothing can be kept here.
+        ValueError: There are too few solves, or no cache folder is writable.
     """
     if len(solve_time) < LEAST:
         raise ValueError(f"{len(solve_time)} solves, expected {LEAST} at least")
@@ -40,7 +40,7 @@ def keep_plan_delay(solve_time: FloatArray) -> tuple[float, Path]:
 
 
 def kept_plan_delay() -> float | None:
-    """Returns what was measured on this machine, s; None where nothing was."""
+    """Returns the delay measured on this machine, s; None if it was not measured."""
     folder = user_cache()
     if folder is None:
         return None

@@ -1,9 +1,9 @@
-"""Code of a user's own that adds to the package, such as effects.
+"""Loads plugins: user code that extends the package, such as new effects.
 
-A plugin is a Python file or module that calls `register_effect`. The command line loads it with
-`--plugin`; a package that is installed names it in the entry-point group `drake_dress.plugins`, and
-the environment variable `DRAKE_DRESS_PLUGINS` in a list. Child processes inherit that variable and
-the folder of a file on `sys.path`, so that they import the same module anew.
+A plugin is a Python file or module that calls, for example, `register_effect`. The command line
+loads it with `--plugin`; an installed package names it in the entry-point group
+`drake_dress.plugins`; the environment variable `DRAKE_DRESS_PLUGINS` holds a list. Child processes
+inherit that variable, and a file's folder on `sys.path`, so that they import the same modules.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def load_plugin(given: str) -> ModuleType:
     """Imports a plugin; returns its module.
 
     Args:
-        given: a Python file, or the dotted name of a module that can be imported.
+        given: A Python file, or the dotted name of an importable module.
 
     Raises:
-        UserError: it cannot be imported, or does not register what it defines as it should.
+        UserError: The plugin cannot be imported, or registers something incorrectly.
     """
     if given.endswith(".py") or os.sep in given:
         return _load_file(Path(given))
@@ -38,7 +38,7 @@ def load_plugin(given: str) -> ModuleType:
 
 
 def load_for_children(given: str) -> None:
-    """Imports a plugin, and has the processes that this one starts import it, too.
+    """Imports a plugin here and in the processes that this one starts.
 
     Raises:
         UserError: see `load_plugin`.
@@ -54,8 +54,8 @@ def load_installed_plugins() -> None:
     """Imports the plugins of installed packages and of the environment variable, each once.
 
     Raises:
-        UserError: one cannot be imported. It is not passed over, since what it adds would be
-            missing without a word.
+        UserError: A plugin cannot be imported. It is not skipped, since its additions would be
+            missing silently.
     """
     for given in os.environ.get(VARIABLE, "").split(os.pathsep):
         if given:
@@ -76,7 +76,7 @@ def _load_entry_points() -> None:
 
 
 def _load_file(path: Path) -> ModuleType:
-    """Imports a file by its name, from its folder, which is put at the end of `sys.path`."""
+    """Imports a file as a module; appends its folder to `sys.path`."""
     source = str(path)
     if not path.is_file():
         raise UserError("--plugin", source, "no such file, expected a Python file or a module")
@@ -109,7 +109,7 @@ def _imported(source: str, module: str) -> ModuleType:
 
 
 def _line(module: str, error: BaseException) -> str:
-    """Returns the line of the plugin's own file that failed, in words; may be empty."""
+    """Returns the failing line of the plugin's file, such as "line 3"; may be empty."""
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}"
     stem = module.split(".")[-1]

@@ -1,4 +1,4 @@
-"""Scenarios that ship with the program, wherever it is run from."""
+"""Finds the scenarios that ship with the program."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from pathlib import Path
 from drake_dress.errors import UserError
 
 _PACKAGE = Path(__file__).parent
-# In a checkout, the folder in the package is a link, which not every system keeps.
+# In a checkout, the folder in the package is a symbolic link, which some systems do not keep.
 _FOLDERS = (_PACKAGE / "scenarios", _PACKAGE.parent / "scenarios")
 
 
 def shipped_scenario(name: str) -> Path:
-    """Returns the file of a scenario, such as "lab"."""
+    """Returns the file of a shipped scenario, such as "lab"."""
     files = [folder / f"{name}.yaml" for folder in _FOLDERS]
     return next((file for file in files if file.is_file()), files[0])
 
 
 def shipped_scenarios() -> dict[str, str]:
-    """Returns the names of all scenarios, each with the first sentence of its comment."""
+    """Returns the names of all shipped scenarios and the first sentence of each comment."""
     return {file.stem: _summary(file) for file in _files()}
 
 
 def scenario_file(given: str) -> Path:
-    """Returns the file that the user means: a path, or the name of a scenario that ships.
+    """Returns the file for a path or the name of a shipped scenario.
 
-    A file of that name in the working directory goes before a scenario that ships. A directory,
-    such as one that an earlier command wrote with `--out`, does not.
+    A file of that name in the working directory takes precedence over a shipped scenario. A
+    directory, such as one that an earlier command wrote with `--out`, does not.
 
     Raises:
-        UserError: it is neither.
+        UserError: There is neither a file nor a shipped scenario of that name.
     """
     path = Path(given)
     here = os.path.exists(path) and not os.path.isdir(path)

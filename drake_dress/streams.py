@@ -1,8 +1,8 @@
-"""Standard output and errors that never end a command.
+"""Standard streams that never end a command.
 
-Who reads a pipe may stop (`| head -1`), a terminal may close, a disk that output is redirected to
-may be full, and an encoding may lack a character. None of this is a reason to end a simulation: its
-results are in files. What cannot be shown is dropped, or escaped.
+The reader of a pipe may stop (`| head -1`), a terminal may close, the disk may be full when output
+is redirected to a file, and an encoding may lack a character. None of this should end a simulation,
+whose results are in files. Output that cannot be shown is dropped or escaped.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-# Nobody reads any more: a closed pipe, or a terminal that is gone.
+# No reader: a closed pipe or terminal.
 _UNREAD = (errno.EPIPE, errno.EIO)
 
 
 @contextmanager
 def forgiving_streams() -> Iterator[None]:
-    """Has `print` neither fail nor leave anything behind that fails when Python ends."""
+    """Prevents failures of `print`, and of the final flush when Python ends."""
     before = sys.stdout, sys.stderr
     shown = [None if stream is None else _Forgiving(stream) for stream in before]
-    # Python has None where a stream is closed, which `print` passes over.
+    # A closed stream is None in Python; `print` ignores it.
     sys.stdout, sys.stderr = shown
     try:
         yield
@@ -39,9 +39,9 @@ def forgiving_streams() -> Iterator[None]:
 
 
 def keep_standard_descriptors() -> None:
-    """Opens what is closed of descriptors 0, 1 and 2, so that no file gets their numbers.
+    """Opens descriptors 0, 1 and 2 if they are closed, so that no file gets their numbers.
 
-    Libraries that write to descriptor 1 or 2 would write into that file.
+    Otherwise libraries that write to descriptor 1 or 2 would write into that file.
     """
     with contextlib.suppress(OSError):
         number = os.open(os.devnull, os.O_RDWR)
@@ -51,10 +51,10 @@ def keep_standard_descriptors() -> None:
 
 
 class _Forgiving:
-    """A text stream whose writes do not fail; all else is the stream's own.
+    """A text stream whose writes do not fail; other attributes are the wrapped stream's.
 
     Attributes:
-        lost: why output was dropped; None while none was.
+        lost: Reason why output was dropped; None if none was.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -62,7 +62,7 @@ class _Forgiving:
         self.lost: OSError | None = None
 
     def write(self, text: str) -> int:
-        """Writes, escapes what the encoding lacks, drops what cannot be written."""
+        """Writes text; escapes characters that the encoding lacks, drops text on failure."""
         if self.lost is None:
             try:
                 try:
@@ -75,12 +75,12 @@ class _Forgiving:
         return len(text)
 
     def writelines(self, lines: Any) -> None:
-        """Writes one after the other."""
+        """Writes the lines in order."""
         for line in lines:
             self.write(line)
 
     def flush(self) -> None:
-        """Flushes, or drops what cannot be written."""
+        """Flushes; on failure drops the output."""
         if self.lost is None:
             try:
                 self._stream.flush()
@@ -90,9 +90,9 @@ class _Forgiving:
                 self._lose(error)
 
     def _lose(self, error: OSError) -> None:
-        """From now on, what goes to this stream goes nowhere."""
+        """Discards all further output of this stream."""
         self.lost = error
-        # Python flushes its buffer at its end; that goes to the descriptor, which must take it.
+        # At exit, Python flushes its buffer to the descriptor, which must accept it.
         with contextlib.suppress(OSError, ValueError):
             sink = os.open(os.devnull, os.O_WRONLY)
             os.dup2(sink, self._stream.fileno())

@@ -1,4 +1,4 @@
-"""Reads text files that a user names: regular files of a sensible size, in UTF-8."""
+"""Reads text files named by a user: regular files of limited size, in UTF-8."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drake_dress.errors import UserError
 
-# Far more than any scenario or table of poses; a mistaken file is told before it fills memory.
+# Far more than any scenario or table of poses; rejects a wrong file before it fills memory.
 MAX_BYTES = 1 << 20
 _OTHER_ENCODINGS = {
     codecs.BOM_UTF32_LE: "UTF-32",
@@ -23,17 +23,17 @@ def read_text(path: Path, expected: str, max_bytes: int = MAX_BYTES) -> str:
     """Returns the text of a file, without a byte order mark.
 
     Args:
-        path: of the file.
-        expected: what it should hold, for messages, such as "a scenario in YAML".
-        max_bytes: size above which it is refused.
+        path: Path of the file.
+        expected: Expected content, for messages, such as "a scenario in YAML".
+        max_bytes: Largest accepted size.
 
     Raises:
-        UserError: there is no such file, it is no regular file (a folder, a pipe, a device), it is
-            too large, or it is not UTF-8.
+        UserError: The file does not exist, is not a regular file (a folder, pipe or device), is too
+            large, or is not UTF-8.
     """
     source = str(path)
     try:
-        # A pipe without a writer would block in `open`; O_NONBLOCK opens it at once.
+        # Without O_NONBLOCK, opening a pipe that has no writer would block.
         number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         raise UserError(source, "", f"{_why_not(error)}, expected {expected}") from error

@@ -1,8 +1,8 @@
-"""Processes that work side by side and need neither semaphores nor /dev/shm.
+"""A pool of worker processes that needs neither semaphores nor /dev/shm.
 
-Python's own pool makes semaphores, for which /dev/shm must be there and writable; in many
-containers it is not. Here each process has a pipe and a thread that talks to it, which works
-anywhere. Used like `concurrent.futures.ProcessPoolExecutor`.
+Python's own pool creates semaphores, which require a writable /dev/shm; many containers lack it.
+Here each process has a pipe and a thread that communicates with it, which works anywhere. The
+interface is that of `concurrent.futures.ProcessPoolExecutor`.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class WorkerPool(Executor):
-    """Calls functions in other processes; a context manager that ends them.
+    """Calls functions in worker processes; a context manager that ends them.
 
-    Processes begin at once, end with this one however that ends, and leave Ctrl-C and other signals
-    to it. When the context ends with an exception they are killed, whatever they do.
+    Workers start at once and leave Ctrl-C and other signals to this process. They end with it, even
+    if it crashes. If the context exits with an exception, they are killed immediately.
 
     Args:
-        max_workers: how many.
-        mp_context: how processes begin; by default they are spawned, since Numba and BLAS may hang
-            in what is forked from a process with threads.
-        initializer: called in each process first; it can be pickled.
-        initargs: its arguments.
+        max_workers: Number of workers.
+        mp_context: Start method; spawn by default, since Numba and BLAS may hang in a process
+            forked from one with threads.
+        initializer: Picklable function that each worker calls first.
+        initargs: Arguments of `initializer`.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class WorkerPool(Executor):
         self._free: SimpleQueue[tuple[Connection, BaseProcess]] = SimpleQueue()
         self._processes: list[BaseProcess] = []
         self._killed = False
-        # Python waits at its end for processes, which ignore the signal that it sends them.
+        # At exit, Python waits for workers that ignore its signal, so kill them first.
         atexit.register(_kill_all, weakref.WeakMethod(self.kill))
         pipes = []
         for _ in range(max_workers):
@@ -67,27 +67,27 @@ class WorkerPool(Executor):
             self._processes.append(process)
             pipes.append(pipe)
         for pipe, process in zip(pipes, self._processes, strict=True):
-            # Of one that has ended already, the first call tells.
+            # If a worker has already ended, its first call reports it.
             with contextlib.suppress(OSError):
                 pipe.send((initializer, tuple(initargs)))
             self._free.put((pipe, process))
 
     @property
     def alive(self) -> bool:
-        """Whether no process has ended."""
+        """Whether all workers are running."""
         return not self._killed and all(process.is_alive() for process in self._processes)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Returns what will be the result of `fn`, which can be pickled, as can all else."""
+        """Returns a future of `fn(*args, **kwargs)`; function, arguments and result are pickled."""
         return self._threads.submit(self._call, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Ends the processes when their work is done."""
+        """Ends the workers when their work is done."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         if wait:
             while not self._free.empty():
                 pipe, _ = self._free.get()
-                # In what was forked, the pipe has further ends and does not close.
+                # Forked workers inherit copies of the pipe, so closing it does not reach them.
                 with contextlib.suppress(OSError):
                     pipe.send(None)
                 pipe.close()
@@ -95,7 +95,7 @@ class WorkerPool(Executor):
                 process.join()
 
     def kill(self) -> None:
-        """Ends the processes whatever they do; results that are awaited become exceptions."""
+        """Kills the workers immediately; pending results become exceptions."""
         self._killed = True
         for process in self._processes:
             with contextlib.suppress(ValueError):
@@ -107,7 +107,7 @@ class WorkerPool(Executor):
         self.shutdown(cancel_futures=error is not None)
 
     def _call(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Has the next free process call a function; runs in a thread."""
+        """Calls a function in the next free worker; runs in a thread."""
         pipe, process = self._free.get()
         try:
             pipe.send((fn, args, kwargs))
@@ -123,30 +123,30 @@ class WorkerPool(Executor):
 
 
 def start_process(process: BaseProcess) -> None:
-    """Starts a process to which no signal comes before it leaves signals to this one.
+    """Starts a process that receives no signal before it ignores signals.
 
-    Ctrl-C and `timeout` send them to all processes of a group. What the process is given should be
-    small: this one waits for ever where it has more to write than a pipe holds and the reader ends.
+    Ctrl-C and `timeout` send signals to all processes of a group. Arguments of the process should
+    be small: if they exceed the pipe's buffer and the reader ends, this process waits forever.
     """
-    # Its own start lets SIGINT and SIGTERM through again, so it has to come first.
+    # Starting the resource tracker unblocks SIGINT and SIGTERM, so it must come first.
     resource_tracker.ensure_running()
     with signals_deferred():
         process.start()
 
 
 def end_with(parent: int) -> None:
-    """Has this process end with its parent, however that ends, and leave signals to it."""
+    """Makes this process end with its parent, even on a crash, and ignore signals."""
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
     with contextlib.suppress(AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
-        # it ended before the kernel was told
+        # the parent ended before prctl took effect
         os._exit(1)
 
 
 def kill_at_exit(process: BaseProcess) -> None:
-    """Has a process end with this one, before Python waits for it."""
+    """Kills a process when this one ends, before Python waits for it."""
     atexit.register(_kill_all, weakref.WeakMethod(process.kill))
 
 
@@ -182,5 +182,5 @@ def _serve(pipe: Connection, parent: int) -> None:
         except OSError:
             return
         except Exception as error:
-            # What came out of it cannot be pickled.
+            # The result cannot be pickled.
             pipe.send((False, RuntimeError(f"{type(error).__name__}: {error}")))

@@ -1,12 +1,12 @@
-"""Reads YAML strictly: what readers of YAML disagree about, or drop without a word, is refused.
+"""Reads YAML strictly: rejects values that parsers disagree about or drop silently.
 
-YAML 1.1 and 1.2 give different values to the same word: `010` is 8 or 10, `1:30` is 90 or text,
-`no` is false or text. Loaders keep the last of two equal keys. A file that depends on either does
-not say what its author meant, so it is told with its line and what to write instead. Every other
-word means what it does in the core schema of YAML 1.2.
+YAML 1.1 and 1.2 give different values to the same scalar: `010` is 8 or 10, `1:30` is 90 or text,
+`no` is false or text. Loaders keep the last of two equal keys. A file that depends on either is
+ambiguous, so the error gives the line and what to write instead. All other scalars follow the core
+schema of YAML 1.2.
 
-The text is read as a stream of events, without recursion, so that depth cannot end the process;
-aliases are copied under a limit, so that a small file cannot grow without bound.
+The text is parsed as a stream of events, without recursion, so that nesting depth cannot crash the
+process. Aliases are copied up to a limit, so that a small file cannot grow without bound.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _CORE = "tag:yaml.org,2002:"
 _MERGE = "<<"
 _NULL = frozenset(("", "~", "null", "Null", "NULL"))
 _TRUE, _FALSE = frozenset(("true", "True", "TRUE")), frozenset(("false", "False", "FALSE"))
-# Booleans of YAML 1.1 that are text in 1.2.
+# Booleans in YAML 1.1 that are text in 1.2.
 _YES, _NO = frozenset(("yes", "on")), frozenset(("no", "off"))
 _INTEGER = re.compile(r"[-+]?(0|[1-9][0-9]*)")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -42,19 +42,19 @@ _LEAST, _MOST = -(2**63), 2**63 - 1
 
 
 def read_yaml(source: str, text: str, one_value: bool = False) -> Any:
-    """Returns what a YAML document says: None, bool, int, float, str, lists and dicts of these.
+    """Returns the value of a YAML document: None, bool, int, float, str, lists, dicts of these.
 
     Args:
-        source: name of the file or option, for messages.
-        text: of the document.
-        one_value: whether messages leave out the line, since `text` is one value of an option.
+        source: Name of the file or option, for messages.
+        text: Text of the document.
+        one_value: Whether `text` is a single value of an option; messages then omit the line.
 
     Raises:
-        UserError: it is not YAML, or says what it should not, with the line.
+        UserError: The text is not YAML or is rejected; the message gives the line.
     """
     reader = _Reader(source, one_value)
     try:
-        # The scanner stops at characters that YAML does not allow before any event comes.
+        # The scanner rejects characters that YAML does not allow before it yields any event.
         return reader.document(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         problem = error.problem or "not YAML"
@@ -69,14 +69,14 @@ def read_yaml(source: str, text: str, one_value: bool = False) -> Any:
 
 @dataclass
 class _Level:
-    """A list or group of keys that is being read.
+    """A list or mapping that is being read.
 
     Attributes:
-        value: what it holds so far.
-        anchor: name that an alias may repeat it by.
-        line: where it begins, from 1.
-        lines: of each key, where it is a group of keys.
-        key: of the value that comes next; None where a key does.
+        value: Content so far.
+        anchor: Anchor name for aliases, if any.
+        line: Line at which it starts, from 1.
+        lines: Line of each key of a mapping.
+        key: Key of the next value; None if a key comes next.
     """
 
     value: list[Any] | dict[str, Any]
@@ -87,7 +87,7 @@ class _Level:
 
 
 class _Reader:
-    """Builds a document's value from its events."""
+    """Builds the value of a document from its events."""
 
     def __init__(self, source: str, one_value: bool) -> None:
         self._source, self._one_value = source, one_value
@@ -97,7 +97,7 @@ class _Reader:
         self._count = 0
 
     def error(self, mark: yaml.Mark | None, message: str, key: str = "") -> UserError:
-        """Returns the error for a place in the text."""
+        """Returns the error for a position in the text."""
         line = "" if mark is None or self._one_value else f"line {mark.line + 1}"
         where = ".".join(part for part in (self._path(), key) if part)
         if where and line:
@@ -105,7 +105,7 @@ class _Reader:
         return UserError(self._source, where or line, message)
 
     def document(self, events: Iterator[yaml.Event]) -> Any:
-        """Returns the value of the only document; None where there is none."""
+        """Returns the value of the only document; None if there is none."""
         documents = 0
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
@@ -154,7 +154,7 @@ class _Reader:
         return level is not None and isinstance(level.value, dict) and level.key is None
 
     def _put(self, value: Any, mark: yaml.Mark, line: int) -> None:
-        """Puts a value, or a key, where it belongs."""
+        """Adds a value or key to the current list or mapping, or sets the root."""
         if not self._levels:
             self._root = value
             return
@@ -175,7 +175,7 @@ class _Reader:
                 level.value[key] = value
 
     def _merge(self, level: _Level, value: Any, mark: yaml.Mark, line: int) -> None:
-        """Adds the keys of other groups; none of them may stand here, too."""
+        """Adds the keys of other mappings; none may be a duplicate."""
         assert isinstance(level.value, dict)
         for group in value if isinstance(value, list) else [value]:
             if not isinstance(group, dict):
@@ -195,7 +195,7 @@ class _Reader:
         level.lines[key] = line
 
     def _path(self) -> str:
-        """Returns the dotted key of what is being read."""
+        """Returns the dotted key of the current position."""
         path = ""
         for level in self._levels:
             if isinstance(level.value, list):
@@ -218,7 +218,7 @@ class _Reader:
             raise self.error(mark, f"more than {MAX_VALUES} values, aliases included")
 
     def _plain(self, event: yaml.ScalarEvent) -> Any:
-        """Returns the value of a word without quotes."""
+        """Returns the value of an unquoted scalar."""
         word = event.value
         try:
             return plain_value(word)
@@ -230,13 +230,13 @@ class _Reader:
 
 
 def write_yaml(content: Any) -> str:
-    """Returns YAML that `read_yaml` reads to the same, keys in their order."""
+    """Returns YAML from which `read_yaml` restores the content; keeps the order of keys."""
     text: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False)
     return text
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes each text that without quotes would not be read as itself."""
+    """Quotes text that would not be read back as the same text without quotes."""
 
 
 def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
@@ -251,11 +251,11 @@ _Dumper.add_representer(str, _represent_text)
 
 
 def plain_value(word: str) -> bool | int | float | str | None:
-    """Returns the value of a word without quotes.
+    """Returns the value of an unquoted scalar.
 
     Raises:
-        ValueError: readers of YAML disagree about it, or it is beyond what a number can be; says
-            what to write instead.
+        ValueError: YAML parsers disagree about it, or it is out of range; the message says what to
+            write instead.
     """
     if word in _NULL:
         return None
@@ -279,7 +279,7 @@ def plain_value(word: str) -> bool | int | float | str | None:
 
 
 def _whole(word: str) -> int:
-    # Text to int takes quadratic time, and Python refuses thousands of digits.
+    # Conversion takes quadratic time, and Python rejects thousands of digits.
     value = int(word) if len(word) < 30 else _MOST + 1
     if not _LEAST <= value <= _MOST:
         raise ValueError(f"{_short(word)} is out of range, expected at most 64 bits")
@@ -294,7 +294,7 @@ def _decimal(word: str) -> float:
 
 
 def _other_number(word: str) -> str:
-    """Returns why a word that some readers take for a number or date is refused; "" if none do."""
+    """Returns why a scalar that some parsers read as a number or date is rejected, or ""."""
     base = _OTHER_BASE.fullmatch(word)
     if base:
         sign, letter, digits = base.groups()

@@ -1,1 +1,1 @@
-"""All dressing scenarios, with floating grippers and with two Panda arms."""
+"""Runs all dressing scenarios with floating grippers and with two Panda arms."""

@@ -1,7 +1,7 @@
-"""`python -m benchmarks.arms`: dresses in every scenario with and without arms, and measures them.
+"""`python -m benchmarks.arms`: runs every scenario with and without arms, and measures the arms.
 
-Every run is a `drake-dress run` of its own. What was run stays in the file of `--json` and is not
-run again.
+Every run is a separate `drake-dress run`. Results are kept in the file of `--json` and not run
+again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from benchmarks.study import (
 
 _NAME = "arms"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
-# Every scenario that dresses somebody.
+# Every scenario with a dressing.
 SCENARIOS = (
     "dummy_standing",
     "dummy_sitting",
@@ -52,12 +52,12 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For files and tables."""
+        """Name for files and tables."""
         return f"{self.scenario}-{self.method}-{self.grippers}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
+    """Does the missing runs, prints tables; returns 0, 2 on bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     chosen = [
         Case(*which)
@@ -67,12 +67,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Returns what one run came to.
+    """Executes one run and returns its result.
 
     Args:
-        case: which.
-        keep: folder for its log, report and replay; None to keep none.
-        overrides: further KEY=VALUE for the scenario.
+        case: Case to run.
+        keep: Folder for its log, report and replay; None to keep none.
+        overrides: Further KEY=VALUE settings of the scenario.
     """
     settings = [
         f"controller.method={case.method}",
@@ -84,7 +84,7 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
-    """Returns how dressings ended with floating grippers and on arms, and what the arms did."""
+    """Returns the results with floating grippers and with arms, and the measures of the arms."""
     done = {Case(**r["case"]).name: r["summary"] for r in results if "summary" in r}
     cases = [Case(**r["case"]) for r in results if "summary" in r]
     pairs = dict.fromkeys((c.scenario, c.method) for c in cases)

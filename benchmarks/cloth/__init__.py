@@ -1,5 +1,5 @@
-"""The cloth schemes against each other, against a fine reference and against other simulators.
+"""Compares the cloth schemes with each other, a fine reference and other simulators.
 
-`python -m benchmarks.cloth --help` says what can be measured. Nothing here is imported by the
-package itself.
+`python -m benchmarks.cloth --help` lists the measurements. The package itself imports nothing from
+here.
 """

@@ -17,14 +17,14 @@ from benchmarks.figures import machine, write_figures
 from benchmarks.parser import OneLineParser, at_least_one, output_file, output_folder
 from drake_dress.interrupt import caught_interrupt
 
-# In the order of the paper, then what it does not have.
+# The paper's scenes in its order, then additional ones.
 SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying", "layers")
 _PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
 _QUICK_LIMIT = 1.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measures and prints; returns the exit status: 0, 2 for bad arguments, 130 after Ctrl-C."""
+    """Measures and prints; returns 0, 2 on bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     names = options.only or list(SCENES)
     about = _about()

@@ -1,4 +1,4 @@
-"""The adjoint of a step in contact: a coat of 1,793 nodes with an arm in its sleeve."""
+"""Cost of the adjoint of a step in contact: a coat of 1,793 nodes with an arm in its sleeve."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.garment import GarmentMesh
 
 _ARM_RADIUS = 0.047
-# The arm is lifted out of the sleeve's axis so far, rad, in this time, s: the sleeve comes to lie
-# on it with about 150 nodes of the coat of 1,793.
+# Angle by which the arm is lifted out of the sleeve's axis, rad, and duration, s: about 150 of the
+# coat's 1,793 nodes then lie on it.
 _LIFT, _LIFT_TIME = 0.6, 0.6
 _SETTLING = 0.3
 _REPEATS = 25
@@ -30,12 +30,12 @@ _SEED = 7
 
 
 def arm_in_sleeve(mesh: GarmentMesh, angle: float, speed: float) -> Obstacles:
-    """Returns an arm in the left sleeve, from above the armhole to below the cuff.
+    """Returns an arm in the left sleeve that extends from above the armhole to below the cuff.
 
     Args:
-        mesh: a coat in its rest pose.
-        angle: by which the arm is lifted about its upper end, rad.
-        speed: of that lift, rad/s.
+        mesh: A coat in its rest pose.
+        angle: Angle by which the arm is lifted about its upper end, rad.
+        speed: Angular velocity of the lift, rad/s.
     """
     armhole = mesh.rest_position[mesh.loops["left_armhole"]].mean(axis=0)
     cuff = mesh.rest_position[mesh.loops["left_cuff"]].mean(axis=0)
@@ -48,7 +48,7 @@ def arm_in_sleeve(mesh: GarmentMesh, angle: float, speed: float) -> Obstacles:
 
 
 def measure(session: Session) -> Result:
-    """Returns times of a step and of its adjoint for each time step."""
+    """Returns the times of a step and of its adjoint for each time step."""
     mesh = jacket(QUICK_SPACING if session.quick else CONTROLLER_SPACING)
     session.say(f"backward: {len(mesh.rest_position)} nodes, an arm in the left sleeve")
     rows = []
@@ -65,7 +65,7 @@ def measure(session: Session) -> Result:
 
 
 def _one_step(mesh: GarmentMesh, h: float) -> Result:
-    """Settles the coat on the arm, then times the same step and its adjoint in turn."""
+    """Settles the coat on the arm, then repeatedly times the same step and its adjoint."""
     held = grasp(mesh)
     x = mesh.rest_position
     cloth = ExplicitBiasCloth(make_elements(x, mesh.faces), SOFT, h, held)
@@ -87,7 +87,7 @@ def _one_step(mesh: GarmentMesh, h: float) -> Result:
         _, _, _, tape = cloth.step(x, v, still, arm)
         middle = time.perf_counter()
         gradient = cloth.vector_jacobian_product(tape, x_bar, v_bar, force_bar)
-        if k:  # the first adjoint compiles
+        if k:  # the first adjoint compiles its kernels
             forward.append(middle - begin)
             backward.append(time.perf_counter() - middle)
     return {
@@ -120,5 +120,5 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes nothing: a table says it all."""
+    """Writes nothing; the table is sufficient."""
     return []

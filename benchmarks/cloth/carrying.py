@@ -1,7 +1,7 @@
-"""The force that the grippers feel while they carry a coat at constant speed through free air.
+"""The force on the grippers while they carry a coat at constant speed through free air.
 
-A coat that has come to rest and is given the grippers' speed stays at rest in their frame, so the
-force is its weight; all else is the scheme's own.
+A coat that has come to rest and starts with the grippers' velocity stays at rest in their frame, so
+the force should equal its weight; any deviation is an error of the scheme.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from drake_dress.models.cloth.matrices import lumped_mass
 SPEED = 0.15
 DURATION = 1.0
 _SETTLING = 4.0
-# Stiffness-proportional, s: only to come to rest sooner, it does not change where.
+# Stiffness-proportional damping, s: speeds up settling without changing the rest state.
 _SETTLING_DAMPING = 0.02
 _GRAVITY = 9.81
 
 
 def measure(session: Session) -> Result:
-    """Returns each gripper's force over its share of the weight, per scheme and time step."""
+    """Returns gripper forces over their share of the weight, by scheme and time step."""
     mesh = jacket(QUICK_SPACING if session.quick else CONTROLLER_SPACING)
     held, x = grasp(mesh), mesh.rest_position
     session.say(f"carrying: {len(x)} nodes at {SPEED} m/s")
@@ -93,7 +93,7 @@ def measure(session: Session) -> Result:
 
 
 def _hanging(scene: Scene, session: Session) -> tuple[FloatArray, float]:
-    """Returns the coat that hangs at rest, (n,3), m, and the largest speed that is left, m/s."""
+    """Returns the coat hanging at rest (n,3), m, and its largest remaining speed, m/s."""
     m = scene.material
     damped = Material(
         m.surface_density, m.stretch_stiffness, m.bending_stiffness, _SETTLING_DAMPING
@@ -128,5 +128,5 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes nothing: a table says it all."""
+    """Writes nothing; the table is sufficient."""
     return []

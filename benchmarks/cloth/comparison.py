@@ -1,8 +1,8 @@
-"""The two questions that every moving scene is asked.
+"""The two comparisons made for every moving scene.
 
-Over time steps: how far is a scheme from the fine reference as time goes on, and what does a second
-of simulation cost? Against peers: what does a step cost beside other simulators, and is what it
-gives as good?
+Over time steps: the distance of each scheme to the fine reference over time, and the cost of a
+simulated second. Against peers: the cost of a step compared with other simulators, and the quality
+of the result.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from drake_dress.drawing import load_matplotlib
 
 Result = dict[str, Any]
 
-# Inner iterations of the accelerated scheme beside the paper's single one.
+# Inner iterations of the accelerated scheme, in addition to the paper's single one.
 _MORE_ITERATIONS = (5, 20)
-# Peers are run at one time step only, and are given so much more time for it.
+# Peers run at one time step only, with a time limit longer by this factor.
 _PEER_PATIENCE = 3.0
 # Names of engines begin so: MuJoCo's flex, and the schemes of this package.
 _MUJOCO = "MuJoCo"
@@ -57,7 +57,7 @@ def own_recipes() -> list[Recipe]:
 def _recipes_beside_peers(scene: Scene) -> list[Recipe]:
     """Returns the schemes for a table with peers.
 
-    Projective Dynamics is left out on a stiff fabric: a step of 10 ms of 6,168 nodes did not
+    Projective Dynamics is omitted for a stiff fabric: with 6,168 nodes, a step of 10 ms did not
     converge in its 5,000 iterations, which take longer than all other engines together.
     """
     own = own_recipes()
@@ -84,11 +84,11 @@ def over_steps(
     """Returns cost and distance to the fine reference of each scheme at each time step.
 
     Args:
-        session: of the benchmark.
-        scene: what is simulated.
-        time_steps: s.
-        recipes: of the schemes; None for all of this package.
-        accuracy: whether to compare with a fine reference.
+        session: Session of the benchmark.
+        scene: Scene to simulate.
+        time_steps: Time steps, s.
+        recipes: Recipes of the schemes; None for all of this package.
+        accuracy: Whether to compare with a fine reference.
     """
     session.say(f"{scene.name}: {len(scene.position)} nodes, {scene.duration:g} s")
     reference = fine_reference(session, scene) if accuracy else None
@@ -114,8 +114,8 @@ def over_steps(
 def _accuracy(run: Run, scene: Scene, reference: Reference | None) -> Result:
     """Returns the distances to the reference.
 
-    A run that was cut short has neither mean nor maximum: distances grow with time, and it would
-    seem better than those that went on.
+    An incomplete run has neither mean nor maximum: distances grow with time, so it would seem
+    better than complete runs.
     """
     distance = [] if reference is None else reference.distance(run)
     away = [d for _, d in distance[1:]]
@@ -129,14 +129,14 @@ def _accuracy(run: Run, scene: Scene, reference: Reference | None) -> Result:
 
 
 def _contact(run: Run, scene: Scene) -> Result:
-    """Returns what contact cost, for scenes that have any.
+    """Returns the cost of steps in contact, for scenes with contact.
 
-    From the first step with a node in contact to the first with the run's largest count, which is
-    all of them where a garment comes to lie flat.
+    These are the steps from the first one with a node in contact to the first one with the run's
+    largest number of contacts, which is all nodes if a garment comes to lie flat.
     """
     if not run.contact:
         return {}
-    # Aligned from the end: the first step, which compiles, has no time.
+    # Aligned at the end: the first step, which compiles, is not timed.
     count = min(len(run.contact), len(run.step_time))
     contact = np.array(run.contact[-count:]) if count else np.zeros(0, dtype=int)
     cost = np.array(run.step_time[-count:]) if count else np.zeros(0)
@@ -166,11 +166,11 @@ def against_peers(
     """Returns cost and quality of own schemes and peers at one time step.
 
     Args:
-        session: of the benchmark.
-        scene: what is simulated.
-        time_step: s.
-        settle: time at which the mean height is told, s.
-        accuracy: whether to compare with a fine reference.
+        session: Session of the benchmark.
+        scene: Scene to simulate.
+        time_step: Time step, s.
+        settle: Time at which the mean height is reported, s.
+        accuracy: Whether to compare with a fine reference.
     """
     h = time_step
     session.say(f"{scene.name}: {len(scene.position)} nodes, {scene.duration:g} s, peers")
@@ -366,12 +366,12 @@ def _reference(result: Result) -> str:
     return f" ({r['engine']} at {1e3 * r['time_step_s']:g} ms)"
 
 
-# Engine → Matplotlib colour map; light to dark is small to large time step, as in the paper.
+# Matplotlib colour maps of the engines; light to dark is small to large time step, as in the paper.
 _MAPS = ("Blues", "Purples", "Greens", "Reds", "Oranges", "Greys")
 
 
 def steps_panels(result: Result) -> list[Panel]:
-    """Returns the paper's pair of plots: distance over time, cost of a simulated second."""
+    """Returns the pair of plots as in the paper: distance over time, cost of a simulated second."""
     load_matplotlib()
     from matplotlib import colormaps
 
@@ -383,7 +383,7 @@ def steps_panels(result: Result) -> list[Panel]:
         runs = [run for run in result["runs"] if run["engine"] == engine]
         for k, run in enumerate(runs):
             shade = colormaps[name](0.35 + 0.6 * k / max(1, len(runs) - 1))
-            # one entry in the legend per engine: the title tells what the shades are
+            # one legend entry per engine; the title explains the shades
             label = engine if k == len(runs) - 1 else "_nolegend_"
             if run["distance_m"]:
                 time, distance = zip(*run["distance_m"], strict=True)

@@ -21,7 +21,7 @@ from benchmarks.cloth.table import Table
 from drake_dress.models.cloth.material import Material
 
 DURATION = 3.0
-# Long enough for the height after 1 s.
+# Long enough to report the height after 1 s.
 _PEER_DURATION = 1.0
 _PEER_STEP = 0.01
 
@@ -35,7 +35,7 @@ def draping_scene(spacing: float, material: Material, duration: float, name: str
 
 
 def measure(session: Session) -> Result:
-    """Returns cost and accuracy over time steps, and peers on a stiff fabric."""
+    """Returns cost and accuracy over time steps, and the comparison with peers on stiff fabric."""
     spacing = QUICK_SPACING if session.quick else PAPER_SPACING
     steps = QUICK_STEPS if session.quick else TIME_STEPS
     duration = 0.5 if session.quick else DURATION
@@ -54,7 +54,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes the paper's pair of plots; returns the files."""
+    """Writes the pair of plots as in the paper; returns the files."""
     file = folder / "cloth_draping.png"
     write_figure(file, steps_panels(result["over_steps"]))
     return [file]

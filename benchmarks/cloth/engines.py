@@ -1,6 +1,6 @@
-"""This package's schemes behind one small interface, the one that peers have too.
+"""This package's cloth schemes behind one small interface, which the peers share.
 
-What differs between their constructors stands here and nowhere else.
+All differences between their constructors are handled here.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from drake_dress.models.cloth.state import ClothState
 
 
 class Engine(Protocol):
-    """A garment that is stepped."""
+    """A garment simulation."""
 
     def step(self, held: FloatArray) -> None:
-        """Advances by one time step, at whose end the held nodes are at `held` (k,3), m."""
+        """Advances by one time step, which moves the held nodes to `held` (k,3), m."""
 
     def positions(self) -> FloatArray:
-        """Returns (n,3), m."""
+        """Returns the positions (n,3), m."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """How to make an engine.
+    """How to create an engine.
 
     Attributes:
-        name: for tables.
-        make: scene and time step, s → engine.
-        missing: why it cannot be made here, in one line; None if it can.
+        name: Name for tables.
+        make: Scene and time step, s → engine.
+        missing: Returns why it is not available here, in one line; None if it is.
     """
 
     name: str
@@ -51,10 +51,10 @@ class ExplicitBiasEngine:
     """The controller's scheme.
 
     Args:
-        scene: what is simulated.
+        scene: Scene to simulate.
         time_step: h, s.
-        iterations: 1 for the paper's scheme, else the most iterations of the inner solve.
-        thickness: that layers of the garment keep, m; 0 lets them pass.
+        iterations: Limit of the inner solver's iterations; 1 gives the paper's scheme.
+        thickness: Least distance of the garment's layers, m; 0 disables self-collision.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class ExplicitBiasEngine:
         self.x, self.v, self.reaction, _ = self.cloth.step(self.x, self.v, motion, self._obstacles)
 
     def positions(self) -> FloatArray:
-        """Returns (n,3), m."""
+        """Returns the positions (n,3), m."""
         return self.x
 
     def held_force(self) -> FloatArray:
@@ -90,8 +90,8 @@ class StateEngine:
     """A scheme that steps a `ClothState`: implicit Euler, Projective Dynamics.
 
     Args:
-        cloth: steps `(state, obstacles, held_velocity) -> (state, info)`.
-        scene: what is simulated.
+        cloth: Scheme with the step `(state, obstacles, held_velocity) -> (state, info)`.
+        scene: Scene to simulate.
         time_step: h, s.
     """
 
@@ -112,7 +112,7 @@ class StateEngine:
         self.unconverged += not getattr(info, "converged", True)
 
     def positions(self) -> FloatArray:
-        """Returns (n,3), m."""
+        """Returns the positions (n,3), m."""
         return self.state.x
 
     def held_force(self) -> FloatArray:
@@ -121,9 +121,9 @@ class StateEngine:
 
 
 def explicit_bias(iterations: int = 1, thickness: float = 0.0) -> Recipe:
-    """Returns the controller's scheme with so many inner iterations at most.
+    """Returns the controller's scheme with at most `iterations` inner iterations.
 
-    With a thickness, m, it keeps the garment's layers so far apart.
+    With a thickness, m, it keeps the garment's layers that far apart.
     """
     return Recipe(
         f"explicit bias, {iterations} it." + (", layers" if thickness else ""),
@@ -132,7 +132,7 @@ def explicit_bias(iterations: int = 1, thickness: float = 0.0) -> Recipe:
 
 
 def _make_implicit(scene: Scene, h: float) -> Engine:
-    # Peers and the other schemes have contact at nodes only.
+    # Like the peers and the other schemes: contact at nodes only.
     cloth = ImplicitCloth(
         scene.elements(),
         scene.material,
@@ -144,7 +144,7 @@ def _make_implicit(scene: Scene, h: float) -> Engine:
 
 
 def implicit() -> Recipe:
-    """Returns the plant's scheme, with contact at nodes only as the others have it."""
+    """Returns the plant's scheme, but with contact at nodes only, like the others."""
     return Recipe("implicit", _make_implicit)
 
 

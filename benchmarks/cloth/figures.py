@@ -1,4 +1,4 @@
-"""Line plots of the results, without a display."""
+"""Line plots of the results; they need no display."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drake_dress.drawing import new_figure, plain_settings
 
 @dataclass(frozen=True)
 class Line:
-    """A curve with its label; styles and colour as Matplotlib names them."""
+    """A curve with its label; line style, marker and colour as in Matplotlib."""
 
     x: npt.ArrayLike
     y: npt.ArrayLike

@@ -1,4 +1,4 @@
-"""The meshes that are measured: coats of a wanted fineness, a tube, a limb."""
+"""The meshes of the benchmark: coats of a given spacing, a sheet and a tube."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment import COATS, GarmentMesh, make_coat
 
-# Spacings at which the jacket has nearly the paper's 6,121 and 1,800 nodes: 6,168 and 1,793.
+# Spacings at which the jacket nearly has the paper's 6,121 and 1,800 nodes: 6,168 and 1,793.
 PAPER_SPACING = 0.0142
 CONTROLLER_SPACING = 0.0264
-# The same scenes in seconds: 392 nodes.
+# Spacing for quick runs of the same scenes: 392 nodes.
 QUICK_SPACING = 0.06
-# From 963 to 25,210 nodes of the overcoat.
+# Spacings that give 963 to 25,210 nodes of the overcoat.
 GROWTH_SPACINGS = (0.045, 0.032, 0.025, 0.018, 0.0125, 0.01)
 
 
@@ -31,7 +31,7 @@ def overcoat(spacing: float) -> GarmentMesh:
 
 
 def grasp(mesh: GarmentMesh) -> IntArray:
-    """Returns (20,) the held nodes: the left gripper's ten, then the right one's."""
+    """Returns the held nodes (20,): ten of the left gripper, then ten of the right one."""
     return mesh.held
 
 

@@ -1,4 +1,4 @@
-"""How the cost of a step grows with the number of nodes: draping, one iteration."""
+"""Growth of the cost of a step with the number of nodes: draping, one iteration."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _REPEATS = 4
 
 
 def measure(session: Session) -> Result:
-    """Returns the cost of a step for each size and the exponent of a fit.
+    """Returns the cost of a step for each size, and the exponent of a fit.
 
-    Sizes take turns, several rounds of steps each.
+    Sizes are timed in several alternating rounds.
     """
     spacings = (0.06, 0.045, 0.035) if session.quick else GROWTH_SPACINGS
     session.say(f"growth: {len(spacings)} sizes of the overcoat")
     sizes: list[Result] = []
     engines: list[ExplicitBiasEngine] = []
-    ExplicitBiasEngine(_scene(spacings[0]), _STEP)  # what is compiled is no part of a set-up
+    ExplicitBiasEngine(_scene(spacings[0]), _STEP)  # compile before timing set-ups
     for spacing in spacings:
         scene = _scene(spacing)
         begin = time.perf_counter()
@@ -93,7 +93,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes cost over size; returns the files."""
+    """Writes a plot of cost over size; returns the files."""
     done = [size for size in result["sizes"] if size["step_median_s"]]
     line = Line(
         [size["nodes"] for size in done],

@@ -1,7 +1,7 @@
-"""What it costs to keep the layers of a garment apart: a step with self-collision over one without.
+"""Cost of self-collision: time of a step with it, divided by the time without.
 
-A coat that hangs, a coat that falls in a heap, and two sheets at rest on each other, which touch
-with all of their nodes.
+The scenes are a hanging coat, a coat that falls in a heap, and two sheets at rest on each other,
+which touch with all of their nodes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 _THICKNESS = 2e-3
 _STEP = 0.01
 _TIME, _QUICK_TIME = 1.0, 0.3
-# A heap and sheets begin so far above the floor and apart, m.
+# Initial height of the heap above the floor, and initial distance of the sheets, m.
 _ABOVE, _APART = 0.02, 4e-3
 _COLUMNS, _SPACING = 55, 0.014
 _NONE = np.zeros(0, dtype=np.int32)
@@ -90,5 +90,5 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes nothing: a table says it all."""
+    """Writes nothing; the table is sufficient."""
     return []

@@ -1,8 +1,8 @@
-"""Steps engines side by side and keeps their times, positions and contact.
+"""Steps engines alternately and records their times, positions and contact.
 
-Engines that are compared advance in turn, a stretch of simulated time each, so that whatever else
-the machine does falls on all of them alike. What the tables show are medians of steps; ratios are
-medians over the stretches of the ratio within a stretch.
+The compared engines advance in turns of equal simulated time, so that other load on the machine
+affects all of them alike. Tables show medians of step times; ratios are medians over turns of the
+ratio within a turn.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from benchmarks.cloth.scene import Scene
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import Elements
 
-# Interval of the kept positions and of the turns, s.
+# Interval of recorded positions, and duration of a turn, s.
 SAMPLE_INTERVAL = 0.1
-# Beyond this far from the origin a garment has exploded, m.
+# Distance from the origin above which a garment counts as exploded, m.
 _FAR = 20.0
 
 
 @dataclass
 class Session:
-    """What all scenes need to know about a run of the benchmark.
+    """Settings of a benchmark run, common to all scenes.
 
     Attributes:
-        quick: small meshes and short times.
-        limit: wall time that one engine may take for one run, s; then it is cut short.
-        cache: folder of references; None to do without distances to them.
-        say: prints a line of progress.
-        stop: set by Ctrl-C; what was measured until then counts.
-        engines: parts of names of the engines that are compared; empty for all.
+        quick: Whether to use small meshes and short times.
+        limit: Wall time after which an engine's run is cut short, s.
+        cache: Folder of references; None to omit distances to them.
+        say: Prints a line of progress.
+        stop: Set by Ctrl-C; measurements up to then count.
+        engines: Substrings of the names of the engines to compare; empty for all.
     """
 
     quick: bool = False
@@ -48,7 +48,7 @@ class Session:
     engines: tuple[str, ...] = ()
 
     def wants(self, name: str) -> bool:
-        """Returns whether an engine is to be measured."""
+        """Returns whether to measure an engine."""
         return not self.engines or any(part in name for part in self.engines)
 
 
@@ -57,17 +57,18 @@ class Run:
     """One engine on one scene at one time step.
 
     Attributes:
-        name: of the engine.
+        name: Name of the engine.
         time_step: h, s.
-        setup: wall time of making it, s; first_step: of its first step, s, which compiles.
-        step_time: (steps,) wall time of the others, s.
-        contact: (steps,) nodes in contact after the step.
-        turn_mean: mean step time of each turn, s; nan where it did not take part.
-        final: (n,3) positions at the time that was reached, m.
-        sample: multiple of SAMPLE_INTERVAL → (n,3) positions, m.
-        exploded: simulated time at which it was not finite or metres away, s; None if never.
-        reached: simulated time, s.
-        unconverged: steps whose solver gave up, where the engine tells.
+        setup: Wall time of its creation, s; first_step: Wall time of its first step, which
+            compiles, s.
+        step_time: (steps,) wall times of the other steps, s.
+        contact: (steps,) number of nodes in contact after each step.
+        turn_mean: Mean step time of each turn, s; nan if it did not take part.
+        final: (n,3) positions at the time reached, m.
+        sample: Multiple of SAMPLE_INTERVAL → (n,3) positions, m.
+        exploded: Simulated time at which it was not finite or metres away, s; None if never.
+        reached: Simulated time reached, s.
+        unconverged: Number of steps whose solver did not converge, if the engine reports it.
     """
 
     name: str
@@ -89,11 +90,11 @@ class Run:
         return float(np.median(times)) if times else float("nan")
 
     def worst(self) -> float:
-        """Returns the largest wall time of a step but the first, s."""
+        """Returns the largest wall time of a step except the first, s."""
         return max(self.step_time, default=float("nan"))
 
     def spread(self) -> float:
-        """Returns the interquartile range of the step times by their median."""
+        """Returns the interquartile range of the step times divided by their median."""
         if len(self.step_time) < 4:
             return float("nan")
         low, high = np.percentile(self.step_time, (25, 75))
@@ -120,8 +121,8 @@ class Run:
 def race(session: Session, scene: Scene, recipes: Sequence[Recipe], time_step: float) -> list[Run]:
     """Returns the runs of the engines over the scene's duration, in the order of `recipes`.
 
-    An engine that is missing gives a line of progress and no run, nor does one that was
-    interrupted before its first step.
+    An engine that is not available is reported and gives no run. One that was interrupted before
+    its first step gives no run, either.
     """
     runs: list[Run] = []
     engines: list[Engine] = []
@@ -151,7 +152,7 @@ def race(session: Session, scene: Scene, recipes: Sequence[Recipe], time_step: f
 
 
 def _turn(session: Session, scene: Scene, run: Run, engine: Engine, steps: range) -> None:
-    """Advances one engine by one stretch and writes it into its run."""
+    """Advances one engine by one turn and records it in its run."""
     h = run.time_step
     taken: list[float] = []
     for step in steps:
@@ -192,9 +193,9 @@ def _line(run: Run, scene: Scene) -> str:
 
 
 def ratio(run: Run, to: Run, last: int = 0) -> float:
-    """Returns how many times as long as `to` a step of `run` took, median over turns.
+    """Returns the step time of `run` divided by that of `to`, median over turns.
 
-    Of the `last` turns alone, if any are asked for.
+    If `last` is not 0, only the last `last` turns count.
     """
     count = min(len(run.turn_mean), len(to.turn_mean))
     both = np.array(run.turn_mean[:count]) / np.array(to.turn_mean[:count])

@@ -1,4 +1,4 @@
-"""How the held nodes are led: none of these jumps, so accuracy is not a matter of the first step.
+"""Motions of the held nodes, without jumps, so that the first step does not decide the accuracy.
 
 Each function returns a motion: time, s → (k,3) positions, m.
 """
@@ -12,7 +12,7 @@ from drake_dress.models.arrays import FloatArray
 
 
 def at_rest(held: FloatArray) -> Motion:
-    """Returns no motion of the nodes at `held` (k,3)."""
+    """Returns a motion that keeps the nodes at `held` (k,3)."""
     return lambda time: held
 
 
@@ -22,13 +22,13 @@ def carried(held: FloatArray, velocity: FloatArray) -> Motion:
 
 
 def _eased(share: float) -> float:
-    """Returns 0 … 1 with velocity and acceleration zero at both ends (quintic)."""
+    """Returns a quintic from 0 to 1 with zero velocity and acceleration at both ends."""
     s = min(max(share, 0.0), 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def pulled(held: FloatArray, way: FloatArray, duration: float) -> Motion:
-    """Returns an eased straight motion by `way` (3,), m, that takes `duration`, s."""
+    """Returns an eased straight motion by `way` (3,), m, of `duration`, s."""
     return lambda time: held + _eased(time / duration) * way
 
 
@@ -37,16 +37,16 @@ def laid_down(
 ) -> Motion:
     """Returns a motion that lays a hanging garment on a table and folds it over.
 
-    The shoulders go down and forward on a quarter ellipse until the lowest held node is on the
-    table, so that the hem touches first and the rest follows, then in an arc back over what lies
-    there by a third of the length. The held patches stay as they are: flattened, they would strain.
+    The shoulders move down and forward on a quarter ellipse until the lowest held node is on the
+    table, so that the hem touches first. Then they move back in an arc by a third of the length.
+    The held patches keep their shape: flattened, they would strain.
 
     Args:
-        held: (k,3) start, m.
-        table: height at which nodes lie on the table, m.
-        length: of the garment from shoulder to hem, m: how far forward the shoulders go.
-        down_time: of laying down, s.
-        fold_time: of folding over, s.
+        held: (k,3) initial positions, m.
+        table: Height of nodes that lie on the table, m.
+        length: Length of the garment from shoulder to hem, by which the shoulders move forward, m.
+        down_time: Duration of laying down, s.
+        fold_time: Duration of folding over, s.
     """
     drop = float(held[:, 2].min()) - table
 

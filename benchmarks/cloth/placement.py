@@ -1,8 +1,8 @@
 """A hanging coat is laid on a table and folded over: the paper's placement.
 
-A coat is no flat thing: laid down it keeps hollows, and some of its nodes never touch the table.
-What a step costs with every node in contact is measured on a flat sheet that is let down on the
-table by one edge.
+A coat is not flat: when laid down it keeps hollows, and some nodes never touch the table. The cost
+of a step with every node in contact is measured on a flat sheet that is lowered onto the table by
+one edge.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from benchmarks.cloth.table import Table
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.material import Material
 
-# Of the hem above the table at the start, m.
+# Initial height of the hem above the table, m.
 _CLEARANCE = 0.05
-# Of laying down, of folding over and of coming to rest, s.
+# Durations of laying down, folding over and settling, s.
 _TIMES = (1.2, 0.8, 0.4)
 _QUICK_TIMES = (0.5, 0.3, 0.2)
 _PEER_STEP = 0.01
-# 78² = 6,084 nodes at a centimetre.
+# 78² = 6,084 nodes, spacing a centimetre.
 _SHEET_COLUMNS, _SHEET_SPACING = 78, 0.01
 _SHEET_SLOPE = 0.35  # rad
 _SHEET_CLEARANCE = 0.005
@@ -51,28 +51,28 @@ def placement_scene(
     """Returns the scene with the jacket at a spacing, m.
 
     Args:
-        spacing: m.
-        material: of the jacket.
-        times: of laying down, of folding over, of rest, s.
-        name: for tables.
+        spacing: Spacing, m.
+        material: Material of the jacket.
+        times: Durations of laying down, folding over and settling, s.
+        name: Name for tables.
     """
     mesh = jacket(spacing)
     held = grasp(mesh)
     x = mesh.rest_position
     table = float(x[:, 2].min()) - _CLEARANCE - material.margin
-    # the hem lies where it touched, the shoulders a coat's length before it
+    # the hem stays where it touched, the shoulders come to lie a coat's length in front of it
     length = -float(x[:, 2].min())
     motion = laid_down(x[held], table + material.margin, length, *times[:2])
     return Scene(name, x, mesh.faces, held, material, motion, sum(times), Obstacles.floor(table))
 
 
 def sheet_scene(columns: int, spacing: float, name: str) -> Scene:
-    """Returns a sheet that rises from its free edge and whose other edge is let down.
+    """Returns a sheet that slopes up from its free edge and is lowered by the other edge.
 
     Args:
-        columns: nodes along a side.
-        spacing: m.
-        name: for tables.
+        columns: Number of nodes along a side.
+        spacing: Spacing, m.
+        name: Name for tables.
     """
     flat, faces = garments.sheet(columns, spacing)
     side = spacing * (columns - 1)
@@ -85,7 +85,7 @@ def sheet_scene(columns: int, spacing: float, name: str) -> Scene:
     )
     held = np.arange(columns * (columns - 1), columns**2, dtype=np.int32)
     table = -SOFT.margin
-    # forward to where the edge lies when the sheet is flat, and a little more, so that it is taut
+    # forward to the edge's position when the sheet is flat, and slightly beyond, so that it is taut
     way = np.array([1.01 * side - side * np.cos(_SHEET_SLOPE), 0.0, -float(x[held[0], 2])])
     motion = pulled(x[held], way, _SHEET_TIME)
     duration = _SHEET_TIME + _SHEET_REST
@@ -93,14 +93,14 @@ def sheet_scene(columns: int, spacing: float, name: str) -> Scene:
 
 
 def measure(session: Session) -> Result:
-    """Returns cost and accuracy over time steps, and peers on a stiff fabric."""
+    """Returns cost and accuracy over time steps, and the comparison with peers on stiff fabric."""
     spacing = QUICK_SPACING if session.quick else PAPER_SPACING
     steps = QUICK_STEPS if session.quick else TIME_STEPS
     times = _QUICK_TIMES if session.quick else _TIMES
     soft = placement_scene(spacing, SOFT, times, "placement")
     stiff = placement_scene(spacing, STIFF, times, "placement-stiff")
     sheet = sheet_scene(20 if session.quick else _SHEET_COLUMNS, _SHEET_SPACING, "laid sheet")
-    # Kernels are loaded at first use: not within what is told as the worst step.
+    # Warm up: kernels are loaded at first use, which must not count as the worst step.
     silent = replace(session, say=lambda _: None)
     race(silent, sheet_scene(12, 0.03, "warm-up"), own_recipes(), _PEER_STEP)
     return {
@@ -122,7 +122,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes the paper's pair of plots; returns the files."""
+    """Writes the pair of plots as in the paper; returns the files."""
     file = folder / "cloth_placement.png"
     write_figure(file, steps_panels(result["over_steps"]))
     return [file]

@@ -1,4 +1,4 @@
-"""One scene in this process, or several in processes of their own."""
+"""Measures scenes in this process or in several worker processes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Result = dict[str, Any]
 
 
 def scene_module(name: str) -> Any:
-    """Returns the module of a scene: `measure`, `tables`, `write_figures`."""
+    """Returns the module of a scene, with `measure`, `tables` and `write_figures`."""
     return importlib.import_module(f"benchmarks.cloth.{name}")
 
 
@@ -30,7 +30,7 @@ def measure_in_turn(
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
-    """Measures scenes one after the other and hands each result to `finish`."""
+    """Measures scenes one after the other and passes each result to `finish`."""
     session = Session(quick, limit, cache, _say, stop, engines)
     for name in names:
         if stop.is_set():
@@ -48,9 +48,9 @@ def measure_at_once(
     stop: threading.Event,
     finish: Callable[[str, Result], None],
 ) -> None:
-    """Measures scenes in `jobs` processes; they disturb each other's times.
+    """Measures scenes in `jobs` parallel processes, which disturb each other's times.
 
-    Ctrl-C reaches all processes of a terminal, and each ends with what it has.
+    Ctrl-C reaches all processes of a terminal, and each ends with its results so far.
     """
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         pending = {
@@ -64,7 +64,7 @@ def measure_at_once(
 def measure_alone(
     name: str, quick: bool, limit: float, cache: Path | None, engines: tuple[str, ...]
 ) -> Result:
-    """Returns the result of one scene; for a process of its own."""
+    """Measures one scene; the task of a worker process."""
     with caught_interrupt() as stop:
         session = Session(quick, limit, cache, _say, stop, engines)
         result: Result = scene_module(name).measure(session)

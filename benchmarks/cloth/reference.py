@@ -1,4 +1,4 @@
-"""A scene at so small a step that it stands for the limit h → 0, kept in a file once computed."""
+"""Reference runs with a time step small enough to represent the limit h → 0, kept in a file."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from benchmarks.cloth.measure import SAMPLE_INTERVAL, Run, Session
 from benchmarks.cloth.scene import Scene
 from drake_dress.models.arrays import FloatArray
 
-# The paper takes 0.1 ms for Projective Dynamics, at 6,121 nodes hours on one core for all scenes.
+# The paper uses 0.1 ms for Projective Dynamics: hours on one core for all scenes, at 6,121 nodes.
 _PD_STEP = 5e-4
 _IMPLICIT_STEP = 2.5e-4
-# Stiffer than that, N/m, Projective Dynamics needs hundreds of iterations a step even at 0.5 ms;
-# both schemes have the same energy and so the same limit.
+# Above this stiffness, N/m, Projective Dynamics needs hundreds of iterations per step even at
+# 0.5 ms. Both schemes have the same energy and therefore the same limit.
 STIFF_FROM = 1000.0
 
 
@@ -24,8 +24,8 @@ class Reference:
     """Positions of the fine run at multiples of SAMPLE_INTERVAL.
 
     Attributes:
-        engine: its name; time_step: s.
-        sample: multiple → (n,3) m.
+        engine: Name of the engine; time_step: Time step, s.
+        sample: Multiple of SAMPLE_INTERVAL → (n,3) positions, m.
     """
 
     def __init__(self, engine: str, time_step: float, sample: dict[int, FloatArray]) -> None:
@@ -34,7 +34,7 @@ class Reference:
         self.sample = sample
 
     def distance(self, run: Run) -> list[tuple[float, float]]:
-        """Returns (time, s; mean over nodes of the distance to the reference, m) per sample."""
+        """Returns (time, s; mean distance of the nodes to the reference, m) for each sample."""
         common = sorted(set(run.sample) & set(self.sample))
         return [
             (
@@ -46,9 +46,10 @@ class Reference:
 
 
 def fine_reference(session: Session, scene: Scene) -> Reference | None:
-    """Returns the fine run of a scene, from its file if there is one; None or not asked for.
+    """Returns the fine run of a scene, from its file if there is one; None if not requested.
 
-    By Projective Dynamics where the fabric is not stiff, else implicit.
+    It uses Projective Dynamics for a soft fabric, and the implicit scheme for a stiff one. It is
+    also None if the run is interrupted.
     """
     if session.cache is None:
         return None
@@ -87,7 +88,7 @@ def _choice(scene: Scene) -> tuple[Recipe, float]:
 
 
 def _key(scene: Scene, engine: str, step: float) -> str:
-    """Returns a name for all that the reference depends on but the engine's own code."""
+    """Returns a hash of everything that the reference depends on except the engine's code."""
     digest = hashlib.sha256()
     for array in (scene.first_position(), scene.first_velocity(), scene.position):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -104,7 +105,7 @@ def _key(scene: Scene, engine: str, step: float) -> str:
 
 
 def _store(file: Path, positions: FloatArray) -> None:
-    """Writes the file in one go: an interrupted run leaves none behind."""
+    """Writes the file atomically, so that an interrupted run leaves none behind."""
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_suffix(".part.npz")
     np.savez_compressed(partial, x=positions.astype(np.float32))

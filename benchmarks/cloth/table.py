@@ -1,4 +1,4 @@
-"""Tables as plain text that is Markdown too."""
+"""Tables as plain text that is also Markdown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Table:
-    """A title, a header and rows of cells; numbers are shown by `shown`."""
+    """A title, a header and rows of cells, formatted by `shown`."""
 
     title: str
     header: Sequence[str]
@@ -32,7 +32,7 @@ class Table:
 
 
 def shown(cell: Any) -> str:
-    """Returns a cell as text: three digits for numbers, a dash for what was not measured."""
+    """Returns a cell as text: numbers with three digits, missing values as a dash."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "–"
     if isinstance(cell, float):

@@ -1,12 +1,12 @@
 """The paper's single-sleeve task: an armhole follows a target from the hand to the shoulder.
 
-The grippers move by the transposed Jacobian of one step of the cloth (the paper's law for ṗ_rl and
-ṗ_rr): with e = x_tar − x_cl, x_cl the mean of six nodes of the left armhole,
+The grippers move by the transposed Jacobian of one cloth step (the paper's law for ṗ_rl and ṗ_rr).
+With e = x_tar − x_cl, and x_cl the mean of six nodes of the left armhole,
 
     ṗ = K Σ_held (∂x_cl / ∂p)ᵀ e,
 
-one vector-Jacobian product a step for both grippers. The arm is raised toward the coat's left
-armhole, through its open front.
+which takes one vector-Jacobian product per step for both grippers. The arm points toward the coat's
+left armhole, through its open front.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth
 from drake_dress.models.dressing.linking import arm_linking_number
 
 _STEP = 0.01
-# From the hand to the shoulder, seen from the coat: through the open front.
+# From the hand to the shoulder, in the coat's frame: through the open front.
 _ARM_DIRECTION = np.array([0.50, -0.86, 0.06])
 _ARM_LENGTH, _ARM_RADIUS = 0.50, 0.035
-# Of the hand's tip before the armhole's centre at the start, m.
+# Initial distance of the hand's tip from the armhole's centre, m.
 _GAP = 0.05
-# The coat comes to rest, then the target waits at the hand, then it goes along the arm.
+# The coat settles, then the target waits at the hand, then it moves along the arm, s.
 _SETTLING, _WAITING = 1.0, 1.5
 _TARGET_SPEED = 0.08  # m/s
 _END_WAITING = 1.0
-_GAIN = 60.0  # K, 1/s: the Jacobian of one step is a few per cent
-_FASTEST = 0.25  # of a gripper, m/s: faster, nodes step over the hand
+_GAIN = 60.0  # K, 1/s; large, since the Jacobian of one step is a few per cent
+_FASTEST = 0.25  # of a gripper, m/s; at higher speed nodes pass through the hand
 _KEY_NODES = 6
-# Up to here the error is that of the approach.
+# Duration of the approach, whose error does not count, s.
 _APPROACH = 1.0
 
 
 def measure(session: Session) -> Result:
-    """Returns the trajectories, the error, and whether the sleeve is on."""
+    """Returns the trajectories, the tracking error, and whether the sleeve is on."""
     mesh = jacket(QUICK_SPACING if session.quick else CONTROLLER_SPACING)
     held, x = grasp(mesh), mesh.rest_position
     loop = mesh.loops["left_armhole"]
@@ -73,7 +73,7 @@ def measure(session: Session) -> Result:
         name: [] for name in ("sleeve", "left", "right", "target")
     }
     error, cost, contacts, deepest = [], [], [], 0.0
-    # nodes in a gripper go where it goes
+    # exclude held nodes, which move with the gripper regardless of the arm
     free = np.setdiff1d(np.arange(len(x)), held)
     none = np.zeros((len(held), 3))
     for k in range(round(duration / _STEP)):
@@ -128,7 +128,7 @@ def measure(session: Session) -> Result:
 
 
 def _gripper_motion(held_gradient: FloatArray) -> FloatArray:
-    """Returns (k,3) the motion of the held nodes over a step: each gripper's patch moves as one."""
+    """Returns the held nodes' motion (k,3) over a step; each gripper's patch moves rigidly."""
     motion = np.empty_like(held_gradient)
     half = len(held_gradient) // 2
     for part in (slice(0, half), slice(half, None)):
@@ -139,7 +139,7 @@ def _gripper_motion(held_gradient: FloatArray) -> FloatArray:
 
 
 def tables(result: Result) -> list[Table]:
-    """Returns one row."""
+    """Returns a table with one row."""
     row = [
         str(result["nodes"]),
         *(
@@ -166,13 +166,13 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes the paper's pair of plots: trajectories, and the error over time."""
+    """Writes the pair of plots as in the paper: trajectories, and the error over time."""
     path = {name: np.array(points) for name, points in result["trajectory_m"].items()}
     if not len(path["sleeve"]):
         return []
     names = {"sleeve": "sleeve state x_cl", "left": "grasp point p_rl", "right": "grasp point p_rr"}
     arm = np.array([result["arm"]["hand"], result["arm"]["shoulder"]])
-    # seen from above: the arm lies nearly level
+    # view from above, since the arm is nearly horizontal
     lines = [Line(path[name][:, 1], path[name][:, 0], label) for name, label in names.items()]
     lines.append(
         Line(path["target"][:, 1], path["target"][:, 0], "target x_tar", "--", color="red")

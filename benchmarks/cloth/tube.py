@@ -1,4 +1,4 @@
-"""A cloth tube is pulled along a limb: contact all round, sliding, as in a sleeve."""
+"""A cloth tube pulled along a limb: sliding contact all around, as in a sleeve."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from benchmarks.cloth.table import Table
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.material import Material
 
-# 36 · 50 = 1,800 nodes at about a centimetre.
+# 36 · 50 = 1,800 nodes, spacing about a centimetre.
 _AROUND, _ALONG = 36, 50
 _RADIUS, _LENGTH = 0.05, 0.5
-# With the margin of contact there are 2 mm of air between limb and tube.
+# With the contact margin, the gap between limb and tube is 2 mm.
 _LIMB_RADIUS, _LIMB_LENGTH = 0.045, 0.7
-# How far the held ring is on the limb at the start, and how far it is pulled, m.
+# Initial distance of the held ring along the limb, and distance that it is pulled, m.
 _ON, _WAY = 0.2, 0.35
 DURATION = 1.5
 _PEER_STEP = 0.01
 
 
 def tube_scene(around: int, along: int, material: Material, duration: float, name: str) -> Scene:
-    """Returns the scene: the tube's first ring is led along −x over a capsule.
+    """Returns the scene: the tube's first ring is pulled along −x over a capsule.
 
-    Part of the tube is on the limb from the start, the rest hangs before its end and follows.
+    Part of the tube is on the limb at the start; the rest hangs in front of its end and follows.
 
     Args:
-        around: nodes of a ring.
-        along: rings.
-        material: of the tube.
-        duration: of the pull, s.
-        name: for tables.
+        around: Number of nodes in a ring.
+        along: Number of rings.
+        material: Material of the tube.
+        duration: Duration of the pull, s.
+        name: Name for tables.
     """
     x, faces = garments.tube(around, along, _RADIUS, _LENGTH)
     x = x + np.array([-_ON, 0.0, 0.0])
@@ -57,7 +57,7 @@ def tube_scene(around: int, along: int, material: Material, duration: float, nam
 
 
 def measure(session: Session) -> Result:
-    """Returns cost and accuracy over time steps, and peers on a stiff fabric."""
+    """Returns cost and accuracy over time steps, and the comparison with peers on stiff fabric."""
     around, along = (14, 20) if session.quick else (_AROUND, _ALONG)
     steps = QUICK_STEPS if session.quick else TIME_STEPS
     duration = 0.4 if session.quick else DURATION
@@ -75,7 +75,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def write_figures(result: Result, folder: Path) -> list[Path]:
-    """Writes the paper's pair of plots; returns the files."""
+    """Writes the pair of plots as in the paper; returns the files."""
     file = folder / "cloth_tube.png"
     write_figure(file, steps_panels(result["over_steps"]))
     return [file]

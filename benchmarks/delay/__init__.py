@@ -1,1 +1,1 @@
-"""How long plans take on this machine."""
+"""Measures the plan delay on this machine."""

@@ -1,9 +1,9 @@
-"""Measures how long plans take on this machine, and keeps it.
+"""Measures the time that plans take on this machine, and stores it.
 
     drake-dress bench delay
 
-`controller.global_mpc.delay: measured` takes what is kept: a delay that 95 % of the solves keep.
-Nothing else should run meanwhile.
+`controller.global_mpc.delay: measured` uses the stored delay, which 95 % of the solves do not
+exceed. Nothing else should run during the measurement.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a dressing and keeps its solve times' quantile; returns the exit status."""
+    """Runs a dressing and stores the quantile of its solve times; returns the exit status."""
     options = _parser().parse_args(arguments)
     with tempfile.TemporaryDirectory() as out:
         _, problem = run_scenario(

@@ -1,1 +1,1 @@
-"""The dressing experiments: methods, persons, coats and seeds against each other."""
+"""The dressing experiments: comparison of methods, persons, coats and seeds."""

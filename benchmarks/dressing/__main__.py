@@ -1,7 +1,7 @@
-"""`python -m benchmarks.dressing`: dresses persons in coats by each method, under many seeds.
+"""`python -m benchmarks.dressing`: dresses persons in coats by each method, with many seeds.
 
-Every run is a `drake-dress run` of its own, with the pose, the coat's size, the plant's fabric and
-the start drawn by the seed. What was run stays in the file of `--json` and is not run again.
+Every run is a separate `drake-dress run`; its seed draws the pose, the coat's size, the plant's
+fabric and the start. Results are kept in the file of `--json` and not run again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _NAME = "dressing"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs what is missing and prints tables; returns 0, 2 for bad arguments, 130 after Ctrl-C."""
+    """Does the missing runs, prints tables; returns 0, 2 on bad arguments, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
     seeds, said = chosen_seeds(options)
     chosen = cases(options.methods, options.persons, options.coats, seeds, options.variation)

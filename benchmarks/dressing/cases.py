@@ -1,4 +1,4 @@
-"""Which runs there are, and what is kept of each."""
+"""The runs of the study, and the results kept of each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drake_dress.report.log import RunLog
 
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
 METHODS = ("full", "global", "local")
-# Who is dressed, and the scenario that has that person.
+# Person to the scenario with that person.
 PERSONS = {
     "dummy": "dummy_standing.yaml",
     "passive_standing": "passive_standing.yaml",
@@ -29,15 +29,15 @@ COATS = {
     "armhole_girth: 0.60, cuff_girth: 0.36, front_opening: 0.34}",
     "overcoat": "{preset: overcoat, shoulder_width: 0.52, front_opening: 0.34}",
 }
-# What the seed draws: all measures, as in scenarios/dummy_varied.yaml, or the few that it drew when
-# the first figures were made: coat_scale left given measures alone then.
+# What the seed draws: all measures, as in scenarios/dummy_varied.yaml, or the few drawn for the
+# first figures, when coat_scale did not change explicitly given measures.
 _SAME = "plant_stiffness: 0.3, plant_friction: 0.3, start_offset: 0.03}"
 VARIATIONS = {
     "all": "{arm_angle_deg: 10.0, coat_scale: 0.05, coat_measures: 0.03, person_scale: 0.05, "
     f"person_measures: 0.03, {_SAME}",
     "few": f"{{arm_angle_deg: 10.0, {_SAME}",
 }
-# Of the series that are kept, s.
+# Time step of the kept series, s.
 SERIES_STEP = 0.2
 
 
@@ -53,7 +53,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For files and tables."""
+        """Name for files and tables."""
         which = "" if self.variation == "few" else f"-{self.variation}"
         return f"{self.method}-{self.person}-{self.coat}-{self.seed}{which}"
 
@@ -65,7 +65,7 @@ def cases(
     seeds: Sequence[int],
     variation: str = "all",
 ) -> list[Case]:
-    """Returns all of them, the seeds outermost: a part of them is a fair part of all groups."""
+    """Returns all cases, ordered by seed first, so that any part covers all groups evenly."""
     return [
         Case(method, person, coat, seed, variation)
         for seed, person, coat, method in itertools.product(seeds, persons, coats, methods)
@@ -73,7 +73,7 @@ def cases(
 
 
 def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
-    """Returns KEY=VALUE for the scenario of a case."""
+    """Returns the KEY=VALUE settings of a case's scenario."""
     return [
         f"controller.method={case.method}",
         f"garment.coat={COATS[case.coat]}",
@@ -83,17 +83,17 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
 
 
 def scenario_of(case: Case, overrides: Sequence[str] = ()) -> Scenario:
-    """Returns the scenario of a case, with its variation to draw."""
+    """Returns the scenario of a case, before its variation is drawn."""
     return load_scenario(_SCENARIOS / PERSONS[case.person], settings_of(case, overrides), case.seed)
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
-    """Returns what one run came to.
+    """Executes one run and returns its result.
 
     Args:
-        case: which.
-        keep: folder for its log, report and replay; None to keep none.
-        overrides: further KEY=VALUE for the scenario.
+        case: Case to run.
+        keep: Folder for its log, report and replay; None to keep none.
+        overrides: Further KEY=VALUE settings of the scenario.
     """
     return run_case(
         case,
@@ -112,7 +112,7 @@ def _measured(out: Path) -> dict[str, Any]:
 
 
 def _series(log: RunLog) -> tuple[dict[str, list[Any]], float]:
-    """Returns s, l, force over time, and the force that 99 % of the samples stay below, N."""
+    """Returns s, l and force over time, and the 99 % quantile of the gripper force, N."""
     at = np.arange(log.time[0], log.time[-1], SERIES_STEP)
     rows = np.searchsorted(log.time, at)
     force = np.stack([np.linalg.norm(log.gripper_force[side], axis=1) for side in SIDES], axis=1)

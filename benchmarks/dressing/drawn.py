@@ -1,4 +1,4 @@
-"""What a run's seed drew: the numbers by which runs of a study differ."""
+"""The numbers drawn by a run's seed, by which the runs of a study differ."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drake_dress.diagrams.scenario.coat import coat_parameters
 
 
 def drawn(case: Case) -> dict[str, float]:
-    """Returns the measures, angles and values of a run by their names, in SI units and degrees."""
+    """Returns the drawn measures, angles and values of a run by name, in SI units and degrees."""
     scenario = _scenario(replace(case, seed=0))
     return values(apply_variation(replace(scenario, seed=case.seed)))
 
@@ -23,7 +23,7 @@ def _scenario(case: Case) -> Scenario:
 
 
 def values(scenario: Scenario) -> dict[str, float]:
-    """Returns what varies between scenarios whose variation is drawn."""
+    """Returns the numbers of a scenario that a variation may change."""
     found: dict[str, float] = {}
     for side in ("left", "right"):
         arm = getattr(scenario.person, f"{side}_arm")

@@ -1,4 +1,4 @@
-"""A page of a study: how success depends on pose, body, coat and fabric, and every failure."""
+"""The page of a study: success over pose, body, coat and fabric, and a list of failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.statistics import wilson
 from drake_dress.drawing import plain_settings
 from drake_dress.report.page import chart, embedded, html_page
 
-# Maps: what is over what. Arms are the mean of both.
+# Maps: title, the features of both axes, and their labels. Arm angles are the mean of both arms.
 MAPS = (
     ("pose", "abduction_deg", "extension_deg", "abduction, °", "extension, °"),
     ("body", "body_shoulder_width", "body_upper_arm_length", "shoulder width, m", "upper arm, m"),
@@ -31,12 +31,12 @@ _BINS = 5
 def study_page(
     results: Sequence[dict[str, Any]], drawn: Callable[[Case], Mapping[str, float]], beside: Path
 ) -> str:
-    """Returns the page.
+    """Returns the HTML page.
 
     Args:
-        results: of the runs, with summaries.
-        drawn: what a run's seed drew.
-        beside: where the page will be; replays that are kept in a folder there are linked.
+        results: Results of the runs, with summaries.
+        drawn: Returns the numbers drawn by a run's seed.
+        beside: Path of the page; replays kept in a folder next to it are linked.
     """
     rows = [(r, features(drawn(Case(**r["case"])))) for r in results]
     good = np.array([r["summary"]["success"] for r, _ in rows], dtype=bool)
@@ -55,7 +55,7 @@ def study_page(
 
 
 def features(drawn: Mapping[str, float]) -> dict[str, float]:
-    """Returns what was drawn, and a few numbers that follow from it."""
+    """Returns the drawn numbers and some derived ones."""
     found = dict(drawn)
     for name in ("abduction_deg", "extension_deg", "elbow_deg"):
         found[name] = 0.5 * (drawn[f"left_{name}"] + drawn[f"right_{name}"])
@@ -67,7 +67,7 @@ def features(drawn: Mapping[str, float]) -> dict[str, float]:
 
 @plain_settings()
 def _map(title: str, points: np.ndarray, good: np.ndarray, x: str, y: str) -> str:
-    """Returns runs as points, and the share of the dressed over each axis with its interval."""
+    """Returns a scatter plot of the runs, and the success rate over each axis with intervals."""
     figure, (ax, over_x, over_y) = chart(11.0, 3.4, columns=3)
     for dressed, colour, marker in ((True, _GOOD, "o"), (False, _BAD, "x")):
         at = points[good == dressed]
@@ -85,7 +85,7 @@ def _map(title: str, points: np.ndarray, good: np.ndarray, x: str, y: str) -> st
 
 
 def _shares(values: np.ndarray, good: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Returns of runs in groups of equal size: where, share in %, and its interval."""
+    """Returns the mean value, success rate and interval, %, of equally large groups of runs."""
     order = np.argsort(values, kind="stable")
     rows = []
     for group in np.array_split(order, min(_BINS, len(order))):
@@ -119,6 +119,6 @@ def _failures(results: Sequence[dict[str, Any]], beside: Path) -> str:
 
 
 def _kept(page: Path, name: str) -> list[Path]:
-    """Returns report and replay of a run, in a folder of its name below the page's."""
+    """Returns the report and replay of a run, found in its folder below the page's folder."""
     found = sorted(page.parent.glob(f"*/{name}/*.html"))
     return [path for path in found if path.stem in ("report", "replay")]

@@ -1,4 +1,4 @@
-"""All runs of a study in one table, for other programs."""
+"""Writes all runs of a study to one table, for other programs."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from drake_dress.errors import UserError
 def write_table(
     path: Path, results: Sequence[dict[str, Any]], drawn: Callable[[Case], Mapping[str, float]]
 ) -> None:
-    """Writes a row for each run: case, what was drawn, summary.
+    """Writes a row for each run: case, drawn numbers, summary.
 
     Args:
-        path: of the Parquet file.
-        results: of the runs, with summaries.
-        drawn: what a run's seed drew.
+        path: Path of the Parquet file.
+        results: Results of the runs, with summaries.
+        drawn: Returns the numbers drawn by a run's seed.
 
     Raises:
         UserError: PyArrow is not installed.
@@ -41,7 +41,7 @@ def write_table(
 def row_of(
     result: Mapping[str, Any], drawn: Callable[[Case], Mapping[str, float]]
 ) -> dict[str, Any]:
-    """Returns the columns of a run; groups of a summary are told apart by dots."""
+    """Returns the columns of a run; keys of nested groups are joined by dots."""
     row: dict[str, Any] = dict(result["case"])
     row |= {f"drawn.{name}": value for name, value in drawn(Case(**result["case"])).items()}
     for name, value in result["summary"].items():

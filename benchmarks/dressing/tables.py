@@ -1,4 +1,4 @@
-"""How often, how fast and how gently: tables and figures of the dressing experiments."""
+"""Tables and figures of the dressing experiments: success, time and forces."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ _STAGES = [
     "lost again, runs",
 ]
 MIN_S = SuccessRules().min_s
-# A hand counts as in from when it stays in for so long, s.
+# A hand counts as in once it stays in for this long, s.
 _LASTING = 2.0
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
-    """Returns what each method came to, over all, and by person and coat; and why runs failed."""
+    """Returns the results of each method, in total and by person and coat, and failure reasons."""
     done = [r for r in results if "summary" in r]
     methods = [m for m in METHODS if any(r["case"]["method"] == m for r in done)]
     by_method = [[m, *_row(_of(done, method=m))] for m in methods]
@@ -97,7 +97,7 @@ def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
 
 @plain_settings()
 def figure(results: Sequence[dict[str, Any]]) -> str:
-    """Returns an SVG: s, l and force of both sleeves over time, medians and quartiles."""
+    """Returns an SVG of s, l and force of both sleeves over time: medians and quartiles."""
     done = [r for r in results if "summary" in r]
     drawing, axes = chart(9.0, 7.0, rows=len(_WHAT) * len(SIDES))
     for row, ((name, label), side) in enumerate((w, s) for w in _WHAT for s in SIDES):
@@ -118,7 +118,7 @@ def figure(results: Sequence[dict[str, Any]]) -> str:
 def _bands(
     series: Iterable[dict[str, Any]], name: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Returns times and quartiles over runs; a run that has ended stays as it ended."""
+    """Returns times and quartiles over runs; a finished run keeps its last value."""
     rows = [np.array(s[name], dtype=float) for s in series]
     longest = max(map(len, rows))
     padded = np.stack([np.concatenate([r, np.full(longest - len(r), r[-1])]) for r in rows])
@@ -144,7 +144,7 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         max((s["max_gripper_force_N"] for s in summaries), default=None),
         max(penetration, default=None),
         sum(map(_short_of_the_shoulder, summaries)),
-        # logs of earlier versions do not tell
+        # summaries of earlier versions lack this key
         sum((s.get("layers_crossed_at_end") or 0) > 0 for s in summaries),
         median("realtime_factor"),
     ]
@@ -156,9 +156,9 @@ def _short_of_the_shoulder(summary: dict[str, Any]) -> bool:
 
 
 def _beside(done: Sequence[dict[str, Any]], method: str) -> list[Any]:
-    """Returns how pairs of runs of full and another method ended that have all else in common.
+    """Compares full with another method over pairs of runs that are otherwise equal.
 
-    The time is the median of how much longer the other took where both dressed.
+    The time is the median of how much longer the other method took if both dressed.
     """
 
     def by_rest(which: str) -> dict[tuple[Any, ...], dict[str, Any]]:
@@ -179,9 +179,10 @@ def _beside(done: Sequence[dict[str, Any]], method: str) -> list[Any]:
 
 
 def _stages(results: Sequence[dict[str, Any]]) -> list[Any]:
-    """Returns how many runs had one hand, both hands in, both sleeves on, and how long each took.
+    """Returns counts and times of runs with one hand in, both hands in, and both sleeves on.
 
-    Times are medians over those that came that far. Last, how many had a hand in and out again.
+    Times are medians over the runs that reached that stage. The last number counts the runs in
+    which a hand slipped out again.
     """
     first, second, last, lost = [], [], [], 0
     for r in results:
@@ -203,7 +204,7 @@ def _stages(results: Sequence[dict[str, Any]]) -> list[Any]:
 
 
 def _first_lasting(inside: np.ndarray) -> float | None:
-    """Returns when a hand came in to stay for `_LASTING`, s; None if it never did."""
+    """Returns when a hand came in and stayed in for `_LASTING`, s; None if it never did."""
     count = round(_LASTING / SERIES_STEP)
     for k in np.flatnonzero(inside):
         if inside[k : k + count].all():
@@ -212,7 +213,7 @@ def _first_lasting(inside: np.ndarray) -> float | None:
 
 
 def _reasons(results: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Returns how often each reason came up, without its figures."""
+    """Returns the number of runs per failure reason, without figures."""
     found: dict[str, int] = {}
     for r in results:
         reason = r["summary"]["reason"]

@@ -1,1 +1,1 @@
-"""How often `drake-dress explain` is right: data that hide an effect, and what it says of them."""
+"""Measures how often `drake-dress explain` identifies an effect hidden in data."""

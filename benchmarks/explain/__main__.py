@@ -1,8 +1,8 @@
-"""`python -m benchmarks.explain`: hides effects, explains the data, and counts what was right.
+"""`python -m benchmarks.explain`: hides effects, explains the data, counts correct answers.
 
-What was found is kept, case by case, and not run again, so that a long study may be interrupted
-and resumed: in the cache beside what was simulated, and in the file of `--json`, which can be
-passed on without it. Remove both to run the study with other code.
+The result of each case is kept and not run again, so that a long study can be interrupted and
+resumed. It is kept in the cache with the simulated data, and in the file of `--json`, which does
+not need the cache. Remove both before running the study with changed code.
 """
 
 from __future__ import annotations
@@ -77,21 +77,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def name_of(case: dict[str, Any]) -> str:
-    """Returns the name of a case that was kept."""
+    """Returns the name of a kept case."""
     return Case(**case).name
 
 
 def _all(
     chosen: Sequence[Case], cache: Path, jobs: int, workers: int, stop: threading.Event
 ) -> Iterator[dict[str, Any]]:
-    """Yields the results in the order of the cases; after Ctrl-C no new case is begun."""
+    """Yields the results in the order of the cases; after Ctrl-C no new case starts."""
     if jobs == 1:
         for case in chosen:
             if stop.is_set():
                 return
             yield _run(case, cache, workers)
         return
-    # nobody waits for a case that has not begun, and what is done is kept
+    # on interruption, cases that have not started are cancelled; finished ones are kept
     with ProcessPoolExecutor(jobs) as pool:
         futures = [pool.submit(_run, case, cache, workers) for case in chosen]
         for future in futures:

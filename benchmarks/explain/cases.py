@@ -1,4 +1,4 @@
-"""What is hidden in which case, and how it is made; what was made once is kept."""
+"""The cases of the study and their hidden effects; generated data are kept."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drake_dress.discrepancy.unlisted_effects import UNLISTED
 from drake_dress.models.effects.effect import Effect
 
 DURATION = 4.0
-# The model run coarsely on purpose: five times the step, one iteration.
+# A deliberately coarse model: five times the time step, one iteration.
 COARSE = ("plant.time_step=0.02", "plant.iterations=1")
 
 
@@ -28,11 +28,11 @@ class Case:
     """One set of recordings.
 
     Attributes:
-        group: effect, nothing, pair, coarse or outside.
-        hide: effects joined by "+", or nothing.
-        seed: of all that is drawn.
-        size: of the effect, times what matters.
-        marker_noise, force_noise: m, N.
+        group: Group: effect, nothing, pair, coarse or outside.
+        hide: Effects joined by "+", or nothing.
+        seed: Seed of all draws.
+        size: Factor on the effect's strength.
+        marker_noise, force_noise: Noise of markers, m, and forces, N.
     """
 
     group: str
@@ -44,14 +44,14 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For files and tables."""
+        """Name for files and tables."""
         return f"{self.group}-{self.hide}-{self.seed}-{self.size:g}-{self.marker_noise:g}"
 
 
 def cases(
     groups: Sequence[str], draws: dict[str, int], seed: int, size: float, noise: float
 ) -> list[Case]:
-    """Returns the cases of the groups asked for, `draws` of each."""
+    """Returns the cases of the selected groups, with `draws` for each."""
     found: list[Case] = []
     forces = 50.0 * noise
 
@@ -85,16 +85,16 @@ def study(
 ) -> list[Case]:
     """Returns the cases of a study: all groups at the first size and noise, effects at the others.
 
-    The further sizes and noises come effect by effect, in an order that mixes their kinds, so that
-    a study that is not finished yet has seen the same effects at each of them.
+    The further sizes and noises are ordered by effect, in a shuffled order, so that an unfinished
+    study has covered the same effects at each of them.
 
     Args:
-        groups: of them.
-        draws: of each group.
-        seed: of the first draw.
-        sizes: of effects, times what matters.
-        noises: of markers, m.
-        beside: draws of each effect at a further size or noise.
+        groups: Groups to include.
+        draws: Number of draws by group.
+        seed: Seed of the first draw.
+        sizes: Factors on the effects' strength.
+        noises: Noises of markers, m.
+        beside: Number of draws of each effect at each further size or noise.
     """
     found = cases(groups, draws, seed, sizes[0], noises[0])
     if "effect" in groups:
@@ -111,7 +111,7 @@ def study(
 def make(
     case: Case, scenario: Scenario, base: Path, cache: Path, workers: int | None = None
 ) -> tuple[list[Effect], list[Recording]]:
-    """Returns what was hidden and what was measured; the truth without noise is kept in `cache`."""
+    """Returns hidden effects and noisy recordings; keeps the noise-free truth in `cache`."""
     seeds = [case.seed, *case.hide.encode()]
     hidden = draw_hidden(case.hide, np.random.default_rng(seeds), case.size)
     sensors = Sensors(marker_noise=case.marker_noise, force_noise=case.force_noise)

@@ -1,4 +1,4 @@
-"""What a study has shown: how often the verdict was right, by how much parameters were off."""
+"""Tables of a study: rate of correct verdicts, and errors of the parameters."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from drake_dress.report.page import chart
 
 ASKED = {"effect": 90, "nothing": 95, "pair": 75, "coarse": 90, "outside": 100}
 _CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
-# Confidence below which a kin of what was hidden may be named.
+# Confidence below which a related effect may be named without being wrong.
 _LOW = 0.7
 
 
 def right(result: dict[str, Any]) -> bool:
-    """Returns whether the verdict is what was hidden, all of it and nothing else.
+    """Returns whether the verdict names exactly the hidden effects.
 
-    What the list of effects lacks must be called unexplained, or named with low confidence.
+    An effect outside the list must be called unexplained, or be attributed to other effects with
+    low confidence.
     """
     named = {c["effect"] for c in result["causes"]}
     wanted = set(result["hidden"])
@@ -39,9 +40,10 @@ def right(result: dict[str, Any]) -> bool:
 
 
 def right_but_for_numerics(result: dict[str, Any]) -> bool:
-    """Returns whether what was hidden is named, and the scenario's own numerics with it.
+    """Returns whether the hidden effects are named together with the scenario's discretisation.
 
-    Under little noise these stand out of it, and are not wrongly named; strictly it is not right.
+    With little noise, discretisation errors exceed the noise and are named with good reason;
+    strictly, the verdict is not right.
     """
     named = {c["effect"] for c in result["causes"]}
     wanted = set(result["hidden"])
@@ -49,10 +51,11 @@ def right_but_for_numerics(result: dict[str, Any]) -> bool:
 
 
 def parameter_error(result: dict[str, Any]) -> float | None:
-    """Returns how far the parameters of a cause that was named right are off, relative.
+    """Returns the relative error of the parameters of a correctly named cause.
 
-    Of vectors the length of the difference over the length; a place on the garment does not count,
-    and a kin that is named for what the list lacks has no parameters to compare.
+    It is the norm of the difference over the norm of the true parameters. Only the mass of
+    `local_mass` and the rate of `gripper_slip` count. Only the group `effect` has parameters to
+    compare.
     """
     if result["case"]["group"] != "effect" or not right(result):
         return None
@@ -63,7 +66,7 @@ def parameter_error(result: dict[str, Any]) -> float | None:
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
-    """Returns the tables of a study; the first result's noise and size are its centre."""
+    """Returns the tables of a study; the first result's noise and size are the reference."""
     if not results:
         return []
     centre = _setting(results[0])
@@ -112,7 +115,7 @@ def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
 
 
 def _shared(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Returns results of draws that were made at every noise and size."""
+    """Returns the results of the draws that exist at every noise and size."""
     settings = {_setting(r) for r in results}
     made: dict[tuple[str, int], set[tuple[float, float]]] = {}
     for r in results:
@@ -129,7 +132,7 @@ def _setting(result: dict[str, Any]) -> tuple[float, float]:
 
 
 def _summary(results: Sequence[dict[str, Any]]) -> list[Any]:
-    """Returns draws, how many are right and ambiguous, and medians of error, gain and loss."""
+    """Returns numbers of draws, right and ambiguous ones, and medians of error, gain, loss."""
     return [
         len(results),
         sum(map(right, results)),
@@ -141,7 +144,7 @@ def _summary(results: Sequence[dict[str, Any]]) -> list[Any]:
 
 
 def _median_error(results: Sequence[dict[str, Any]]) -> float | None:
-    """Returns the median error of parameters, %."""
+    """Returns the median relative error of the parameters, %."""
     return _median([100.0 * e for r in results if (e := parameter_error(r)) is not None])
 
 
@@ -150,14 +153,14 @@ def _median(values: Sequence[float]) -> float | None:
 
 
 def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any]]]:
-    """Returns header and rows of what was asked and reached in each group."""
+    """Returns header and rows of required and reached rates of each group."""
     rows: list[list[Any]] = []
     for group, asked in ASKED.items():
         mine = [r for r in results if r["case"]["group"] == group]
         if not mine:
             continue
         gains = [r["gain"][0] for r in mine if r["hidden"]]
-        # cases side by side have one process each, and say nothing about time
+        # cases run in parallel have one process each, so their time is not representative
         times = [r["seconds"] for r in mine if r["workers"] > 1]
         rows.append(
             [
@@ -176,13 +179,13 @@ def _groups(results: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any
 
 
 def unsure(result: dict[str, Any]) -> bool:
-    """Returns whether the verdict is ambiguous with the right cause among two."""
+    """Returns whether the verdict is ambiguous but includes a right cause."""
     named = {c["effect"] for c in result["causes"]}
     return result["verdict"] == "ambiguous" and bool(named & set(result["hidden"]))
 
 
 def reliability(results: Sequence[dict[str, Any]]) -> list[tuple[float, float, list[bool]]]:
-    """Returns for ranges of confidence whether each cause that was given it is right."""
+    """Returns, for ranges of confidence, whether each cause in the range is right."""
     found = []
     for low, high in itertools.pairwise(_CONFIDENCES):
         hits = [
@@ -203,7 +206,7 @@ def _hidden_there(result: dict[str, Any], name: str) -> bool:
 
 @plain_settings()
 def reliability_plot(results: Sequence[dict[str, Any]]) -> str:
-    """Returns an SVG: how often causes of a given confidence are right."""
+    """Returns an SVG of the share of right causes over the stated confidence."""
     figure, (ax,) = chart(4.5, 4.0)
     ax.plot([0.0, 1.0], [0.0, 1.0], color="#66727f", ls=":")
     for low, high, hits in reliability(results):

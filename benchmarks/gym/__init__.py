@@ -1,1 +1,1 @@
-"""Speed of the environment, and dressings through its actions."""
+"""Measures the environment's speed, and dresses persons through its actions."""

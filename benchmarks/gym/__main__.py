@@ -2,10 +2,10 @@
 
     drake-dress bench gym
 
-`speed` steps environments in one process and in several with small random velocities. `dressing`
+`speed` steps environments in one and in several processes with small random velocities. `dressing`
 lets the scenario's own controllers act through the environment's actions, from its observations
-alone, until each episode ends; the exit status is 1 if one of them did not dress the person.
-Processor time per step is that of all cores together; it depends less on what else runs.
+only, until each episode ends; the exit status is 1 if an episode does not dress the person.
+Processor time per step is summed over all cores; it depends less on other load.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from drake_dress.gym import ENV_ID, ControllerPolicy, make_vec
 
 _NAME = "gym"
 _PARTS = ("speed", "dressing")
-# What is varied where speed is measured: settings, and what is observed.
+# Variants for measuring speed: settings and observations.
 _KINDS: dict[str, tuple[list[str], list[str]]] = {
     "standard, state and force": ([], ["state", "force"]),
     "quick, state and force": (["plant.fidelity=quick"], ["state", "force"]),
     "quick, with color": (["plant.fidelity=quick"], ["state", "force", "color"]),
 }
-_SPEED = 0.03  # most of each component of the random actions, m/s
+_SPEED = 0.03  # bound of each component of the random actions, m/s
 _WARM_UP = 20  # steps before the clock starts
 
 
@@ -78,14 +78,14 @@ _TERMS = ("progress", "approach", "gripper_force", "person_force", "success", "f
 
 
 def _speed(kind: str, processes: int, steps: int) -> list[Any]:
-    """Returns a row of the table of speeds."""
+    """Measures one variant; returns a row of the table of speeds."""
     overrides, observe = _KINDS[kind]
     envs = make_vec(processes, overrides=overrides, observe=observe)
     seeds: Any = list(range(processes))  # Gymnasium types a single seed only
     try:
         rng = np.random.default_rng(0)
         envs.reset(seed=seeds)
-        # the same draw again: what a reset takes that keeps its diagram
+        # the same draw again: measures a reset that keeps its diagram
         begin = clock.perf_counter()
         envs.reset(seed=seeds)
         reset = clock.perf_counter() - begin
@@ -101,14 +101,14 @@ def _speed(kind: str, processes: int, steps: int) -> list[Any]:
 
 
 def _cpu_time() -> float:
-    """Returns the processor time that this process and its children have used, s."""
+    """Returns the processor time used by this process and its children, s."""
     this = psutil.Process()
     times = [process.cpu_times() for process in (this, *this.children(recursive=True))]
     return float(sum(t.user + t.system for t in times))
 
 
 def _dressing(scenario: str, seed: int, overrides: Sequence[str]) -> list[Any]:
-    """Returns a row of the table of dressings."""
+    """Runs one episode; returns a row of the table of dressings."""
     env = gymnasium.make(ENV_ID, scenario=scenario, overrides=overrides)
     seen, _ = env.reset(seed=seed)
     policy = ControllerPolicy(env)
@@ -126,7 +126,7 @@ def _dressing(scenario: str, seed: int, overrides: Sequence[str]) -> list[Any]:
 
 
 def _numbers(text: str) -> list[int]:
-    """Returns numbers with commas between, for argparse."""
+    """Parses comma-separated numbers; an argparse type."""
     numbers = text.split(",")
     if not all(n.isdecimal() for n in numbers):
         raise argparse.ArgumentTypeError(f"{text!r}, expected numbers with commas between")

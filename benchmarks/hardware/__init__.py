@@ -1,1 +1,1 @@
-"""A run and its lab in two processes, with a network of their own."""
+"""Measures a run and its lab in two processes in their own network namespace."""

@@ -1,4 +1,4 @@
-"""How the hardware path does: rate and latency of commands, faults, a dressing, memory.
+"""Measures the hardware path: rate and latency of commands, faults, a dressing, memory.
 
     drake-dress bench hardware --only commands
     drake-dress bench hardware --only faults --seeds 0-19 --json hardware.json
@@ -6,8 +6,8 @@
     drake-dress bench hardware --only dressing --rate 0.35
     drake-dress bench hardware --only soak --minutes 20
 
-A lab and a run in two processes, over LCM multicast in a network namespace with a loopback alone.
-What was measured stays in the file of `--json` and is not measured again.
+A lab and a run communicate as two processes over LCM multicast, in a network namespace that has
+only a loopback device. Results are kept in the file of `--json` and not measured again.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ SCENARIO = str(shipped_scenario("lab"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measures what is missing and prints tables.
+    """Does the missing measurements and prints tables.
 
     Returns:
-        0, 1 if a fault was not answered as stated, 2 for bad arguments, 130 after Ctrl-C.
+        0; 1 if a reaction to a fault was not as stated; 2 on bad arguments; 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     if not (options.kept or available()):
@@ -70,10 +70,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _cases(
     parts: Sequence[str], kinds: Sequence[str], seeds: Sequence[int], repeats: int
 ) -> list[Case]:
-    """Returns what is to be measured, the seeds of faults outermost.
+    """Returns the cases, with faults ordered by seed first.
 
-    Kinds that are named are those of "faults" as they are, and of "beliefs" as far as they are some
-    of it; each part has all of its own where none is named.
+    Selected kinds apply to "faults" without restriction, and to "beliefs" if they belong to it. If
+    none is selected, each part has all of its kinds.
     """
     groups = {
         "faults": kinds or list(FAULTS),
@@ -87,7 +87,7 @@ def _cases(
         },
     }
     chosen = [c for part in PARTS if part in parts for c in of_part.get(part, [Case(part)])]
-    # a kind that is named may be of two parts
+    # a selected kind may belong to two parts
     return list(dict.fromkeys(chosen))
 
 
@@ -130,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--minutes", type=number_between(0.1, 1e4), default=20.0, help="of the soak; default 20"
     )
-    # what is measured here are two processes on two cores
+    # each measurement uses two processes on two cores
     add_study_options(parser, _NAME, jobs=1)
     return parser
 

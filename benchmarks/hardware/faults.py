@@ -1,4 +1,4 @@
-"""One fault in one run, and whether the reaction to it was the stated one."""
+"""Injects one fault into a run and checks the reaction against the stated one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drake_dress.report.arms import arm_extremes
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import read_summary
 
-# Coarse: what is asked is how arms react, not how a coat is put on.
+# Coarse, since only the reaction of the arms matters, not the dressing.
 COARSE = [
     "plant.spacing=0.05",
     "plant.time_step=0.005",
@@ -30,32 +30,33 @@ CAMERA = (
     "station.cameras=[{name: front, position: [2.2, 0.8, 1.6], target: [0.0, 0.0, 1.1], "
     "width: 160, height: 120}]"
 )
-# A fault that passes lasts this long, s; then what is left of the run.
+# Duration of a temporary fault, and of the rest of the run after it, s.
 LASTING, AFTER = 0.8, 1.0
-# An image must be older than the others, and may be on its way.
+# Longer, since an image becomes stale later and one may still be on its way.
 LASTING_CAMERA = 1.5
-# A fault that lasts longer ends the run, s.
+# Duration of a fault above which the run ends, s.
 PATIENCE = 3.0
-# Age at which a status and an estimate are stale, s.
+# Age above which a status and an estimate are stale, s.
 STALE = {"stale_status": 0.05, "stale_estimate": 0.2}
-# A lab that plays slower than it is asked to, by more than this share, is no driver to be judged.
+# Least achieved share of the requested rate; a slower lab is not a valid driver for the test.
 KEPT_UP = 0.9
-# A gripper holds from when on it is slower than this over this time to come, m/s and s: a garment
-# that slips tugs at an arm that holds for one or two samples of the log, by half a millimetre.
+# A gripper holds once its mean speed over this time ahead is lower than this, m/s and s: a slipping
+# garment tugs at a holding arm by half a millimetre, for one or two samples of the log.
 STILL, STILL_OVER = 0.015, 0.06
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """What is stated about a fault.
+    """Stated reaction to a fault.
 
     Attributes:
-        source: which may have it; one is drawn.
-        within: from its start until both grippers hold, s; None where they do not.
-        ends: what the run ends with; None where it goes on.
-        waits: of it, what the run waits by this machine's clock before there is a fault, s.
-        told: of which the run's log must tell one; empty where nothing is asked.
-        lasting: of the fault, s.
+        source: Sources that may have the fault; one is drawn.
+        within: Time limit from its start until both grippers hold, s; None if they do not hold.
+        ends: Reason with which the run ends; None if it continues.
+        waits: Part of `within` that the run waits by this machine's clock before it reports the
+            fault, s.
+        told: Texts of which the run's log must contain one; empty if none is required.
+        lasting: Duration of the fault, s.
     """
 
     source: tuple[str, ...]
@@ -66,9 +67,9 @@ class Reaction:
     lasting: float = LASTING
 
     def at(self, rate: float) -> Reaction:
-        """Returns what is stated by a clock that is slower than this machine's, by `rate`.
+        """Returns the reaction in simulated time that runs at `rate` relative to real time.
 
-        What waits by this machine's clock takes less of it; everything else goes by that clock.
+        Waiting by this machine's clock takes less simulated time; all else is in simulated time.
         """
         if self.within is None:
             return self
@@ -77,13 +78,13 @@ class Reaction:
 
 _ARMS = ("left_arm", "right_arm")
 _ALL = (*_ARMS, "garment", "person")
-# A status is stale at 50 ms, an estimate at 200 ms; then 20 ms until the governor has it, 10 ms
-# until the arms have, 60 ms of braking, 100 ms of the drives' own.
+# A status is stale at 50 ms, an estimate at 200 ms. Then it takes 20 ms to reach the governor,
+# 10 ms to reach the arms, 60 ms for braking and 100 ms for the drives.
 _HOLD, _HOLD_ESTIMATE = 0.25, 0.45
 FAULTS = {
     "stale": Reaction(_ARMS, _HOLD, None, 0.05),
     "stale_estimate": Reaction(("garment", "person"), _HOLD_ESTIMATE, None, 0.2),
-    # an image at 0.5 s; they come five times a second, and one may still be on its way
+    # an image is stale at 0.5 s; they arrive five times per second, and one may be on its way
     "stale_camera": Reaction(("camera_front",), 1.2, None, 0.5, lasting=LASTING_CAMERA),
     "bus_lost": Reaction(("left_arm",), _HOLD, None, 0.05),
     "arm_lost": Reaction(_ARMS, _HOLD, None, 0.05),
@@ -93,28 +94,28 @@ FAULTS = {
     "clock_jump": Reaction(_ALL, _HOLD, "clock jump"),
     "joint_limit": Reaction(_ARMS, _HOLD, "joint limit"),
     "push": Reaction(_ARMS, None, None),
-    # from the run's last command: 100 ms until it is missed, and the joints' own braking
+    # from the run's last command: 100 ms until the next one is missed, then braking of the joints
     "killed": Reaction(("",), 0.45, None),
-    # a log is written each second; then as if it were killed
+    # the log is written once per second; then as if the run were killed
     "disk_full": Reaction(("",), 1.6, "log: cannot be written", 1.0),
 }
 
 
 def _refused(source: str, *told: str, within: float = _HOLD, lasting: float = LASTING) -> Reaction:
-    """Returns that arms hold at an estimate that cannot be, which is told, and go on after it."""
+    """Returns the reaction to an impossible estimate: it is logged, arms hold, then resume."""
     return Reaction((source,), within, None, told=told, lasting=lasting)
 
 
 def _dropped(*told: str) -> Reaction:
-    """Returns that messages are dropped, and arms go on."""
+    """Returns the reaction to dropped messages: arms continue."""
     return Reaction(_ALL, None, None, told=told)
 
 
 _LOST = "at (0, 0, 0), as a lost point written as zero"
 _DROPPED = "a repeated or late message is dropped"
-# A point stays the same for 0.5 s before it is called frozen, a garment while a gripper goes 1 cm.
+# A point counts as frozen after 0.5 s without change, a garment after a gripper has moved 1 cm.
 _FROZEN, _FROZEN_GARMENT, _LASTING_FROZEN = 0.5 + _HOLD, 1.0, 1.6
-# What cannot be, and what comes out of order.
+# Impossible content, and messages out of order.
 BELIEFS = {
     "person_zero": _refused("person", _LOST),
     "person_hand_zero": _refused("person", f"left hand {_LOST}"),
@@ -142,18 +143,18 @@ BELIEFS = {
         "garment", "the same to the last bit", within=_FROZEN_GARMENT, lasting=_LASTING_FROZEN
     ),
     "mode_unknown": Reaction(_ARMS, _HOLD, None, told=("robot_mode is 0 (kOther)",)),
-    # by 0.3 rad from where the joint is by then
+    # by 0.3 rad from the joint's position at that time
     "joint_leap": Reaction(
         _ARMS, _HOLD, "speed limit", told=("joint 1 moved 0.29", "joint 1 moved 0.3")
     ),
     "utime_zero": Reaction(_ALL, _HOLD, None, told=("utime is 0 after",)),
     "second_sender": Reaction(_ALL, _HOLD, "time back", told=("a second sender on the channel",)),
 }
-# What must not hold arms: here nothing may be stale for want of what was dropped.
+# These must not make arms hold; in these tests dropped messages must not make anything stale.
 OUT_OF_ORDER = {
     "reordered": _dropped(_DROPPED),
     "duplicated": _dropped(_DROPPED),
-    # by less than a period, so that of an estimate nothing is late
+    # by less than a period, so that no estimate is late
     "set_back": _dropped(),
 }
 BELIEFS |= OUT_OF_ORDER
@@ -169,21 +170,21 @@ def inject(
     overrides: Sequence[str] = (),
     report: bool = False,
 ) -> dict[str, Any]:
-    """Returns what a fault did, and under "wrong" what was not as stated.
+    """Injects a fault; returns its effects, and under "wrong" all deviations from the stated ones.
 
     Args:
-        kind: of REACTIONS.
-        seed: of the moment and the source.
-        scenario: file of both processes.
-        out: directory of both.
-        rate: simulated seconds per second. A machine that does other work too is late by
-            milliseconds of its own; at a slower rate they are fewer of those that are judged.
-        overrides: further KEY=VALUE for both processes.
-        report: whether lab and run write report and replay, too.
+        kind: Kind of fault, from REACTIONS.
+        seed: Seed of the fault's time and source.
+        scenario: Scenario file of both processes.
+        out: Output directory of both.
+        rate: Simulated seconds per second. Delays by other load on the machine take less simulated
+            time at a lower rate.
+        overrides: Further KEY=VALUE settings of both processes.
+        report: Whether lab and run write report and replay, too.
 
     Raises:
-        RuntimeError: lab or run did not begin, or the lab did not keep up with the rate, so that
-            nothing can be judged.
+        RuntimeError: Lab or run did not start, or the lab did not keep up with the rate, so that
+            the reaction cannot be judged.
     """
     rng = np.random.default_rng([seed, *kind.encode()])
     stated = REACTIONS[kind].at(rate)
@@ -204,7 +205,7 @@ def inject(
             *COARSE,
             *([CAMERA] if kind == "stale_camera" else []),
             f"duration={start + lasting + AFTER + 1.0}",
-            # which goes by this machine's clock
+            # the patience is in this machine's time
             f"station.hardware.patience={PATIENCE / rate}",
             *(_patient(rate) if kind in OUT_OF_ORDER else []),
             *overrides,
@@ -233,7 +234,7 @@ def inject(
 
 
 def _patient(rate: float) -> list[str]:
-    """Returns settings by which what goes by this machine's clock waits as long of a slower one."""
+    """Returns settings that keep the stale ages equal in simulated time at a lower rate."""
     return [f"station.hardware.{key}={age / rate}" for key, age in STALE.items()]
 
 
@@ -253,7 +254,7 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
             ended = log.ended_by
             if kind in BELIEFS:
                 wrong += untold(log.events, stated)
-            # what was flushed a second before it was killed is there
+            # data flushed a second before the kill must be in the log
             if log.time[-1] < start - 1.5:
                 wrong.append(f"run's log ends at {log.time[-1]:.2f} s")
     except UserError as error:
@@ -270,7 +271,7 @@ def _judged(kind: str, stated: Reaction, start: float, lasting: float, out: Path
 
 
 def untold(events: Sequence[str], stated: Reaction) -> list[str]:
-    """Returns what the lines of a run's log lack, or have too much, from when arms may move on."""
+    """Returns missing or unexpected events in a run's log after arms were first allowed to move."""
     lines = [line.split(" ", 1)[1] for line in events]
     if "arms may move" not in lines:
         return ["arms were never permitted to move"]
@@ -303,7 +304,7 @@ def _lab_facts(
     if not speed[(time > 0.5) & (time < start)].max(initial=0.0) > 0.03:
         wrong.append("nothing moved before the fault")
     end = time[-1] if kind in ("killed", "disk_full") or stated.ends else start + lasting
-    # what is looked ahead at must not be what comes after the fault
+    # the look-ahead must not extend beyond the end of the fault
     during = (time >= start) & (time <= end - STILL_OVER)
     moving = time[during & (speed > STILL)]
     held = float(moving.max() - start) if len(moving) else 0.0
@@ -313,11 +314,11 @@ def _lab_facts(
 
 
 def _speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Returns the speed of a point over the STILL_OVER from each time on, m/s.
+    """Returns the mean speed of a point over STILL_OVER after each time, m/s.
 
     Args:
-        time: (T,) s, increasing.
-        position: (T, 3) m.
+        time: (T,) increasing times, s.
+        position: (T, 3) positions, m.
     """
     end = np.minimum(time + STILL_OVER, time[-1])
     begin = np.minimum(time, time[-1] - STILL_OVER)

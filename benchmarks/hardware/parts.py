@@ -1,4 +1,4 @@
-"""Which measurements there are of the hardware path, and what each comes to."""
+"""The measurements of the hardware path and their results."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from benchmarks.hardware.two_processes import Plan, play_usable
 from drake_dress.errors import UserError
 from drake_dress.report.summary import read_summary
 
-# Beliefs are faults, too: of what messages say.
+# Beliefs are faults, too: implausible content of messages.
 PARTS = ("commands", "dressing", "soak", "faults", "beliefs")
-# On two cores a lab keeps up with time if its garment is coarse.
+# On two cores a lab keeps up with real time only with a coarse garment.
 _COARSE = [
     "plant.spacing=0.035",
     "plant.time_step=0.005",
@@ -24,17 +24,17 @@ _COARSE = [
     "controller.command_rate=200",
 ]
 _COARSER = ["plant.spacing=0.05", "controller.spacing=0.06"]
-# What is loaded and compiled comes before memory is settled: a share of the samples. At the end
-# processes close down.
+# Share of the samples before memory settles, because of loading and compiling, and number of
+# samples at the end while processes close down.
 _LOADING, _CLOSING = 0.25, 5
 _HOURS_A_WEEK = 168.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """One measurement: `part` of PARTS; of a fault, its `kind`.
+    """One measurement: `part` of PARTS, and the `kind` of a fault.
 
-    `seed` is that of a fault, and the number of a measurement of commands that are repeated.
+    `seed` is the seed of a fault, or the number of a repeated measurement of commands.
     """
 
     part: str
@@ -43,7 +43,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For files and tables."""
+        """Name for files and tables."""
         if self.part in ("faults", "commands"):
             return f"{self.kind or self.part}-{self.seed:04d}"
         return self.part
@@ -51,13 +51,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which it is measured.
+    """Conditions of the measurements.
 
     Attributes:
-        scenario: file of lab and run.
-        rate: of the dressing, simulated seconds per second. fault_rate: of the faults.
-        minutes: of the soak.
-        report: whether lab and run write report and replay, too.
+        scenario: Scenario file of lab and run.
+        rate: Rate of the dressing, simulated seconds per second. fault_rate: Rate of the faults.
+        minutes: Duration of the soak test, min.
+        report: Whether lab and run write report and replay, too.
     """
 
     scenario: str
@@ -70,13 +70,13 @@ class Conditions:
 def run(
     case: Case, conditions: Conditions, out: Path, overrides: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Returns what one measurement came to: "summary", or the "problem" that there was none.
+    """Executes one measurement; returns its "summary", or the "problem" that prevented it.
 
     Args:
-        case: which.
-        conditions: under which.
-        out: directory of lab and run.
-        overrides: further KEY=VALUE for both.
+        case: Measurement to execute.
+        conditions: Conditions of the measurement.
+        out: Output directory of lab and run.
+        overrides: Further KEY=VALUE settings of both.
     """
     try:
         summary = _measured(case, conditions, out, overrides)
@@ -129,11 +129,11 @@ def _dressing(conditions: Conditions, out: Path, overrides: Sequence[str]) -> di
 
 
 def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[str, Any]:
-    # so coarse that nothing succeeds, or the run would end
+    # so coarse that the dressing fails; otherwise the run would end
     duration = 60.0 * conditions.minutes
     settings = [*_COARSE, *_COARSER, f"duration={duration}", *overrides]
     done = play_usable(_plan(conditions, out, settings, timeout=duration + 300.0, sampled=True))
-    # afterwards each concludes
+    # later samples are from the end of the processes
     count = int(duration)
     if len(done.run_memory) < count:
         raise RuntimeError(f"they ran for {len(done.run_memory)} s, expected {count}")
@@ -145,20 +145,20 @@ def _soak(conditions: Conditions, out: Path, overrides: Sequence[str]) -> dict[s
 
 
 def _plan(conditions: Conditions, out: Path, settings: Sequence[str], **words: Any) -> Plan:
-    """Returns what is started, with what all of these have in common."""
+    """Returns a plan with the common settings of all measurements."""
     return Plan(conditions.scenario, str(out), list(settings), report=conditions.report, **words)
 
 
 def growth(memory: Sequence[float]) -> dict[str, float]:
-    """Returns how memory grew: first and last MB, MB/h, and at most how many MB in a week.
+    """Returns the growth of memory: first and last MB, MB/h, and an upper bound of MB per week.
 
-    The week is the slope and twice its standard error, for what is sampled each second.
+    The bound is the slope plus twice its standard error, for samples once per second.
 
     Args:
-        memory: MB, each second; NaN where there was none.
+        memory: Memory once per second, MB; NaN if not known.
 
     Raises:
-        RuntimeError: too few samples.
+        RuntimeError: There are too few samples.
     """
     values = np.array([m for m in memory if np.isfinite(m) and m > 0.0])
     settled = values[int(_LOADING * len(values)) : -_CLOSING]

@@ -1,4 +1,4 @@
-"""What was measured of the hardware path beside what is asked of it."""
+"""Tables of the hardware path: measured and required values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.hardware.parts import Case
 
 
 def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
-    """Returns tables of what there is."""
+    """Returns the tables of the available results."""
     done = [(Case(**r["case"]), r["summary"]) for r in results if "summary" in r]
     of_part = {case.part: summary for case, summary in done}
     faults = [(case, summary) for case, summary in done if case.part == "faults"]
@@ -59,7 +59,7 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
 
 
 def tell(summary: dict[str, Any]) -> str:
-    """Returns what one measurement came to, in a few words."""
+    """Returns a short text on the result of one measurement."""
     if "wrong" in summary:
         how = "; ".join(summary["wrong"]) or "as stated"
         return f"{summary['source'] or 'run'} at {summary['start']:.2f} s: {how}"

@@ -1,6 +1,6 @@
-"""Starts a lab and a run in a network namespace that has a loopback alone.
+"""Starts a lab and a run in a network namespace that has only a loopback device.
 
-Nothing reaches any other address. It takes `unshare` and the right to use it; `available` tells.
+Nothing reaches any other address. It requires `unshare` and the right to use it; see `available`.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ _ROOT = Path(__file__).parents[2]
 _NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
 _BEGUN = "commands come"
 _POLL = 0.02
-# For which a lab is left alone whose run has ended before any command, s.
+# Time after which a lab is interrupted if its run ended before any command, s.
 _ALONE = 5.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is started, and what is done to it.
+    """Settings of both processes, and actions on them.
 
     Attributes:
-        scenario: file.
-        out: directory of both.
-        settings: of both processes. lab_settings: of the lab. run_settings: of the run.
-        rate: simulated seconds per second.
-        kill_at: SIGKILL to the run, s after the first command.
-        fill_at: when the run's disk is filled, s after the first command.
-        timeout: for all of it, s.
-        sampled: whether memory is sampled, each second from the first command on.
-        report: whether report and replay are written beside log and summary.
+        scenario: Scenario file.
+        out: Output directory of both.
+        settings: Settings of both processes. lab_settings: Of the lab. run_settings: Of the run.
+        rate: Simulated seconds per second.
+        kill_at: Time of SIGKILL to the run, after the first command, s.
+        fill_at: Time at which the run's disk is filled, after the first command, s.
+        timeout: Timeout of the whole, s.
+        sampled: Whether to sample memory once per second from the first command on.
+        report: Whether to write report and replay in addition to log and summary.
     """
 
     scenario: str
@@ -59,7 +59,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How both ended, what they said, and memory of the lab and of the run, MB, each second."""
+    """Exit status and output of both processes, and their memory once per second, MB."""
 
     lab_status: int
     run_status: int
@@ -70,7 +70,7 @@ class Outcome:
 
 
 def available() -> bool:
-    """Returns whether this user may have a network of their own here."""
+    """Returns whether this user may create a network namespace here."""
     probe = ["unshare", "-nm", "sh", "-c", _NETWORK]
     try:
         return subprocess.run(probe, capture_output=True, check=False).returncode == 0
@@ -79,12 +79,12 @@ def available() -> bool:
 
 
 def play(plan: Plan) -> Outcome:
-    """Returns how a lab and a run went.
+    """Executes a lab and a run and returns the outcome.
 
     Raises:
-        RuntimeError: they could not be started.
+        RuntimeError: They could not be started.
     """
-    # not by the process that only starts others, which would take seconds to import it
+    # imported here, since the process that only starts others must not spend seconds on it
     from drake_dress.diagrams.lab import OPEN
 
     with tempfile.TemporaryDirectory() as place:
@@ -104,10 +104,10 @@ def play(plan: Plan) -> Outcome:
 
 
 def play_usable(plan: Plan) -> Outcome:
-    """Returns how a lab and a run went that could both begin.
+    """Executes a lab and a run and returns the outcome if both started.
 
     Raises:
-        RuntimeError: one of them could not; the message ends with its own.
+        RuntimeError: One of them did not start; the message ends with its last line of output.
     """
     done = play(plan)
     for name, status, words in (
@@ -124,7 +124,7 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
     run_out = out / "run"
     run_out.mkdir(parents=True, exist_ok=True)
     if plan.fill_at is not None:
-        # a disk of its own, that can be full
+        # a separate disk that can be filled
         subprocess.run(
             ["mount", "-t", "tmpfs", "-o", "size=48m", "tmpfs", str(run_out)], check=True
         )
@@ -138,7 +138,7 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
         "lab": [*plan.settings, *plan.lab_settings],
         "run": [*plan.settings, "station.kind=hardware", *plan.run_settings],
     }
-    # each has a core; libraries that take more slow both
+    # each process has one core; more threads would slow both down
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
     def started(name: str) -> subprocess.Popen[bytes]:
@@ -149,7 +149,7 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
             env=environment,
         )
 
-    # at once: the run waits for the lab, and each takes seconds to load
+    # start both at once: the run waits for the lab, and each takes seconds to load
     process = {name: started(name) for name in words}
     watch = _Watch(plan, process, lab_open)
     while any(p.poll() is None for p in process.values()):
@@ -170,12 +170,12 @@ def _inside(plan: Plan, lab_open: str) -> Outcome:
 
 
 class _Watch:
-    """Does what a plan says to a lab and a run that are under way, and samples their memory.
+    """Executes a plan's actions on the running lab and run, and samples their memory.
 
     Args:
-        plan: the plan.
-        process: of `lab` and `run`.
-        lab_open: what a lab says when it is open.
+        plan: The plan.
+        process: Processes of `lab` and `run`.
+        lab_open: Line that a lab prints when it is open.
     """
 
     def __init__(
@@ -190,7 +190,7 @@ class _Watch:
         self._sent_away = self._filled = False
 
     def look(self, now: float) -> None:
-        """Does what is due at a time of the monotonic clock, s."""
+        """Executes the actions due at `now`, in time of the monotonic clock, s."""
         if now - self._begin > self._plan.timeout:
             for p in self._process.values():
                 p.kill()
@@ -205,7 +205,7 @@ class _Watch:
         return (self._out / "lab.log").read_text()
 
     def _leave_lab_alone(self, now: float) -> None:
-        """The run did not come so far; the lab, once it is open, need not wait for it."""
+        """Interrupts the open lab after a while if the run ended before its first command."""
         if self._alone_since is None and self._lab_open in self._lab_words():
             self._alone_since = now
         is_long = self._alone_since is not None and now - self._alone_since > _ALONE
@@ -214,7 +214,7 @@ class _Watch:
             self._process["lab"].send_signal(signal.SIGINT)
 
     def _act(self, since: float) -> None:
-        """Does what is due so long after the first command, s."""
+        """Executes the actions due `since` s after the first command."""
         plan = self._plan
         if plan.kill_at is not None and since >= plan.kill_at:
             self._process["run"].kill()
@@ -227,7 +227,7 @@ class _Watch:
 
 
 def _keep(run_out: Path, kept: Path) -> None:
-    """Copies what is on the run's own disk, which ends with its processes."""
+    """Copies the files on the run's own disk, which disappears with the mount namespace."""
     (run_out / "filler").unlink(missing_ok=True)
     kept.mkdir(exist_ok=True)
     for path in run_out.iterdir():
@@ -239,7 +239,7 @@ def _set(values: list[str]) -> list[str]:
 
 
 def fill(path: Path) -> None:
-    """Writes a file that takes all that is left on its disk."""
+    """Writes a file that fills its disk."""
     try:
         with path.open("wb") as file:
             while True:
@@ -250,7 +250,7 @@ def fill(path: Path) -> None:
 
 
 def memory_of(pid: int) -> float:
-    """Returns the memory that a process and those that it started have to themselves, MB."""
+    """Returns the unique memory of a process and its descendants, MB."""
     try:
         first = psutil.Process(pid)
         of_all = [p.memory_full_info().uss for p in (first, *first.children(recursive=True))]

@@ -1,1 +1,1 @@
-"""Drawn bad inputs: what the program does with scenarios, meshes, recordings and messages."""
+"""Tests the program with random bad inputs: scenarios, meshes, recordings and messages."""

@@ -1,12 +1,12 @@
-"""What becomes of drawn bad inputs: scenarios, garment files, measured logs, messages.
+"""Tests the program with random bad scenarios, garment files, measured logs and messages.
 
     drake-dress bench inputs --cases 5000
     drake-dress bench inputs --cases 5000 --seed 7 --only mesh
     drake-dress bench inputs --seed 7 --case 1234
 
-Each case is a sound input, changed. An impossible value has to be refused in one line, what is only
-written in another way has to be read the same, and all else may be either, but never a traceback,
-a silence above the limit, or a result that is not the input's.
+Each case is a changed valid input. An impossible value must be rejected in one line; a different
+notation must give the same result. Other inputs may be accepted or rejected, but must never cause a
+traceback, a response time above the limit, or a result that does not match the input.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from benchmarks.side_by_side import completed
 from drake_dress.interrupt import caught_interrupt
 
 _NAME = "inputs"
-# Longest silence, s.
+# Longest response time, s.
 LIMIT = 10.0
-_SHOWN = 40  # failures that are printed whole
+_SHOWN = 40  # failures that are printed in full
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carries out the cases and prints a table.
+    """Runs the cases and prints a table.
 
     Returns:
-        0, 1 if a case did not end as it has to, 2 for bad arguments, 128 and its number after a
-        signal that ends a command.
+        0; 1 if a case had a wrong outcome; 2 on bad arguments; 128 plus the signal's number after
+        an ending signal.
     """
     options = _parser().parse_args(arguments)
     if options.into is not None:
@@ -102,7 +102,7 @@ def _run(
 
 
 def table(results: Sequence[Result], seed: int) -> Table:
-    """Returns how many cases of each kind ended how."""
+    """Returns the number of cases by kind and outcome."""
     rows = []
     for kind in [*KINDS, ""]:
         of_kind = [r for r in results if kind in ("", r.kind)]

@@ -1,4 +1,4 @@
-"""Measured logs with something wrong in them: HDF5, NPZ and CSV."""
+"""Random mutations of measured logs: HDF5, NPZ and CSV."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _MARKERS, _REST = "garment/marker_position", "garment/marker_rest_position"
 _JOINTS, _TIME = "human/joint_position", "time"
 _GRIPPERS = tuple(f"gripper/{side}/position" for side in SIDES)
 _FORCES = tuple(f"gripper/{side}/force" for side in SIDES)
-# A damaged marker that is accepted may be this far from where it was, m: spikes beyond it are told
-# from motion, see docs/explain.md.
+# Permitted error of a damaged marker that is accepted, m: larger spikes are distinguished from
+# motion, see docs/explain.md.
 _OFF = 0.06
 
 
 @dataclass
 class _Log:
-    """What a file will hold.
+    """Content of a file to write.
 
     Attributes:
-        data: arrays by name.
-        noise: `noise_std` by name; what is no number is written as it is.
-        spoilt: (T,m) markers that a reader has to take as not seen, or refuse.
-        units: attribute `unit` by name.
+        data: Arrays by name.
+        noise: `noise_std` by name; values other than numbers are written unchanged.
+        spoilt: (T,m) markers that a reader must treat as not seen, or refuse.
+        units: Attribute `unit` by name.
     """
 
     data: Data
@@ -53,7 +53,7 @@ class _Log:
 
 
 def draw_measurement(rng: Rng) -> Trial:
-    """Returns a mutation of a sound measured log."""
+    """Returns a mutation of a valid measured log."""
     suffix = _pick(rng, ("h5", "npz", "csv"))
     path = place() / f"measured.{suffix}"
     beside = path.with_suffix(".markers.csv")
@@ -65,7 +65,7 @@ def draw_measurement(rng: Rng) -> Trial:
         mutate = _pick(rng, _CONTENT)
         told, expect = mutate(rng, log)
         if suffix == "csv" and mutate is _shape:
-            # rows are written as far as all columns reach, which may leave a sound log
+            # only rows with all columns are written, which may leave a valid log
             expect = Expect.EITHER
         told = f"{mutate.__name__[1:]} {told}"
         _write(log, path)
@@ -79,7 +79,7 @@ def draw_measurement(rng: Rng) -> Trial:
         told, expect = mutate(rng, log, path)
         told = f"{mutate.__name__[1:]} {told}"
     whole = _sound().data[_MARKERS]
-    # a CSV file may hold fewer rows, see above
+    # a CSV file may have fewer rows, see above
     cut = suffix == "csv" and told.startswith("shape")
 
     def use() -> str | None:
@@ -101,7 +101,7 @@ def draw_measurement(rng: Rng) -> Trial:
 
 
 def _far_off(seen: FloatArray, reference: FloatArray) -> str | None:
-    # bits of a number may have changed, by as much as noise does
+    # flipped bits may change a number by as little as noise does
     off = np.linalg.norm(seen - reference, axis=2)
     worst = float(np.nanmax(off)) if np.isfinite(off).any() else 0.0
     return f"a marker {worst:.3g} m off" if worst > _OFF else None
@@ -126,7 +126,7 @@ def _lost(seen: FloatArray, reference: FloatArray, spoilt: BoolArray | None) -> 
 
 
 def prepare(folder: Path) -> None:
-    """Makes the sound recording that all mutations begin with, in a folder shared by workers."""
+    """Creates the valid recording that all mutations start from, in a folder shared by workers."""
     from drake_dress.discrepancy.commands import write_dataset
 
     if not (folder / "measured.h5").exists():
@@ -134,7 +134,7 @@ def prepare(folder: Path) -> None:
 
 
 def use_base(folder: Path) -> None:
-    """Takes the recording that `prepare` made."""
+    """Selects the recording created by `prepare`."""
     _BASE.append(folder / "measured.h5")
 
 
@@ -194,7 +194,7 @@ def _all_scaled(rng: Rng, log: _Log) -> _Told:
 
 
 def _y_up(rng: Rng, log: _Log) -> _Told:
-    """Turns the world about x, as a camera system with y up has it."""
+    """Rotates the world about x, as in a motion-capture system with y up."""
     turn = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0.0]])
     for name in (_MARKERS, *_GRIPPERS, *_FORCES, _JOINTS):
         log.data[name] = log.data[name] @ turn.T
@@ -246,7 +246,7 @@ def _clock(rng: Rng, log: _Log) -> _Told:
 
 
 def _spoil(rng: Rng, log: _Log, longest: int) -> tuple[int, slice]:
-    """Draws a marker and a stretch of samples, and says that they are spoilt."""
+    """Draws a marker and a range of samples, and marks them as spoilt."""
     markers = log.data[_MARKERS]
     count, number = markers.shape[:2]
     marker, length = int(rng.integers(number)), int(rng.integers(1, longest))
@@ -273,7 +273,7 @@ def _spike(rng: Rng, log: _Log) -> _Told:
 
 
 def _label_swap(rng: Rng, log: _Log) -> _Told:
-    """Swaps two markers that are far enough apart to matter, for a while or until the end."""
+    """Swaps two sufficiently distant markers, temporarily or until the end."""
     markers = log.data[_MARKERS]
     rest = log.data[_REST]
     a = int(rng.integers(len(rest)))
@@ -284,12 +284,12 @@ def _label_swap(rng: Rng, log: _Log) -> _Told:
     markers[begin:end, [a, b]] = markers[begin:end, [b, a]]
     log.spoilt = np.zeros(markers.shape[:2], dtype=bool)
     log.spoilt[begin:end, [a, b]] = True
-    # a lasting swap may be undone by renaming, which shows as a difference of the positions
+    # the reader may undo a lasting swap by renaming, which shows as different positions
     return f"{a}, {b} for {end - begin}", Expect.EITHER
 
 
 def _other_labels(rng: Rng, log: _Log) -> _Told:
-    """Rest places in another order than the markers."""
+    """Shuffles the rest positions relative to the markers."""
     log.data[_REST] = log.data[_REST][rng.permutation(len(log.data[_REST]))]
     return "", Expect.REFUSE
 
@@ -526,7 +526,7 @@ def _damaged_chunk(rng: Rng, log: _Log, path: Path) -> _Told:
     k = chunk.byte_offset + int(rng.integers(2, max(3, chunk.size - 8)))
     data[k : k + 4] = rng.bytes(4)
     path.write_bytes(bytes(data))
-    # what a checksum does not cover may pass; then it must still be what it was
+    # damage outside a checksum may pass, but must not change the values
     return name, Expect.EITHER
 
 
@@ -627,7 +627,7 @@ def _columns(rng: Rng, log: _Log, path: Path) -> _Told:
         expect = Expect.ACCEPT
     elif how == "dropped":
         name = rows[0][k]
-        # forces may lack, but not in part
+        # forces may be missing entirely, but not partly
         rows = [[x for j, x in enumerate(row) if j != k] for row in rows]
         how = f"{how} {name}"
     elif how == "twice":

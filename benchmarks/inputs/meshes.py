@@ -1,4 +1,4 @@
-"""Garment files with something wrong in them: OBJ, PLY and STL."""
+"""Random mutations of garment files: OBJ, PLY and STL."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.load import load_garment
 
 Rng = np.random.Generator
-_SPACING = 0.05  # of the mutated jacket, m: quick to load
-# What an accepted garment may differ from the jacket: its area by this share, and its longest edge
-# by this factor.
+_SPACING = 0.05  # of the mutated jacket, m; coarse, to load quickly
+# Permitted differences of an accepted garment from the jacket: relative change of its area, and
+# factor on its longest edge.
 _AREA, _LONGEST = 0.1, 2.5
 
 
 @dataclass(frozen=True)
 class _Sheet:
-    """A mesh: positions (n,3), faces (F,3), and whether it is still the jacket."""
+    """A mesh: positions (n,3), faces (F,3), and whether it still is the jacket."""
 
     x: FloatArray
     faces: IndexArray
@@ -33,7 +33,7 @@ class _Sheet:
 
 
 def draw_mesh(rng: Rng) -> Trial:
-    """Returns a mutation of a sound garment file."""
+    """Returns a mutation of a valid garment file."""
     suffix = _pick(rng, ("obj", "obj", "ply", "stl"))
     binary = suffix != "obj" and bool(rng.integers(2))
     jacket = _jacket()
@@ -78,7 +78,7 @@ def _longest(x: FloatArray, faces: npt.NDArray[np.integer]) -> float:
 
 
 def _unlike_jacket(x: FloatArray, faces: npt.NDArray[np.integer], same: bool) -> str | None:
-    """Returns in what an accepted garment is not the jacket that was spoilt."""
+    """Returns how an accepted garment differs from the mutated jacket; None if it does not."""
     jacket = _jacket()
     if not np.isfinite(x).all():
         return "positions that are not finite"
@@ -151,7 +151,7 @@ def _fin(rng: Rng, s: _Sheet) -> _Mutated:
     face = s.faces[rng.integers(len(s.faces))]
     x = np.vstack([s.x, s.x[face].mean(axis=0) + [0.0, 0.0, 0.03]])
     faces = np.vstack([s.faces, [face[0], face[1], len(s.x)]])
-    # on a boundary it is one more triangle
+    # on a boundary edge it only adds a triangle
     return "", _Sheet(x, faces), Expect.EITHER, "m"
 
 
@@ -262,7 +262,7 @@ def _stl(s: _Sheet, binary: bool) -> bytes:
 
 
 def _dialect(rng: Rng, s: _Sheet) -> tuple[str, bytes, Expect]:
-    """Returns the jacket in a way of writing OBJ that is allowed, by several habits at once."""
+    """Returns the jacket as valid OBJ that combines several styles of notation."""
     habits = {
         name
         for name in (
@@ -312,7 +312,7 @@ def _dialect(rng: Rng, s: _Sheet) -> tuple[str, bytes, Expect]:
 
 
 def _laid_out(lines: list[str], habits: set[str]) -> list[str]:
-    """Returns the same statements with other blanks, notes and empty lines."""
+    """Returns the same statements with other white space, comments and empty lines."""
     if "tabs" in habits:
         lines = [line.replace(" ", "\t") if "\\" not in line else line for line in lines]
     if "indent" in habits:
@@ -351,7 +351,7 @@ def _damaged(rng: Rng, sound: bytes) -> tuple[str, bytes]:
 
 
 def _other_lines(rng: Rng, data: bytearray) -> bytearray:
-    """Returns a file of which some lines are gone, and others stand where they did not."""
+    """Returns the file with some lines deleted and others copied to new positions."""
     lines = data.split(b"\n")
     for _ in range(int(rng.integers(1, 10))):
         k = int(rng.integers(len(lines)))

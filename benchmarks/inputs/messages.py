@@ -1,4 +1,4 @@
-"""Messages of hardware with something wrong in them: statuses, persons, garments."""
+"""Random mutations of hardware messages: statuses, persons and garments."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from drake_dress.systems.status_messages import StatusCheck
 
 Rng = np.random.Generator
 _SCENARIO = Path(__file__).parents[2] / "scenarios" / "lab.yaml"
-# Between two messages, s.
+# Period of the messages, s.
 _PERIOD = 0.02
-# Sound messages that a source sends before the drawn one, at most.
+# Bound of the number of valid messages before the mutated one.
 _BEFORE = 8
 
 
 def draw_message(rng: Rng) -> Trial:
-    """Returns a mutation of a sound message, after sound ones from the same source."""
+    """Returns a mutation of a valid message, preceded by valid ones from the same source."""
     return _pick(rng, (_status, _person, _garment))(rng)
 
 
@@ -63,7 +63,7 @@ def _pick(rng: Rng, items: Sequence[Any]) -> Any:
 
 @cache
 def _believed() -> tuple[GarmentMesh, Beliefs, FloatArray]:
-    """Returns garment, what is believed, and where the person's six points are, m."""
+    """Returns the garment, the plausibility bounds, and the person's six points, m."""
     scenario = load_scenario(_SCENARIO)
     mesh = build_garment(scenario.garment, scenario.controller.spacing, _SCENARIO.parent)
     p = station_parameters(scenario, mesh)
@@ -99,7 +99,7 @@ def _person(rng: Rng) -> Trial:
 
 def _garment(rng: Rng) -> Trial:
     mesh, believed, points = _believed()
-    # it hangs from grippers behind the shoulders
+    # the garment hangs from grippers behind the shoulders
     nodes = mesh.rest_position + points[[0, 3]].mean(axis=0) + [-0.75, 0.0, 0.0]
     grippers = np.stack([nodes[mesh.grasp[side]].mean(axis=0) for side in SIDES])
     told, wrong, expect = _pick(rng, _GARMENTS)(rng, nodes)
@@ -256,7 +256,7 @@ def _unchanged(rng: Rng, m: Any) -> _StatusTold:
 def _mode(rng: Rng, m: Any) -> _StatusTold:
     good = (lcmt_panda_status.kMove, lcmt_panda_status.kIdle)
     m.robot_mode = int(_pick(rng, [x for x in range(-128, 128) if x not in good]))
-    # it tells where it is, but that it does not follow: arms hold
+    # the position is valid, but the arm reports that it does not follow, so arms hold
     return f"mode {m.robot_mode}", Expect.EITHER
 
 

@@ -1,4 +1,4 @@
-"""Scenarios with something wrong in them."""
+"""Random mutations of scenarios."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drake_dress.diagrams.setup import read_setup
 
 Rng = np.random.Generator
 _FOLDER = Path(__file__).parents[2] / "scenarios"
-# Quantities that cannot be negative, by the end of their key.
+# Suffixes of keys whose quantities cannot be negative.
 _POSITIVE = re.compile(
     r"(_length|_radius|_width|_depth|_mass|stiffness|damping|friction|rate|speed|time_step|period"
     r"|duration|spacing|density|tolerance|horizon|iterations|margin|shoulder_height|stop_time"
@@ -27,7 +27,7 @@ _YAML_1_1 = ("010", "1:30", "0x1F", "1_000", "0b11", "yes", "no", "on", "off", "
 
 
 def draw_scenario(rng: Rng) -> Trial:
-    """Returns a mutation of a sound scenario."""
+    """Returns a mutation of a valid scenario."""
     source = _pick(rng, sorted(_FOLDER.glob("*.yaml")))
     mutate = _pick(rng, _MUTATIONS)
     told, content, expect, same = mutate(rng, source)
@@ -47,8 +47,8 @@ def draw_scenario(rng: Rng) -> Trial:
     return Trial(f"{mutate.__name__[1:]} {source.stem} {told}", expect, use)
 
 
-# A mutation: what was drawn, bytes of the file, what has to become of it, and whether it has to
-# load to the same scenario.
+# A mutation: description, bytes of the file, expected outcome, and whether it must load as the same
+# scenario.
 _Mutated = tuple[str, bytes, Expect, bool]
 
 
@@ -67,7 +67,7 @@ def _put(content: Any, path: tuple[Any, ...], value: Any) -> None:
 
 
 def _whole(source: Path) -> dict[str, Any]:
-    """Returns the scenario with every key that has a value."""
+    """Returns the resolved scenario without keys that are null."""
 
     def given(value: Any) -> Any:
         if isinstance(value, dict):
@@ -99,7 +99,7 @@ def _dotted(path: tuple[Any, ...]) -> str:
 
 
 def _out_of_bounds(content: Any) -> str | None:
-    """Returns what an accepted scenario holds that nothing can be."""
+    """Returns an impossible value in an accepted scenario; None if there is none."""
     for path, value in _numbers(content):
         if not math.isfinite(value):
             return f"{_dotted(path)} is {value}"
@@ -146,7 +146,7 @@ def _wrong_type(rng: Rng, source: Path) -> _Mutated:
     choices: list[Any] = [{"a": 1}, [1, [2]], "wide", "", [], {}, [None]]
     value = _pick(rng, [*choices, 0.5 if isinstance(old, bool) else True])
     _put(content, path, value)
-    # a text may be any text unless it has to be one of some words
+    # a text may be replaced by any text unless it must be one of several words
     expect = Expect.EITHER if isinstance(old, str) and isinstance(value, str) else Expect.REFUSE
     return f"{_dotted(path)}={value!r}", _dump(content), expect, False
 
@@ -202,7 +202,7 @@ def _yaml_1_1(rng: Rng, source: Path) -> _Mutated:
     word = _pick(rng, _YAML_1_1)
     _put(content, path, "@@@")
     text = _dump(content).decode().replace("'@@@'", word)
-    # a bool may be written as YAML 1.1 has it, if the project says so; it is told otherwise
+    # YAML 1.1 booleans may be accepted for a bool if documented; otherwise they are rejected
     expect = Expect.EITHER if isinstance(old, bool) or word == "~" else Expect.REFUSE
     if isinstance(old, str) and "channel" in str(path[-1]):
         expect = Expect.EITHER

@@ -1,4 +1,4 @@
-"""One drawn input: how it was made, what has to become of it, and what did."""
+"""A random input, its expected outcome, and its result."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from pathlib import Path
 
 from drake_dress.errors import UserError
 
-# One line of at most this many characters can be read.
+# Greatest length of a readable line, characters.
 LONGEST_LINE = 720
 
 
 class Expect(StrEnum):
-    """What has to become of an input."""
+    """Expected outcome of an input."""
 
-    REFUSE = "refuse"  # it holds something impossible
-    ACCEPT = "accept"  # it is sound, only written in another way
-    EITHER = "either"  # it may be refused; what is accepted must pass the trial's own check
+    REFUSE = "refuse"  # it contains something impossible
+    ACCEPT = "accept"  # it is valid, only in another notation
+    EITHER = "either"  # it may be refused; if accepted, it must pass the trial's own check
 
 
 class Outcome(StrEnum):
-    """What became of an input."""
+    """Actual outcome of an input."""
 
     REFUSED = "refused"
     ACCEPTED = "accepted"
@@ -40,13 +40,13 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A drawn input.
+    """A random input.
 
     Attributes:
-        mutation: how it was made, in a word and its drawn values.
-        expect: what has to become of it.
-        use: has the program read it; raises UserError where it is refused, and returns what is
-            wrong with a result that was accepted, None if nothing is.
+        mutation: Description of the mutation and its drawn values.
+        expect: Expected outcome.
+        use: Reads the input with the program. Raises UserError if it is refused; otherwise returns
+            what is wrong with the accepted result, None if nothing is.
     """
 
     mutation: str
@@ -56,16 +56,16 @@ class Trial:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a trial.
+    """Result of a trial.
 
     Attributes:
-        index: of the trial, which draws it again with the same seed.
-        kind: of input.
-        mutation, expect: of the trial.
-        outcome: what became of it.
-        told: the line it was refused with, or the traceback's last lines.
-        seconds: it took.
-        problem: why this is a failure; None where it is as it has to be.
+        index: Index of the trial, which draws it again with the same seed.
+        kind: Kind of input.
+        mutation, expect: As in the trial.
+        outcome: Actual outcome.
+        told: Message of the refusal, or the last lines of the traceback.
+        seconds: Duration, s.
+        problem: Why this is a failure; None if the outcome is correct.
     """
 
     index: int
@@ -79,7 +79,7 @@ class Result:
 
 
 def carry_out(index: int, kind: str, trial: Trial) -> Result:
-    """Returns what becomes of a trial in this process."""
+    """Runs a trial in this process and returns its result."""
     begin = time.perf_counter()
     wrong: str | None = None
     with _captured_output() as written:
@@ -118,7 +118,7 @@ def _problem(
 
 @contextmanager
 def _captured_output() -> Iterator[Callable[[], str]]:
-    """Provides what was written to standard output and error, by libraries in C too, and warned."""
+    """Captures standard output and error, also of C libraries, and Python warnings."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = [os.dup(1), os.dup(2)]
@@ -144,7 +144,7 @@ def _captured_output() -> Iterator[Callable[[], str]]:
 
 
 def place() -> Path:
-    """Returns the folder that this process may write its inputs to."""
+    """Returns the folder for this process's input files."""
     folder = Path(tempfile.gettempdir()) / f"drake-dress-inputs-{os.getpid()}"
     folder.mkdir(exist_ok=True)
     return folder

@@ -1,4 +1,4 @@
-"""Trials in a process of their own, which may hang or end without harm to the study."""
+"""Runs trials in a worker process, which may hang or crash without harm to the study."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from benchmarks.inputs.messages import draw_message
 from benchmarks.inputs.scenarios import draw_scenario
 from benchmarks.inputs.trials import Expect, Outcome, Result, Trial, carry_out
 
-# By kind of input, what draws one.
+# Function that draws a trial, by kind of input.
 KINDS: dict[str, Callable[[np.random.Generator], Trial]] = {
     "scenario": draw_scenario,
     "mesh": draw_mesh,
     "measured": measurements.draw_measurement,
     "message": draw_message,
 }
-# For a process to start and compile what it needs, s.
+# Timeout for a process to start and compile its kernels, s.
 _STARTING = 300.0
 
 
 class Worker:
-    """Carries out one trial at a time.
+    """Runs one trial at a time.
 
     Args:
-        kinds: of input, that it will be asked for.
-        base: folder with what trials begin with.
-        limit: after which a trial counts as silent, s.
+        kinds: Kinds of input that will be requested.
+        base: Folder with the valid inputs that trials start from.
+        limit: Time without an answer after which a trial counts as silent, s.
     """
 
     def __init__(self, kinds: Sequence[str], base: Path, limit: float) -> None:
@@ -40,7 +40,7 @@ class Worker:
         self._start()
 
     def run(self, seed: int, index: int, kind: str) -> Result:
-        """Returns what became of the trial `index` of a kind of input."""
+        """Runs the trial `index` of a kind of input and returns its result."""
         self._pipe.send((seed, index, kind))
         mutation = ""
         try:
@@ -59,7 +59,7 @@ class Worker:
         return Result(index, kind, mutation, Expect.EITHER, outcome, "", self._limit, problem)
 
     def close(self) -> None:
-        """Ends the process."""
+        """Kills the worker process."""
         self._process.kill()
         self._process.join()
 
@@ -77,13 +77,13 @@ class Worker:
 
 
 def draw(seed: int, index: int, kind: str) -> Trial:
-    """Returns a trial, which seed and index draw."""
+    """Draws a trial from seed and index."""
     return KINDS[kind](np.random.default_rng([seed, index]))
 
 
 def _serve(pipe: Connection, kinds: Sequence[str], base: Path) -> None:
     measurements.use_base(base)
-    # what is compiled or read once is no part of a trial
+    # compile kernels and read files now, so that trials do not include it
     for kind in kinds:
         carry_out(0, kind, draw(0, 0, kind))
     pipe.send("ready")

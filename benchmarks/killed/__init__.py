@@ -1,1 +1,1 @@
-"""Runs that are killed, terminated, or whose disk fills, at random moments."""
+"""Tests runs that are killed, terminated, or whose disk fills, at random times."""

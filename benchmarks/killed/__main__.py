@@ -1,9 +1,9 @@
-"""Runs that are killed, terminated, or whose disk fills, at random moments: what is left.
+"""Checks the files left by runs that are killed, terminated or out of disk at random times.
 
     drake-dress bench killed --moments 100 --json killed.json
 
-Each run writes to a directory in which an earlier one left its files. Whenever it ends, what was
-written before has to be readable, and no file of one run may stand beside those of the other.
+Each run writes to a directory that contains the files of an earlier run. Whenever it ends, data
+written before must be readable, and files of the two runs must not be mixed.
 
 `group` is SIGTERM to all processes of a run at once, as Ctrl-C and `timeout` send signals.
 """
@@ -36,9 +36,9 @@ from drake_dress.errors import UserError
 
 _NAME = "killed"
 _ROOT = Path(__file__).parents[2]
-# its seed draws the dressing, so that files of two runs are never alike
+# its seed varies the dressing, so that files of two runs always differ
 _SCENARIO = _ROOT / "scenarios" / "dummy_varied.yaml"
-# A run of some ten seconds, of which five are the simulation.
+# A run of about ten seconds, five of them simulation.
 _SETTINGS = [
     "duration=8",
     "plant.spacing=0.05",
@@ -51,9 +51,9 @@ HOW = ("kill", "terminate", "disk_full", "group")
 
 @dataclass(frozen=True)
 class Case:
-    """A run that is ended: `how` of HOW, at the drawn share of a whole run's time.
+    """A run that is ended by `how` of HOW at a random share of a whole run's duration.
 
-    `seed` draws the moment, and `number` is the case's own.
+    `seed` and `number`, the index of the case, draw the time.
     """
 
     number: int
@@ -62,20 +62,20 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For files and tables."""
+        """Name for files and tables."""
         return f"{self.number:03d}-{self.how}-{self.seed}"
 
     @property
     def share(self) -> float:
-        """Of a whole run's time, at which it is ended."""
+        """Share of a whole run's duration at which it is ended."""
         return float(np.random.default_rng([self.seed, self.number]).uniform(0.0, 1.05))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs what is missing and prints a table.
+    """Does the missing runs and prints a table.
 
     Returns:
-        0, 1 if something was lost or mixed, 2 for bad arguments, 130 after Ctrl-C.
+        0; 1 if something was lost or mixed; 2 on bad arguments; 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     seed = _kept_seed(options) if options.seed is None else options.seed
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _kept_seed(options: argparse.Namespace) -> int:
-    """Returns the seed of what is kept and only to be shown; else a new one."""
+    """Returns the seed of the kept results if they are only shown; otherwise a new one."""
     if options.kept and options.json is not None:
         for result in read_results(options.json, lambda case: Case(**case).name, _NAME).values():
             return int(result["case"]["seed"])
@@ -108,7 +108,7 @@ def _kept_seed(options: argparse.Namespace) -> int:
 
 @cache
 def _whole(folder: Path, overrides: tuple[str, ...]) -> float:
-    """Makes the earlier run, and returns how long one takes that nobody ends, s."""
+    """Does the earlier run, and returns the duration of an undisturbed run, s."""
     _, problem = run_scenario(_SCENARIO, folder / "earlier", [*_SETTINGS, *overrides], seed=1)
     if problem:
         raise RuntimeError(problem)

@@ -1,8 +1,7 @@
-"""A run into the directory of an earlier one, ended at a moment by a signal or a full disk.
+"""A run into the directory of an earlier one, ended at a given time by a signal or a full disk.
 
-Takes two arguments: a file with the plan, and one to write what became of it, both JSON. A disk
-that can be filled is mounted for that, for which the process needs a mount namespace of its own:
-`unshare -m`.
+Takes two arguments: a file with the plan, and one for the result, both JSON. For a full disk, a
+small disk is mounted, for which the process needs its own mount namespace: `unshare -m`.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from pathlib import Path
 
 from benchmarks.hardware.two_processes import fill
 
-# Of the disk that is filled: room for all files of such a run, and little more.
+# Size of the disk to fill: enough for all files of such a run, and little more.
 _DISK = "size=40m"
 _POLL = 0.01
 _STAGE_LINE = re.compile(r" *([\d.]+) s  left ")
@@ -29,18 +28,18 @@ _STAGE_LINE = re.compile(r" *([\d.]+) s  left ")
 
 @dataclass(frozen=True)
 class Plan:
-    """What is run and how it ends.
+    """The run and the way to end it.
 
     Attributes:
-        scenario: file.
-        earlier: folder with the files of the earlier run.
-        out: folder to run in; the earlier files are copied there first.
-        settings: KEY=VALUE.
-        seed: of the run.
-        how: `kill`, `terminate`, `disk_full`, or `group`: SIGTERM to its processes, of which it has
-            several, and once more to the first; empty: it is left alone.
-        moment: since the process began, s.
-        timeout: s.
+        scenario: Scenario file.
+        earlier: Folder with the files of the earlier run.
+        out: Output folder; the earlier files are copied there first.
+        settings: KEY=VALUE settings of the scenario.
+        seed: Seed of the run.
+        how: `kill`, `terminate`, `disk_full`, or `group`: SIGTERM to the first process and then to
+            all of the run's several processes; empty: the run is not disturbed.
+        moment: Time since the process started, s.
+        timeout: Timeout of the run, s.
     """
 
     scenario: str
@@ -55,14 +54,14 @@ class Plan:
 
 @dataclass(frozen=True)
 class Ended:
-    """How it ended.
+    """Result of the ended run.
 
     Attributes:
-        status: of the process, negative for a signal.
-        words: what it printed.
-        wall: from its beginning to its end, s.
-        acted: when it was done to it, s; None if the run was over before.
-        told: last simulated time that it had told on its progress lines, s, and when, s.
+        status: Exit status of the process, negative for a signal.
+        words: Output of the process.
+        wall: Duration of the process, s.
+        acted: Time at which it was ended, s; None if the run finished before.
+        told: Last simulated time on its progress lines, s, and the time of that line, s.
     """
 
     status: int
@@ -73,7 +72,7 @@ class Ended:
 
 
 def play(plan: Plan) -> Ended:
-    """Carries out a plan; the disk of `disk_full` has to be this process's own."""
+    """Executes a plan; `disk_full` needs a mount namespace of this process."""
     out = Path(plan.out)
     out.mkdir(parents=True, exist_ok=True)
     place = _place(plan, out)
@@ -119,7 +118,7 @@ def play(plan: Plan) -> Ended:
 
 
 def _place(plan: Plan, out: Path) -> Path:
-    """Returns the folder of the run: on a small disk of its own where that is to be filled."""
+    """Returns the folder of the run, on a small separate disk if that is to be filled."""
     if plan.how != "disk_full":
         return out
     place = out / "disk"
@@ -137,7 +136,7 @@ def _command(plan: Plan, place: Path) -> list[str]:
 
 
 def _act(how: str, process: subprocess.Popen[str], place: Path) -> None:
-    """Does to a run what ends it."""
+    """Ends a run in the given way."""
     if how == "disk_full":
         fill(place / "filler")
     elif how == "group":

@@ -1,4 +1,4 @@
-"""What has to be true of a directory whose last run was ended, whatever the moment."""
+"""Conditions that a directory must fulfil after its last run was ended at any time."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from benchmarks.killed.ended_run import Ended
 from drake_dress.errors import UserError
 from drake_dress.report.log import RunLog
 
-# What runs write.
+# Files that runs write.
 FILES = ("run.h5", "summary.json", "report.html", "replay.html")
-# Signals that are answered; with the log's end, report and replay a run ends within, s.
+# Signals that a run handles; time within which it then ends, with log, report and replay, s.
 _ANSWERED, _SOON = ("terminate", "group"), 60.0
-# Samples are flushed about once a second; what is being flushed at the end may be lost, s.
+# Greatest loss, s: samples are flushed about once per second, and the last flush may be lost.
 _FLUSHED = 3.0
-# What a run says when nothing is left to write.
+# Output of a run that has written all files.
 _WRITTEN = "log, report and replay: "
-# Exit statuses that a terminated run may have: as for other programs, or whole before it.
+# Valid exit statuses of a terminated run: 128 + SIGTERM, or those of a run that finished before.
 _AFTER_TERMINATION = (143, 0, 1)
 
 
 def fingerprints(folder: Path) -> dict[str, str]:
-    """Returns a digest of each file of a run that a folder holds."""
+    """Returns a digest of each of a run's files in a folder."""
     return {
         name: hashlib.sha256((folder / name).read_bytes()).hexdigest()
         for name in FILES
@@ -37,21 +37,21 @@ def fingerprints(folder: Path) -> dict[str, str]:
 def problems(
     folder: Path, earlier: Mapping[str, str], seed: int, how: str, end: Ended
 ) -> list[str]:
-    """Returns what is wrong with what an ended run left.
+    """Returns the problems of the files left by an ended run.
 
     Args:
-        folder: of the run.
-        earlier: digests of the files that an earlier run had left there.
-        seed: of the ended run, which the earlier one does not share.
-        how: it was ended.
-        end: how it did.
+        folder: Folder of the run.
+        earlier: Digests of the files that an earlier run had left there.
+        seed: Seed of the ended run, different from the earlier run's.
+        how: How it was ended.
+        end: Result of the ended run.
     """
     wrong = _answer_problems(how, end)
     now = fingerprints(folder)
     old = [name for name, digest in now.items() if earlier.get(name) == digest]
     if old and len(old) < len(now):
         wrong.append(f"mixture: {', '.join(old)} of the earlier run beside the later one's")
-    # between the removal of old results and the new log the old log stands alone
+    # after old results are removed and before the new log exists, only the old log is there
     if old and "run.h5" not in old:
         wrong.append(f"of the earlier run {', '.join(old)} left without its log")
     if old:
@@ -68,14 +68,14 @@ def problems(
 
 
 def _answer_problems(how: str, end: Ended) -> list[str]:
-    """Returns what is wrong with how a run took being ended."""
+    """Returns the problems of a run's reaction to being ended."""
     wrong = []
     if "Traceback" in end.words:
         wrong.append("traceback")
     if how in _ANSWERED and end.acted is not None and end.wall - end.acted > _SOON:
         wrong.append(f"ended {end.wall - end.acted:.0f} s after SIGTERM")
     if how in _ANSWERED and end.acted is not None and end.status not in _AFTER_TERMINATION:
-        # before the run could take a signal, and when all is written, the system ends it
+        # the default action is valid before the run handles signals and after all is written
         by_the_system = end.status == -15 and (end.told[0] <= 0.0 or _WRITTEN in end.words)
         if not by_the_system:
             wrong.append(f"exit status {end.status} after SIGTERM")
@@ -92,7 +92,7 @@ def _log_problems(folder: Path, seed: int, end: Ended) -> list[str]:
                 if not np.isfinite(log.garment_position(i)).all():
                     return [f"sample {i} is not finite"]
     except UserError as error:
-        # nothing had been written yet when it ended
+        # an unreadable log is valid if nothing had been written yet
         return [f"log cannot be read: {error}"] if end.told[0] > 0.0 else []
     if len(time) > 1 and np.any(np.diff(time) <= 0.0):
         return ["time does not increase"]

@@ -1,1 +1,1 @@
-"""The solver of the local problem against the exact optimum and the cone programme's time."""
+"""Compares the local solver with the exact optimum and the time of a cone programme."""

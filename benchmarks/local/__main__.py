@@ -1,8 +1,8 @@
-"""`python -m benchmarks.local`: constrained DDP on local problems, beside the exact optimum.
+"""`python -m benchmarks.local`: compares constrained DDP with the exact optimum.
 
-Each problem is solved by constrained DDP from nothing, again from the solution with another start
-(as the next of a sequence is), and as a cone programme by Clarabel, whose cost is the optimum and
-whose own time, without what Drake needs to set it up, is the time to beat.
+Each problem is solved by constrained DDP with a cold start, then with a warm start and another
+initial state (like the next problem of a sequence), and as a cone programme by Clarabel. The cone
+programme gives the optimum; its own time, without Drake's set-up, is the time to beat.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.solution import Solution
 from drake_dress.solvers.cone_programme import solve_cone_programme
 
-# Room that it leaves within the bounds for the way foreseen, m.
+# Margin by which widened bounds contain the predicted trajectory, m.
 _ROOM = 1e-4
-# How far the start of a following problem is from where it was foreseen, m.
+# Standard deviation of the next problem's initial state from the prediction, m.
 _SURPRISE = 2e-3
-# What counts as a failure: relative cost above the optimum, and a bound exceeded, m or m/s.
+# Thresholds of a failure: relative cost above the optimum, and violation of a bound, m or m/s.
 MOST_COST, MOST_VIOLATION = 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One problem: times, s; cost above the optimum, relative; worst violation; how it went.
+    """One problem: times, s; relative cost above the optimum; worst violation; statistics.
 
-    `kept` tells whether anything keeps all bounds; if not, costs hold the price of what does not.
+    `kept` is whether the bounds are feasible; if not, costs include the price of the violation.
     """
 
     kind: str
@@ -89,7 +89,7 @@ def _trials(
     problems: Sequence[tuple[str, LocalProblem]], rng: np.random.Generator
 ) -> Iterator[Trial]:
     if problems:
-        # compiled before anything is measured
+        # compile before measuring
         solve_constrained_ddp(problems[0][1])
         feedback_gains(problems[0][1], solve_constrained_ddp(problems[0][1]))
     shown = sys.stderr.isatty()
@@ -103,10 +103,10 @@ def _trials(
         cone = time.perf_counter()
         kept = exact.converged and exact.violation < MOST_VIOLATION
         if not kept:
-            # nothing keeps all bounds: the optimum is that with their price
+            # bounds are infeasible: use the optimum with priced violations
             exact, _ = solve_cone_programme(p, spills=True)
         surprised = replace(p, start=p.start + _SURPRISE * rng.normal(size=len(p.start)))
-        # a start that leaves no way within the bounds is no fair one
+        # widen the bounds, since the new start may make them infeasible
         bounds = surprised.state_bounds
         needed = bounds.norms(surprised.states(found.v)) + _ROOM
         wider = replace(bounds, radius=np.maximum(bounds.radius, needed))
@@ -142,7 +142,7 @@ def _trials(
 
 
 def _above(problem: LocalProblem, found: Solution, exact: Solution) -> float:
-    """Returns by how much a solution costs more than the exact one, relative."""
+    """Returns the relative excess of a solution's cost over the exact one."""
     costs = [s.cost + problem.price * problem.spilled(s.v) for s in (found, exact)]
     return (costs[0] - costs[1]) / max(abs(costs[1]), 1e-12)
 
@@ -161,7 +161,7 @@ def figures(trials: Sequence[Trial]) -> list[Figure]:
 
 
 def table(trials: Sequence[Trial]) -> Table:
-    """Returns what was asked and reached, for each kind of problem and way to solve it."""
+    """Returns times, costs and violations by kind of problem and method."""
     rows = []
     for kind in dict.fromkeys(t.kind for t in trials):
         mine = [t for t in trials if t.kind == kind]

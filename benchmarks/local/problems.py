@@ -1,4 +1,4 @@
-"""Local problems that are drawn: sleeves and grippers on a way, with bounds that some way obeys."""
+"""Random local problems: sleeves and grippers on a trajectory, with feasible bounds."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.norm_bounds import NormBounds
 
 HORIZON, TIME_STEP = 20, 0.05
-# Usual bounds on: sleeve to far gripper, twice; sleeve to sleeve; sleeve beside its arm, twice; m.
+# Usual bounds: sleeve to far gripper, twice; sleeve to sleeve; sleeve off its arm's axis, twice, m.
 _RADIUS = (0.35, 0.35, 0.3, 0.03, 0.03)
-# On sleeves' speed beside their arms, twice, and on grippers' speed, twice; m/s.
+# Usual bounds: speed of sleeves across their arms, twice; speed of grippers, twice, m/s.
 _SPEED = (0.05, 0.05, 0.15, 0.15)
 _ON_ARM, _TETHERED = 0.6, 0.6
 
 
 def random_problem(rng: np.random.Generator) -> tuple[LocalProblem, FloatArray]:
-    """Returns a problem with 12 states, 6 inputs and 20 steps, and inputs (N,6) that obey it.
+    """Returns a problem with 12 states, 6 inputs and 20 steps, and feasible inputs (N,6).
 
-    Sleeves and grippers move at random, targets lie 10 cm off and wander, a sleeve is on its arm or
-    not, and tethered to the other or not. Bounds are the usual ones, or as wide as a way that is
-    drawn, too, needs; some fifty of them are active at a typical optimum.
+    Sleeves and grippers move randomly; targets are about 10 cm away and drift. A sleeve may be on
+    its arm, and may be tethered to the other. Bounds are the usual ones, widened if necessary so
+    that a random trajectory is feasible; some fifty of them are active at a typical optimum.
     """
     n, h = HORIZON, TIME_STEP
     eye, none = np.eye(3), np.zeros((3, 3))
@@ -91,6 +91,6 @@ def random_problem(rng: np.random.Generator) -> tuple[LocalProblem, FloatArray]:
 
 
 def _path(velocity: FloatArray, b: FloatArray) -> FloatArray:
-    """Returns (N+1,n) where inputs (N,m) lead from zero."""
+    """Returns the states (N+1,n) reached from zero with inputs (N,m)."""
     moved: FloatArray = np.cumsum(velocity @ b.T, axis=0)
     return np.concatenate([np.zeros((1, len(b))), moved])

@@ -2,8 +2,8 @@
 
     python -m benchmarks.local.record scenarios/active_standing.yaml --out out/local.npz
 
-The scenario runs with both controllers; of the problems that come up as many as are asked for are
-kept, evenly over the run.
+The scenario runs with both controllers. The requested number of problems is kept, evenly spread
+over the run.
 """
 
 from __future__ import annotations

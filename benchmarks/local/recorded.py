@@ -1,4 +1,4 @@
-"""Local problems in a file, as `drake-dress bench local --recorded` reads them."""
+"""Reads and writes files of local problems, for `drake-dress bench local --recorded`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PARTS = tuple(f.name for f in dataclasses.fields(NormBounds))
 
 
 def write_problems(path: Path, problems: Sequence[LocalProblem]) -> None:
-    """Writes problems of one size, stacked, as NPZ."""
+    """Writes problems of equal size, stacked, as NPZ."""
     stacked = {name: np.stack([getattr(p, name) for p in problems]) for name in _PLAIN}
     for bounds in ("state_bounds", "input_bounds"):
         for part in _PARTS:
@@ -33,7 +33,7 @@ def read_problems(path: Path) -> list[LocalProblem]:
     """Returns the problems of a file.
 
     Raises:
-        UserError: it cannot be read, or holds something else.
+        UserError: The file cannot be read, or has other content.
     """
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -1,1 +1,1 @@
-"""Do tests notice when the program is changed? Mutants of central modules, and who catches them."""
+"""Mutation testing: do the tests notice changes of central modules?"""

@@ -1,10 +1,10 @@
-"""Draws mutants of central modules and counts how many of them the tests notice.
+"""Draws mutants of central modules and counts how many the tests catch.
 
     drake-dress bench mutation --mutants 200 --seed 1
 
-A mutant is a small change of the program. Tests that pass all the same do not hold what was
-changed. What is done is kept, and not run again with the same seed. Survivors that were looked at
-have a line in survivors.json that says why tests need not notice them, or which test does now.
+A mutant is a small change of the program. If the tests still pass, they do not cover the changed
+behaviour. Results are kept and not run again with the same seed. Each examined survivor has a line
+in survivors.json that says why tests need not catch it, or which test does now.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _result(mutant: Mutant, copy: Path) -> dict[str, Any]:
-    """Returns what the tests say of a mutant; the copy is then as it was."""
+    """Returns the result of the tests on a mutant; restores the copy afterwards."""
     path = copy / mutant.file
     code = mutated(mutant, _ROOT)
     assert code is not None

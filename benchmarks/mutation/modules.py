@@ -1,4 +1,4 @@
-"""Modules that are mutated, and the tests that cover each."""
+"""The modules to mutate, and the tests that cover each."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Module:
-    """A part of the program with quick tests of its own.
+    """A part of the program that has its own quick tests.
 
     Attributes:
-        files: that are mutated, from the root of the repository.
-        tests: that are to notice.
-        timeout: of the tests, s: several times what they take. A mutant may never end.
+        files: Files to mutate, relative to the root of the repository.
+        tests: Tests that should catch the mutants.
+        timeout: Timeout of the tests, several times their duration, since a mutant may never end,
+            s.
     """
 
     files: tuple[str, ...]
@@ -21,9 +22,9 @@ class Module:
 
 
 _MODELS = "drake_dress/models"
-# What stands between commands and a person, what is believed and what ends a run, what says that an
-# arm is in its sleeve, the solver of the control loop, and the regression by which causes are
-# named.
+# The safety layer between commands and the person, the plausibility checks that end a run, the test
+# that an arm is in its sleeve, the solver of the control loop, and the regression that identifies
+# causes.
 MODULES = {
     "safety": Module((f"{_MODELS}/control/safety.py",), ("tests/models/control/test_safety.py",)),
     "supervision": Module(

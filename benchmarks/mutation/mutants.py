@@ -1,6 +1,6 @@
-"""Mutants of files: a small change each, by the operators of Cosmic Ray.
+"""Mutants of files: one small change each, by the operators of Cosmic Ray.
 
-Changes of annotations and docstrings are no mutants: nothing could notice them.
+Changes of annotations and docstrings are excluded, since no test could catch them.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class Mutant:
     """One change of one file.
 
     Attributes:
-        module: of `MODULES`.
-        file: from the root of the repository.
-        operator: of Cosmic Ray.
-        occurrence: of what the operator changes, counted through the file.
+        module: Name in `MODULES`.
+        file: Path relative to the root of the repository.
+        operator: Operator of Cosmic Ray.
+        occurrence: Index of the operator's target among all its targets in the file.
     """
 
     module: str
@@ -34,12 +34,12 @@ class Mutant:
 
     @property
     def name(self) -> str:
-        """Tells it from all others."""
+        """Unique name of the mutant."""
         return f"{self.file}:{self.operator}:{self.occurrence}"
 
 
 def all_mutants(module: str, file: str, root: Path) -> list[Mutant]:
-    """Returns every mutant of a file, those that nothing could notice among them.
+    """Returns every mutant of a file, including those that no test could catch.
 
     Raises:
         UserError: Cosmic Ray is not installed.
@@ -63,7 +63,7 @@ def all_mutants(module: str, file: str, root: Path) -> list[Mutant]:
 
 
 def mutated(mutant: Mutant, root: Path) -> str | None:
-    """Returns the mutant's source; None if nothing could notice the change."""
+    """Returns the mutant's source; None if no test could catch the change."""
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
@@ -75,14 +75,14 @@ def mutated(mutant: Mutant, root: Path) -> str | None:
 
 
 def change(mutant: Mutant, code: str, root: Path) -> list[str]:
-    """Returns the lines that differ, those of the original first."""
+    """Returns the changed lines, the original ones first."""
     source = (root / mutant.file).read_text(encoding="utf-8")
     lines = unified_diff(source.splitlines(), code.splitlines(), n=0, lineterm="")
     return [line for line in list(lines)[2:]]
 
 
 def draw(mutants: Sequence[Mutant], count: int, root: Path, seed: int) -> list[Mutant]:
-    """Returns as many mutants as asked for, or all there are, drawn without replacement."""
+    """Draws `count` mutants without replacement, or all if there are fewer."""
     order = np.random.default_rng(seed).permutation(len(mutants))
     chosen: list[Mutant] = []
     for k in order:
@@ -94,7 +94,7 @@ def draw(mutants: Sequence[Mutant], count: int, root: Path, seed: int) -> list[M
 
 
 class _Bare(ast.NodeTransformer):
-    """Takes annotations and docstrings off."""
+    """Removes annotations and docstrings."""
 
     def visit_arg(self, node: ast.arg) -> ast.AST:
         node.annotation = None

@@ -17,17 +17,17 @@ from benchmarks.mutation.modules import Module
 
 CAUGHT, SURVIVED, TIMED_OUT = "caught", "survived", "timed out"
 _COPIED = ("drake_dress", "benchmarks", "tests", "scenarios", "pyproject.toml")
-# Of pytest: all passed; some failed; it was interrupted, as by an error while collecting.
+# Exit codes of pytest: all passed; some failed; interrupted, e.g. by a collection error.
 _PASSED, _FAILED, _INTERRUPTED = 0, 1, 2
 
 
 @contextmanager
 def copied(root: Path) -> Iterator[Path]:
-    """Gives a copy of the repository, kernels that are compiled already among it."""
+    """Yields a copy of the repository, including compiled kernels."""
     with TemporaryDirectory(prefix="mutation-") as directory:
         for name in _COPIED:
             if (root / name).is_dir():
-                # with its times: Numba takes a kernel from its cache if its file is as old
+                # with time stamps: Numba reuses a cached kernel only if its file's time is the same
                 shutil.copytree(root / name, Path(directory) / name)
             else:
                 shutil.copy2(root / name, directory)
@@ -35,20 +35,20 @@ def copied(root: Path) -> Iterator[Path]:
 
 
 def tried(module: Module, copy: Path) -> tuple[str, float]:
-    """Returns what the tests of a module say of the copy, and how long they took, s.
+    """Runs the tests of a module on the copy; returns the result and the duration, s.
 
-    Numba compiles a file anew that has changed, but not what calls it from other files: tests are
-    those of the file itself.
+    Numba recompiles a changed file, but not its callers in other files. Therefore, the tests must
+    be those of the file itself.
 
     Raises:
-        RuntimeError: pytest says neither that tests passed nor that they failed.
+        RuntimeError: pytest reports neither success nor failure.
     """
     begin = time.perf_counter()
     environment = os.environ | {
         "PYTHONPATH": str(copy),
         "PYTHONDONTWRITEBYTECODE": "1",
         "OMP_NUM_THREADS": "1",
-        # the same draws for all mutants
+        # the same random cases for all mutants
         "DRAKE_DRESS_TEST_SEED": "0",
     }
     words = [sys.executable, "-m", "pytest", "-x", "-q", "--hypothesis-seed=0", *module.tests]
@@ -66,14 +66,14 @@ def tried(module: Module, copy: Path) -> tuple[str, float]:
     except subprocess.TimeoutExpired:
         return TIMED_OUT, time.perf_counter() - begin
     finally:
-        # what a test has started, too
+        # end the processes that a test has started, too
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
     spent = time.perf_counter() - begin
     if process.returncode == _PASSED:
         return SURVIVED, spent
-    # a signal: the mutant crashed the interpreter
+    # negative: ended by a signal, since the mutant crashed the interpreter
     if process.returncode in (_FAILED, _INTERRUPTED) or process.returncode < 0:
         return CAUGHT, spent
     raise RuntimeError(f"pytest ended with {process.returncode}:\n{told[-2000:]}")

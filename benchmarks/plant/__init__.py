@@ -1,1 +1,1 @@
-"""The plant's garment: how far it is from a finer reference, and what a step takes."""
+"""Accuracy of the plant's garment against a finer reference, and cost of a step."""

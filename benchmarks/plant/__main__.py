@@ -1,10 +1,10 @@
-"""How far the plant's garment is from a finer reference, and what its steps take.
+"""Measures the error of the plant's garment against a finer reference, and its step times.
 
     drake-dress bench plant --work out/plant --into docs/cloth.md
 
-Grippers and limbs are those of one dressing, which is run first. Parts of it, a second each, are
-stepped on a mesh of 1 cm by 1 ms, and with each setting from the same states.
-What was run stays in the folder of `--work`; the reference alone takes a quarter of an hour.
+Grippers and limbs move as in one dressing, which is run first. Parts of it, one second each, are
+simulated on a mesh of 1 cm with a time step of 1 ms, and with each setting from the same states.
+Results stay in the folder of `--work`; the reference alone takes a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from drake_dress.report.log import RunLog
 
 _NAME = "plant"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
-# How it was before there was `plant.fidelity`; the three words; what each part of `standard` does;
-# the plain law on other meshes and steps.
+# The settings before `plant.fidelity` existed; its three values; the effect of each part of
+# `standard`; the plain law with other meshes and time steps.
 _STANDARD = Setting.of_fidelity("standard")
 SETTINGS = (
     Setting("before", 0.02, 0.004),
@@ -60,7 +60,7 @@ SETTINGS = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs what is missing and prints the table; returns the exit status."""
+    """Computes the missing results and prints the table; returns the exit status."""
     options = _parser().parse_args(arguments)
     if options.into is not None:
         around(options.into, _NAME)
@@ -95,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _motion(scenario: Path, run: Path) -> DressingMotion:
-    """Returns the motion of a dressing, which is run if it was not before."""
+    """Returns the motion of a dressing, which is run first if necessary."""
     if not (run / "summary.json").exists():
         print("a dressing is run, from which the motion is taken", flush=True)
         _, problem = run_scenario(scenario, run, (), report=False)

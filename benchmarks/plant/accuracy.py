@@ -1,9 +1,9 @@
-"""How far a garment is from a finer one after parts of a dressing's motion.
+"""Error of a garment against a finer one after parts of a dressing's motion.
 
-The reference has half the spacing of `fine` and a quarter of its step. It begins where the logged
-garment was, and is left alone for a while, in which it forgets the coarser mesh; then each garment
-that is compared begins from its state. Parts last a second: longer ones are decided by which way
-cloth buckles, where the reference departs from itself.
+The reference has half the spacing of `fine` and a quarter of its time step. It starts from the
+logged garment and is simulated for a while, so that the coarser mesh has no more influence. Each
+compared garment then starts from its state. Parts last one second: over longer times the direction
+of buckling dominates, and not even repeated references agree.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log import RunLog
 
-# In which the reference forgets the mesh that it comes from, and of each part, s.
+# Duration until the initial mesh has no more influence on the reference, and of each part, s.
 _FORGETTING, _PART = 0.3, 1.0
-# Of the first part, s: before, the coat hangs still.
+# Start of the first part, s; before it, the coat hangs still.
 _FIRST = 3.0
-_LAST = 0.04  # left over at the end of the motion, s
+_LAST = 0.04  # unused time at the end of the motion, s
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A garment that is compared; m and s. By default, with the plain law and implicit Euler."""
+    """Settings of a compared garment, m and s; default: the plain law and implicit Euler."""
 
     name: str
     spacing: float
@@ -49,27 +49,27 @@ class Setting:
 
     @staticmethod
     def of_fidelity(name: str, self_collision: bool = False) -> Setting:
-        """Returns the setting of a word of `plant.fidelity`."""
+        """Returns the setting of a value of `plant.fidelity`."""
         shown = f"{name}, layers collide" if self_collision else name
         given = {k: v for k, v in FIDELITIES[name].items() if k in Setting.__dataclass_fields__}
         return Setting(shown, **given, self_collision=self_collision)
 
     def of(self, scenario: Scenario, folder: Path) -> tuple[GarmentMesh, Integrator]:
-        """Returns the scenario's garment with it, and what steps it."""
+        """Returns the scenario's garment with this setting, and its integrator."""
         mesh = build_garment(scenario.garment, self.spacing, folder)
         numerics = {k: v for k, v in vars(self).items() if k not in ("name", "spacing")}
         p = replace(station_parameters(scenario, mesh), integrator="implicit", **numerics)
         return mesh, plant_integrator(p)
 
 
-# What all are held against: half the spacing of `fine` and a quarter of its step, with the plain
-# law. Coats are not made finer than this.
+# The reference for all settings: half the spacing of `fine` and a quarter of its time step, with
+# the plain law. Coats cannot be finer than this.
 REFERENCE = Setting("reference", 0.01, 0.001)
 
 
 @dataclass(frozen=True)
 class Part:
-    """The reference at the begin and at the end of a part of the motion; (n,3) m and m/s."""
+    """The reference at the start and at the end of a part of the motion; (n,3) m and m/s."""
 
     begin: float
     x: FloatArray
@@ -80,7 +80,7 @@ class Part:
 
 
 def part_begins(motion: DressingMotion, count: int) -> FloatArray:
-    """Returns when parts begin, s."""
+    """Returns the start times of the parts, s."""
     return np.linspace(_FIRST, motion.time[-1] - _PART - _LAST, count)
 
 
@@ -91,7 +91,7 @@ def reference_part(
     motion: DressingMotion,
     begin: float,
 ) -> Part:
-    """Returns the reference `fine` through one part of a log of the garment `coarse`."""
+    """Simulates the reference `fine` over one part of a log of the garment `coarse`."""
     mesh, cloth = fine
     finer = barycentric_transfer(coarse, mesh)
     sample = int(np.searchsorted(motion.time, begin - _FORGETTING))
@@ -112,7 +112,7 @@ def compared(
     motion: DressingMotion,
     parts: Sequence[Part],
 ) -> Iterator[dict[str, Any]]:
-    """Yields for each part how far a garment is off, mm and N, and what its steps took, ms."""
+    """Yields, for each part, a garment's errors, mm and N, and its step times, ms."""
     mesh, cloth = setting.of(scenario, folder)
     coarser = barycentric_transfer(fine, mesh)
     for part in parts:

@@ -1,4 +1,4 @@
-"""What a garment goes through in a dressing: grippers and limbs, taken from a run's log."""
+"""Motion of grippers and limbs in a dressing, taken from a run's log."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class DressingMotion:
     """Smooth motions through the samples of a log.
 
     Attributes:
-        time: (T,) s.
-        grippers: (T,2,3) left and right, m.
+        time: (T,) times of the samples, s.
+        grippers: (T,2,3) positions of left and right, m.
         first, second: (T,c,3) ends of the person's capsules, m.
-        radius: (c,) m.
+        radius: (c,) radii of the capsules, m.
     """
 
     time: FloatArray
@@ -38,7 +38,7 @@ class DressingMotion:
 
     @staticmethod
     def of(log: RunLog) -> DressingMotion:
-        """Returns the motion that a log holds."""
+        """Returns the motion in a log."""
         first, second, radius = log.capsules
         grippers = np.stack([log.gripper_position[side] for side in SIDES], axis=1)
         return DressingMotion(log.time, grippers, first, second, radius)
@@ -50,12 +50,12 @@ class DressingMotion:
             return DressingMotion.of(log)
 
     def grippers_at(self, time: float) -> FloatArray:
-        """Returns (2,3), m."""
+        """Returns the positions (2,3) of the grippers, m."""
         at: FloatArray = self._splines[0](time)
         return at
 
     def person_at(self, time: float) -> Obstacles:
-        """Returns the capsules with their velocities; none turns about its own axis."""
+        """Returns the capsules with their velocities, without rotation about their own axes."""
         a, b = self._splines[1](time), self._splines[2](time)
         va, vb = self._splines[1](time, 1), self._splines[2](time, 1)
         axis = b - a

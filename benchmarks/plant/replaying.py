@@ -1,4 +1,4 @@
-"""Steps a garment through parts of a dressing's motion, from given states."""
+"""Simulates a garment over parts of a dressing's motion, from given states."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from drake_dress.models.sides import SIDES
 
 @dataclass(frozen=True)
 class Replayed:
-    """A garment through one part of a motion.
+    """Result of a garment over one part of a motion.
 
     Attributes:
-        state: at the end.
+        state: State at the end.
         grippers: (2,3) mean force of the garment on left and right gripper over the part, N.
         person: (3,) mean force of the garment on the person, N.
-        step: (K,) what the steps took, s.
-        iterations: mean of the linear solver's, a step.
+        step: (K,) wall times of the steps, s.
+        iterations: Mean number of iterations of the linear solver per step.
     """
 
     state: ClothState
@@ -44,16 +44,16 @@ def replay(
     begin: float,
     duration: float,
 ) -> Replayed:
-    """Returns how the garment comes out of a part of the motion.
+    """Simulates the garment over a part of the motion.
 
     Args:
-        cloth: steps it.
-        mesh: of it; its grasp is held.
-        motion: of grippers and person.
-        x: (n,3) nodes at the begin, m.
-        v: (n,3) their velocities, m/s.
-        begin: of the part, s.
-        duration: of it, s.
+        cloth: Integrator of the garment.
+        mesh: Mesh of the garment; its grasp is held.
+        motion: Motion of grippers and person.
+        x: (n,3) initial positions of the nodes, m.
+        v: (n,3) initial velocities of the nodes, m/s.
+        begin: Start of the part, s.
+        duration: Duration of the part, s.
     """
     h = cloth.time_step
     side = np.repeat([0, 1], [len(mesh.grasp[s]) for s in SIDES])

@@ -1,1 +1,1 @@
-"""The same seed gives the same numbers, under any load, in one process or in several."""
+"""Checks that equal seeds give equal numbers, under any load, in one or several processes."""

@@ -1,12 +1,11 @@
-"""Runs one scenario again and again and tells whether all logs hold the same numbers.
+"""Runs one scenario repeatedly and checks whether all logs contain the same numbers.
 
     drake-dress bench repeat --set duration=12
 
-Alone and beside processes that keep every core busy, in one process and in several. Every dataset
-is compared with the first run's bit for bit, but for measured solve times. With `--against RUN.h5`
-they are compared with a log of another version, of the same scenario, instead: a change of
-structure leaves all numbers as they were. The exit status is 0 if all are the same, 1 if some
-differ.
+It runs with and without a load on every core, in one process and in several. Every dataset, except
+for measured solve times, is compared bit for bit with the first run's. With `--against RUN.h5` they
+are compared with another version's log of the same scenario instead: refactoring must not change
+any number. The exit status is 0 if all are equal, 1 if some differ.
 """
 
 from __future__ import annotations
@@ -34,13 +33,13 @@ from drake_dress.report.log import RunLog
 
 _NAME = "repeat"
 _SCENARIOS = Path(__file__).parents[2] / "scenarios"
-# Busy processes for each core: a run then gets a third of one.
+# Busy processes per core: a run then gets a third of a core.
 _LOAD = 2
 
 
 @dataclass(frozen=True)
 class Case:
-    """How a run is made: in one process or several, beside a full load or not."""
+    """Conditions of a run: one process or several, with or without a full load."""
 
     name: str
     one_process: bool
@@ -100,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _busy_cores() -> Iterator[None]:
-    """Keeps every core busy meanwhile."""
+    """Keeps every core busy inside the context."""
     context = multiprocessing.get_context("spawn")
     count = _LOAD * (os.cpu_count() or 1)
     busy = [context.Process(target=_turn, daemon=True) for _ in range(count)]

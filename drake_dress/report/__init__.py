@@ -1,1 +1,1 @@
-"""What a run leaves behind: its log, the verdict on it, and pages to look at."""
+"""Results of a run: its log, its verdict, and HTML pages."""

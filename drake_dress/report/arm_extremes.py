@@ -1,4 +1,4 @@
-"""What the joints of an arm came to between two samples of the log."""
+"""Extremes of an arm's joints between two samples of the log."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ _JOINTS = 7
 
 
 class ArmExtremes:
-    """Least and largest position, largest speed and torque of each joint since last taken."""
+    """Least and largest position, largest speed and torque of each joint since the last reset."""
 
     def __init__(self) -> None:
         self._forget()
 
     def see(self, q: FloatArray, v: FloatArray, torque: FloatArray) -> None:
-        """Takes (7,) rad, rad/s, N·m of one instant into account; NaN says nothing."""
+        """Adds an observation: position, velocity, torque (7,), rad, rad/s, N·m; ignores NaN."""
         np.fmin(self._least, q, out=self._least)
         np.fmax(self._most, q, out=self._most)
         np.fmax(self._speed, np.abs(v), out=self._speed)
         np.fmax(self._torque, np.abs(torque), out=self._torque)
 
     def taken(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Returns least and largest q, largest |v| and |torque|, (7,) each, and forgets them.
+        """Returns least and largest q, largest |v| and |torque|, (7,) each, and resets them.
 
-        NaN where nothing was known.
+        Values without any observation are NaN.
         """
         taken = (self._least, self._most, self._speed, self._torque)
         self._forget()

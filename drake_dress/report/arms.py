@@ -1,4 +1,4 @@
-"""How arms did in a run, measured from their joints in the log and not by their controller."""
+"""Measures of the arms in a run, computed from the logged joints, not by the controller."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log import RunLog
 
-# Links that may be near to the person: the last one and the hand, which hold the garment on it.
+# Links that may be near the person: the last one and the hand, which hold the garment.
 _NEAR_LINKS = 2
 
 
 @dataclass(frozen=True)
 class ArmMeasures:
-    """What arms did; of T samples, left and right.
+    """Measures of the arms at T samples, left and right.
 
     Attributes:
-        speed_share: (T,2) of a joint's limit of speed, the largest since the sample before.
-        torque_share: (T,2) of a joint's limit of torque, the same; NaN where not logged.
-        margin: (T,2) of a joint to its nearest limit, the least since then, rad; negative beyond.
-        off: (T,2) of the gripper from where its joints are commanded to be, m.
-        apart: (T,) of the arms' capsules, m.
-        to_person: (T,2) of an arm without its last link and hand to the person's capsules, m.
+        speed_share: (T,2) largest joint speed since the previous sample, as a share of its limit.
+        torque_share: (T,2) likewise for the joint torque; NaN if not logged.
+        margin: (T,2) least distance of a joint to its nearest limit since the previous sample, rad;
+            negative beyond the limit.
+        off: (T,2) gripper tracking error: distance to the commanded position, m.
+        apart: (T,) distance between the arms' capsules, m.
+        to_person: (T,2) distance of an arm without its last link and hand to the person's
+            capsules, m.
     """
 
     speed_share: FloatArray
@@ -39,7 +41,7 @@ class ArmMeasures:
 
     @property
     def kept(self) -> BoolArray:
-        """(T,) whether no joint was beyond a limit."""
+        """(T,) whether all joints were within their limits."""
         torque = np.nan_to_num(self.torque_share)
         inside = (self.speed_share <= 1.0) & (torque <= 1.0) & (self.margin >= 0.0)
         return np.asarray(inside.all(axis=1), dtype=bool)
@@ -49,8 +51,8 @@ def arm_poses(log: RunLog, samples: npt.NDArray[np.integer]) -> FloatArray:
     """Returns (k,a,8,4,4) X_WL of base and links of the arms; a = 0 without arms.
 
     Args:
-        log: of the run.
-        samples: (k,) which are wanted.
+        log: Log of the run.
+        samples: (k,) indices of the samples.
     """
     if "/arm/left/base" not in log.file:
         return np.zeros((len(samples), 0, 8, 4, 4))
@@ -65,8 +67,8 @@ def arm_poses(log: RunLog, samples: npt.NDArray[np.integer]) -> FloatArray:
 def arm_extremes(log: RunLog, side: Side) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Returns (T,7) least and largest joint, rad, and peaks of speed, rad/s, and torque, N·m.
 
-    Of all steps since the sample before; a log that was written before these were kept has only
-    the samples themselves.
+    They cover all steps since the previous sample. Older logs lack them; the sampled values are
+    returned instead.
     """
 
     def read(name: str, instead: str) -> FloatArray:
@@ -82,7 +84,7 @@ def arm_extremes(log: RunLog, side: Side) -> tuple[FloatArray, FloatArray, Float
 
 
 def measure_arms(log: RunLog) -> ArmMeasures | None:
-    """Returns what arms did; None where there are none."""
+    """Returns the measures of the arms; None for a log without arms."""
     if "/arm/left/base" not in log.file:
         return None
     count = len(log)

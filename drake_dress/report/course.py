@@ -24,18 +24,18 @@ _LIMIT: dict[str, Any] = {"color": "#8a2b2b", "linestyle": (0, (4, 3)), "linewid
 
 
 def course_parts(log: RunLog, measures: Measures, rules: SuccessRules) -> list[str]:
-    """Returns the HTML parts: what the shades mean, then the charts.
+    """Returns the HTML parts: the legend of the shading, then the charts.
 
     Args:
-        log: of the run, with at least one sample.
-        measures: of this log.
-        rules: limits that are drawn as dashed lines.
+        log: Log of the run, with at least one sample.
+        measures: Measures of this log.
+        rules: Limits, drawn as dashed lines.
     """
     return [_shading(), *(_embedded(log, c) for c in _Course(log, measures, rules).charts())]
 
 
 class _Chart(NamedTuple):
-    """A chart: title, note, what draws it, and how many axes it has, one below the other."""
+    """A chart: title, note, drawing function, and number of vertically stacked axes."""
 
     title: str
     note: str
@@ -44,7 +44,7 @@ class _Chart(NamedTuple):
 
 
 class _Course:
-    """Draws what a log and its measures say over time."""
+    """Draws a log and its measures over time."""
 
     def __init__(self, log: RunLog, measures: Measures, rules: SuccessRules) -> None:
         self._log, self._measures, self._rules = log, measures, rules
@@ -129,7 +129,7 @@ class _Course:
 
 
 def _embedded(log: RunLog, drawn: _Chart) -> str:
-    """Returns a chart as a picture inside the page."""
+    """Returns a chart as an image embedded in the page."""
     figure, axes = chart(9.0, 2.5 * drawn.rows + 0.3, drawn.rows)
     drawn.draw(axes)
     _draw_stages(log, axes)
@@ -140,7 +140,7 @@ def _embedded(log: RunLog, drawn: _Chart) -> str:
 
 
 def _draw_stages(log: RunLog, axes: list[Axes]) -> None:
-    """Shades axes by stage in two strips: the upper half left, the lower half right."""
+    """Shades axes by stage in two strips: left sleeve above, right sleeve below."""
     for ax in axes:
         for k in (0, 1):
             change = np.flatnonzero(np.diff(log.stage[:, k])) + 1

@@ -1,8 +1,8 @@
-"""Room on a disk that is kept before it is needed, and a file that is kept from others.
+"""Reserves disk space in advance and locks a file against other processes.
 
-HDF5 does not survive a write that fails: later uses of the file, and the end of the process, may
-crash. What is asked beforehand, whether there is room, may be wrong a moment later. So blocks are
-allocated to the file first, where a write cannot fail for want of them.
+HDF5 does not survive a failed write: later uses of the file, and the end of the process, may crash.
+Checking the free space beforehand is not enough, since it may be gone a moment later. Therefore,
+blocks are allocated to the file first, so that a write cannot run out of space.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ _UNKNOWN = (errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 def keep_room(number: int, start: int, size: int) -> None:
-    """Has bytes of an open file allocated; they stay until it is made shorter or `give_back`.
+    """Allocates bytes of an open file; they stay until it is truncated or `give_back` is called.
 
-    Where the file system cannot, so much must be free.
+    If the file system cannot allocate, only checks that enough space is free.
 
     Args:
-        number: of the file, whose length stays as it is.
-        start: of them.
-        size: how many.
+        number: File descriptor; the length of the file does not change.
+        start: Offset of the first byte.
+        size: Number of bytes.
 
     Raises:
-        OSError: there is no room.
+        OSError: There is not enough space.
     """
     code = _allocate(number, start, size)
     while code == errno.EINTR:
@@ -43,12 +43,12 @@ def keep_room(number: int, start: int, size: int) -> None:
 
 
 def give_back(number: int) -> None:
-    """Frees what is allocated beyond the end of an open file."""
+    """Frees the blocks allocated beyond the end of an open file."""
     os.ftruncate(number, os.fstat(number).st_size)
 
 
 def reserved(directory: Path, size: int) -> int | None:
-    """Returns an open file without a name that takes so many bytes; None if there is no room."""
+    """Returns an open, unnamed file of `size` bytes; None if there is not enough space."""
     try:
         number, name = tempfile.mkstemp(dir=directory)
         os.unlink(name)
@@ -63,12 +63,13 @@ def reserved(directory: Path, size: int) -> int | None:
 
 
 def locked(path: Path) -> int:
-    """Returns a file that is locked as HDF5 locks what it writes, and stays so until it is closed.
+    """Opens a file and locks it, as HDF5 does for writing, until it is closed.
 
-    HDF5's own lock would end wherever it is opened anew, and who read then would keep us out.
+    HDF5 releases its own lock whenever the log is closed and opened again; a process that reads the
+    file at that moment would lock the writer out.
 
     Raises:
-        OSError: it cannot be, or another one writes or reads it.
+        OSError: The file cannot be opened, or another process reads or writes it.
     """
     number = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
@@ -82,7 +83,7 @@ def locked(path: Path) -> int:
 
 
 def _allocate(number: int, start: int, size: int) -> int:
-    """Returns 0 or an error's number."""
+    """Returns 0 or an error number."""
     try:
         fallocate = _LIBC.fallocate
     except AttributeError:

@@ -23,13 +23,14 @@ from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
 
 @dataclass(frozen=True)
 class RunLog:
-    """A run's log, opened for reading; large datasets are read a sample at a time.
+    """A run's log, opened for reading; large datasets are read one sample at a time.
 
-    Open with `RunLog.open`, which checks schema, presence and shapes. A context manager.
+    Open it with `RunLog.open`, which checks the schema and the presence and shapes of datasets. It
+    is a context manager.
 
     Attributes:
-        path: of the file.
-        file: the open HDF5 file, for what has no name here.
+        path: Path of the file.
+        file: The open HDF5 file, for data without a property here.
     """
 
     path: Path
@@ -40,8 +41,8 @@ class RunLog:
         """Opens a log.
 
         Raises:
-            UserError: missing, being written, cut short, not HDF5, another schema, or a dataset
-                missing or misshapen.
+            UserError: The file is missing, being written, truncated, not HDF5 or of another schema,
+                or a dataset is missing or has the wrong shape.
         """
         path = Path(path)
         try:
@@ -77,12 +78,12 @@ class RunLog:
 
     @property
     def estimated(self) -> bool:
-        """Whether garment and person are as they were estimated, since truth was not known."""
+        """Whether garment and person are estimates, because the truth was not known."""
         return str(self.file.attrs.get("source", "")) == "estimate"
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray] | None:
-        """Times of commands to hardware (K,), s, and (K,2) ages of what they answer, s."""
+        """Times of hardware commands (K,), s, and ages (K,2) of the statuses they respond to, s."""
         if "/station/command_time" not in self.file:
             return None
         names = ("/station/command_time", "/station/status_age")
@@ -97,30 +98,30 @@ class RunLog:
 
     @property
     def dropped_messages(self) -> dict[str, int] | None:
-        """Repeated and late messages of each source that a run on hardware dropped."""
+        """Number of repeated and late messages dropped in a hardware run, by source."""
         text = self.file.attrs.get("dropped_messages")
         return None if text is None else dict(json.loads(str(text)))
 
     @property
     def behind(self) -> float | None:
-        """Real time by which a run on hardware fell behind the rate that was asked for, s."""
+        """Real time by which a hardware run fell behind the requested rate, s."""
         value = self.file.attrs.get("behind")
         return None if value is None else float(value)
 
     @property
     def ended_by(self) -> str | None:
-        """What was wrong with the station, that ended the run; None if nothing was."""
+        """The station fault that ended the run; None if there was none."""
         text = self.file.attrs.get("ended_by")
         return None if text is None else str(text)
 
     @property
     def killed(self) -> bool:
-        """Whether the process that wrote it ended without closing it; what it flushed is here."""
+        """Whether the writing process ended without closing the log; flushed data is kept."""
         return not self.file.attrs.get(COMPLETE, True) and self.ended_by is None
 
     @property
     def events(self) -> list[str]:
-        """What changed at the station: lines of a time, s, and what."""
+        """Changes at the station: lines with a time, s, and a description."""
         return str(self.file.attrs.get("events", "")).splitlines()
 
     def close(self) -> None:
@@ -153,7 +154,7 @@ class RunLog:
 
     @property
     def version(self) -> str:
-        """Version of drake_dress that wrote it."""
+        """Version of drake_dress that wrote the log."""
         return str(self.file.attrs.get("version", ""))
 
     @property
@@ -173,21 +174,21 @@ class RunLog:
 
     @cached_property
     def loops(self) -> dict[str, IndexArray]:
-        """Name of an opening to the node indices around it."""
+        """Node indices of the loop around each opening, by name."""
         return {n: np.asarray(self.file[f"/garment/loops/{n}"], dtype=np.int64) for n in LOOPS}
 
     def garment_position(self, sample: int) -> FloatArray:
-        """Returns (n,3) the plant's garment at a sample, m."""
+        """Returns the plant's garment (n,3) at a sample, m."""
         return np.asarray(self.file["/garment/position"][sample], dtype=np.float64)
 
     def contact(self, sample: int) -> npt.NDArray[np.int8] | None:
-        """Returns (n,) 0 none, 1 stick, 2 slip at a sample; None where not logged."""
+        """Returns (n,) 0 none, 1 stick, 2 slip at a sample; None if not logged."""
         if "/garment/contact" not in self.file:
             return None
         return np.asarray(self.file["/garment/contact"][sample], dtype=np.int8)
 
     def contact_force(self, sample: int) -> FloatArray | None:
-        """Returns (n,3) of the person on the garment at a sample, N; None where not logged."""
+        """Returns forces (n,3) of the person on the garment at a sample, N; None if not logged."""
         if "/garment/contact_force" not in self.file:
             return None
         return np.asarray(self.file["/garment/contact_force"][sample], dtype=np.float64)
@@ -206,7 +207,7 @@ class RunLog:
     def capsules(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Ends (T,c,3), (T,c,3) and radius (c,) of the person's capsules, m.
 
-        Where the log has none: the four limbs between the joints, with the mean of their radii.
+        If the log has none: the four limbs between the joints, each with its joints' mean radius.
         """
         if "/human/capsule_radius" in self.file:
             return (
@@ -243,19 +244,19 @@ class RunLog:
 
     @cached_property
     def safety(self) -> IndexArray | None:
-        """(T,2) flags of `models.control.safety.Verdict`; left, right; None where not logged."""
+        """(T,2) flags of `models.control.safety.Verdict`; left, right; None if not logged."""
         if "/control/safety" not in self.file:
             return None
         return np.asarray(self.file["/control/safety"], dtype=np.int64)
 
     def solve_time(self, controller: str) -> FloatArray:
-        """Returns (T,) s of the `global` or `local` controller, NaN where no solve ended."""
+        """Returns (T,) of the `global` or `local` controller, s; NaN if no solve ended."""
         name = f"/control/{controller}/solve_time"
         return self._read(name) if name in self.file else np.full(len(self), np.nan)
 
     @cached_property
     def plan_delay(self) -> float | None:
-        """From what a plan answers to its use, s; None where the scenario does not say it."""
+        """Time from an observation to the use of its plan, s; None if not in the scenario."""
         try:
             scenario: Any = yaml.safe_load(self.scenario_text)
             return float(scenario["controller"]["global_mpc"]["delay"])
@@ -263,9 +264,9 @@ class RunLog:
             return None
 
     def solves(self, controller: str) -> IndexArray:
-        """Returns (T,) how many solves of it ended since the sample before.
+        """Returns (T,) number of solves of a controller since the previous sample.
 
-        A log of before they were counted says one where there is a time.
+        For older logs without this count, it is 1 for each sample that has a solve time.
         """
         name = f"/control/{controller}/solves"
         if name not in self.file:

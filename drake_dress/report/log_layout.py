@@ -1,4 +1,4 @@
-"""What a log is begun with: the constants of a run, and an empty series for each signal."""
+"""Initial content of a log: the constants of a run and an empty series for each signal."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from drake_dress.report.log_schema import (
     STAGE_NAMES,
 )
 
-_SMALL_CHUNK = 256  # samples to a chunk where a sample is a few numbers
+_SMALL_CHUNK = 256  # samples per chunk if a sample has few numbers
 _BULKY = 100  # numbers in a sample above which each sample is a compressed chunk of its own
 
 
 @dataclass(frozen=True)
 class LogContent:
-    """What a log says about a run as a whole; it decides which series the log has.
+    """Data about a run as a whole; it determines which series the log has.
 
     Attributes:
-        garment: the plant's.
-        scenario_text: the resolved scenario, YAML.
-        version: of drake_dress.
-        seed: of the run.
+        garment: The plant's garment.
+        scenario_text: The resolved scenario, YAML.
+        version: Version of drake_dress.
+        seed: Seed of the run.
         radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
-        joint_names: names of these six.
-        capsule_radius: (c,) of the person's capsules, m; None: no capsules are logged.
-        estimate_garment: the controller's garment; None: its positions are not logged.
-        bases: X_WB (4,4) of each arm, where samples have arms.
-        estimated: whether garment and person are estimates because the truth is not known; there
-            is no contact then.
+        joint_names: Names of these six joints.
+        capsule_radius: (c,) radii of the person's capsules, m; None: no capsules are logged.
+        estimate_garment: The controller's garment; None: its positions are not logged.
+        bases: X_WB (4,4) of each arm, if samples have arms.
+        estimated: Whether garment and person are estimates because the truth is not known; contact
+            is not logged then.
     """
 
     garment: GarmentMesh
@@ -61,11 +61,11 @@ def begin_log(file: h5py.File, content: LogContent) -> dict[str, h5py.Dataset]:
     """Writes the constants of a run to an empty file and creates its series.
 
     Args:
-        file: open for writing.
-        content: what the log says about the run.
+        file: HDF5 file, open for writing.
+        content: Data about the run.
 
     Returns:
-        The series by name, without samples; the first axis is that of the samples.
+        The series by name, without samples; their first axis is the sample.
     """
     _write_attributes(file, content)
     layout = _Layout(file)
@@ -85,7 +85,7 @@ def begin_log(file: h5py.File, content: LogContent) -> dict[str, h5py.Dataset]:
 
 
 def label(dataset: h5py.Dataset, unit: str | None, frame: str | None) -> None:
-    """Writes unit and frame as attributes of a dataset, where they are given."""
+    """Writes unit and frame, if given, as attributes of a dataset."""
     if unit is not None:
         dataset.attrs["unit"] = unit
     if frame is not None:
@@ -96,7 +96,7 @@ class _Layout:
     """Creates the datasets of a log.
 
     Attributes:
-        series: those with a row for each sample, by name.
+        series: Datasets with one row per sample, by name.
     """
 
     def __init__(self, file: h5py.File) -> None:
@@ -125,10 +125,10 @@ class _Layout:
         frame: str | None = None,
         dtype: str = "f4",
     ) -> h5py.Dataset:
-        """Returns a new series whose samples have this shape."""
+        """Adds a series whose samples have shape `shape`, and returns it."""
         bulky = int(np.prod(shape, dtype=int)) > _BULKY
-        # Compressed rows are a chunk each: a chunk that grew would move, and a killed process
-        # could leave the file pointing at its old place.
+        # Each compressed row is its own chunk: a growing chunk would be moved, and a killed process
+        # could leave the file pointing to the old location.
         options: dict[str, Any] = (
             {"compression": "gzip", "compression_opts": 1, "shuffle": True} if bulky else {}
         )
@@ -180,7 +180,7 @@ def _add_dressing(layout: _Layout) -> None:
 
 
 def _add_control(layout: _Layout) -> None:
-    """Adds stages, what safety cut, and the controllers' solves."""
+    """Adds stages, verdicts of the safety governor, and the controllers' solves."""
     stage = layout.add("/control/stage", (2,), "1", dtype="i1")
     stage.attrs["names"] = list(SIDES)
     stage.attrs["values"] = list(STAGE_NAMES)

@@ -1,4 +1,4 @@
-"""What a run's log holds, and under which names."""
+"""Names and shapes of the datasets in a run's log."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.sides import SIDES
 
 SCHEMA = "drake_dress.log/1"
-# Attribute: whether the writer closed the file; without it, nobody noted.
+# Attribute: whether the writer closed the file; if missing, this is not known.
 COMPLETE = "complete"
 LOOPS = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
 JOINT_NAMES = (
@@ -35,7 +35,7 @@ ARM_SERIES = (
 )
 STAGE_NAMES = ("prepare", "dress", "done")
 
-# Name to shape after the first axis (None: any length); a first axis "T" has a row a sample.
+# Name to shape (None: any length); a first axis "T" has one row per sample.
 _REQUIRED: dict[str, tuple[Any, ...]] = {
     "/time": ("T",),
     "/garment/faces": (None, 3),
@@ -63,10 +63,10 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
 
 
 def check_log(source: str, file: h5py.File) -> None:
-    """Holds an open log against the schema.
+    """Checks an open log against the schema.
 
     Raises:
-        UserError: another schema, or a dataset missing or misshapen.
+        UserError: The schema is another one, or a dataset is missing or has the wrong shape.
     """
     schema = file.attrs.get("schema")
     if schema != SCHEMA:

@@ -1,16 +1,17 @@
 """Writes the log of a run, `run.h5`, while it runs.
 
-The file must be of use however the run ends. A run that is interrupted closes it with all samples
-whole. A disk that is full ends the log before HDF5 is in trouble, which it does not survive: room
-for what is to be written is the file's own before it is, and space for the end is kept back. A
-process that is killed leaves what was flushed last: samples are written together about once a
-second, rows of bulky datasets are never rewritten, and HDF5 is told to keep its own bookkeeping in
-memory between flushes, so that the file on disk is consistent at all times but during a flush. That
-memory grows with every row; closing the file and opening it again, every few thousand samples,
-gives it back.
+The file must be usable however the run ends:
 
-Writing and flushing a second of samples takes tens of milliseconds, for which no command may wait:
-a thread does it. Who appends hears of a failure with a later sample.
+An interrupted run closes the file with all samples complete. A full disk ends the log before an
+HDF5 write fails, which HDF5 does not survive: space is allocated to the file before each write, and
+space for the end is reserved. A killed process leaves the data of the last flush. For this, samples
+are written in batches about once a second, rows of bulky datasets are never rewritten, and HDF5
+keeps its metadata in memory between flushes, so that the file on disk is consistent except during a
+flush. That memory grows with every row; closing and reopening the file every few thousand samples
+frees it.
+
+Writing and flushing one second of samples takes tens of milliseconds. A thread does it, so that no
+command waits. A write error is raised when a later sample is appended.
 """
 
 from __future__ import annotations
@@ -37,21 +38,22 @@ from drake_dress.report.log_layout import LogContent, begin_log, label
 from drake_dress.report.log_schema import COMPLETE
 
 _FLUSH_PERIOD = 1.0  # s of wall time
-# Kept back on the disk for the end, and what HDF5 writes beside samples, at most, bytes.
+# Disk space reserved for the end, and upper bound of what HDF5 writes besides samples, bytes.
 _RESERVE, _BESIDE = 16 << 20, 4 << 20
-_MOST_WAITING = 64  # samples that are kept in memory between flushes
-_MOST_BEHIND = 512  # samples that are kept while those before them are still being written
-_MOST_OPEN = 2000  # samples that are written before the file is opened anew
+_MOST_WAITING = 64  # samples kept in memory between flushes
+_MOST_BEHIND = 512  # samples kept while earlier ones are still being written
+_MOST_OPEN = 2000  # samples written before the file is reopened
 
 
 @dataclass(frozen=True)
 class ArmSample:
-    """What is logged of one arm.
+    """Logged data of one arm.
 
     Attributes:
         q, q_commanded: (7,) rad. v: (7,) rad/s. torque: (7,) N·m.
-        q_least, q_most: (7,) extremes since the sample before, rad; None: as now.
-        v_peak, torque_peak: (7,) largest magnitudes since then, rad/s, N·m; None: as now.
+        q_least, q_most: (7,) extremes since the previous sample, rad; None: current values.
+        v_peak, torque_peak: (7,) largest magnitudes since the previous sample, rad/s, N·m; None:
+            current values.
     """
 
     q: npt.ArrayLike
@@ -64,7 +66,7 @@ class ArmSample:
     torque_peak: npt.ArrayLike | None = None
 
     def rows(self) -> dict[str, npt.ArrayLike]:
-        """Returns what is written, by the series' names."""
+        """Returns the rows to write, by name of the series."""
         now = {
             "q_least": self.q,
             "q_most": self.q,
@@ -76,27 +78,28 @@ class ArmSample:
 
 @dataclass(frozen=True)
 class Sample:
-    """What is logged of one instant. Positions in the world frame, SI units.
+    """Logged data of one time. Positions in the world frame, SI units.
 
     Attributes:
-        time: s, greater than that of the sample before.
+        time: Time, greater than that of the previous sample, s.
         garment_position: (n,3) the plant's garment, m.
-        contact: (n,) 0 none, 1 stick, 2 slip; None where not known.
-        contact_force: (n,3) of the person on the garment, N; None where not known.
+        contact: (n,) 0 none, 1 stick, 2 slip; None if not known.
+        contact_force: (n,3) of the person on the garment, N; None if not known.
         joint_position: (6,3) shoulder, elbow, hand of left, then of right, m.
-        gripper_position: side to (3,), m.
-        gripper_force: side to (3,) of the garment on the gripper, N.
-        dressing: side to (s, l in m, theta in rad).
+        gripper_position: Side to (3,), m.
+        gripper_force: Side to (3,) of the garment on the gripper, N.
+        dressing: Side to (s, l in m, theta in rad).
         stage: (2,) 0 prepare, 1 dress, 2 done; left, right.
-        global_solve_time, local_solve_time: of the last solve, s; NaN where none ended.
-        global_solves, local_solves: that ended since the sample before; None: as many as times.
-        estimate_garment_position: (m,3) what the controller believed, m; None where it has none.
-        estimate_joint_position: (6,3), m; None where it has none.
-        capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None where not logged.
-        arms: of each side, where there are arms.
-        clearance: (3,) least distance since the sample before between the arms, and from the left
-            and the right one to the person, m, where there are arms.
-        safety: (2,) flags of `models.control.safety.Verdict` that came up since the sample before;
+        global_solve_time, local_solve_time: Duration of the last solve, s; NaN if none ended.
+        global_solves, local_solves: Number of solves since the previous sample; None: 1 if there is
+            a solve time, else 0.
+        estimate_garment_position: (m,3) the controller's estimate, m; None if there is none.
+        estimate_joint_position: (6,3) the controller's estimate, m; None if there is none.
+        capsule_a, capsule_b: (c,3) ends of the person's capsules, m; None if not logged.
+        arms: Data of the arm on each side, if there are arms.
+        clearance: (3,) least distance since the previous sample between the arms, and from the left
+            and the right one to the person, m, if there are arms.
+        safety: (2,) flags of `models.control.safety.Verdict` raised since the previous sample;
             left, right.
     """
 
@@ -126,15 +129,15 @@ class RunLogWriter:
     """Writes a run's log sample by sample; a context manager.
 
     Args:
-        path: of the HDF5 file; what was there is replaced.
-        content: what the log says about the run as a whole.
-        flush_period: wall time between flushes, s.
-        results: names of files beside the log that an earlier run may have left; they are removed
-            before its log is replaced, so that nothing of one run ever stands beside the other's.
+        path: Path of the HDF5 file; an existing file is replaced.
+        content: Data about the run as a whole.
+        flush_period: Wall time between flushes, s.
+        results: Names of result files of an earlier run in the same directory; they are removed
+            before its log is replaced, so that results of two runs never mix.
 
     Raises:
-        UserError: the file cannot be written.
-        ValueError: a sample has another shape, or is not later than the one before.
+        UserError: The file cannot be written.
+        ValueError: A sample has another shape, or is not later than the previous one.
     """
 
     def __init__(
@@ -145,7 +148,7 @@ class RunLogWriter:
         results: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
-        # before anything of an earlier run is touched: a run that cannot begin costs none of it
+        # first of all, since a run that cannot start must not destroy files of an earlier one
         self._reserve = reserved(self.path.parent, _RESERVE + _BESIDE)
         if self._reserve is None and os.access(self.path.parent, os.W_OK):
             raise self._no_room()
@@ -167,10 +170,10 @@ class RunLogWriter:
         self._flushed_at = clock.monotonic()
 
     def append(self, sample: Sample) -> None:
-        """Appends one sample, and has all written and flushed if the last flush was a while ago.
+        """Appends one sample; writes and flushes the samples when a flush is due.
 
         Raises:
-            OSError: the disk is full; what was appended before is in the file.
+            OSError: The disk is full; earlier samples are in the file.
         """
         if not sample.time > self._last_time:
             raise ValueError(f"sample at {sample.time} s is not later than {self._last_time} s")
@@ -180,7 +183,7 @@ class RunLogWriter:
                 raise ValueError(
                     f"{name}: shape {value.shape} given, {self._shapes[name]} expected"
                 )
-        # its own copy: what is waiting must not change
+        # copy: queued samples must not change
         self._waiting.append({name: value.copy() for name, value in row.items()})
         self._last_time = sample.time
         due = clock.monotonic() - self._flushed_at >= self._flush_period
@@ -188,19 +191,19 @@ class RunLogWriter:
             self._hand_over(due)
 
     def note(self, name: str, value: str | float) -> None:
-        """Writes something about the run as an attribute of the file, which may be closed.
+        """Writes an attribute of the file, which may be closed already.
 
         Raises:
-            OSError: there is no room for it.
+            OSError: There is not enough disk space.
         """
         with self._opened(len(str(value))) as file:
             file.attrs[name] = value
 
     def series(self, name: str, rows: npt.ArrayLike, unit: str) -> None:
-        """Writes a series of its own, that has not a row a sample.
+        """Writes a separate series, whose rows do not belong to samples.
 
         Raises:
-            OSError: there is no room for it.
+            OSError: There is not enough disk space.
         """
         data = np.asarray(rows, dtype=np.float64)
         with self._opened(data.nbytes) as file:
@@ -208,7 +211,7 @@ class RunLogWriter:
 
     @contextmanager
     def _opened(self, size: int) -> Iterator[h5py.File]:
-        """Gives the file, with room for so many bytes."""
+        """Yields the open file, with `size` bytes of disk space allocated."""
         self._drain()
         if self._file:
             self._make_room(size)
@@ -217,7 +220,7 @@ class RunLogWriter:
         number = os.open(self.path, os.O_RDWR)
         try:
             keep_room(number, os.fstat(number).st_size, size + _BESIDE)
-            # a lock of its own would stumble over ours
+            # HDF5's own lock would conflict with ours
             with h5py.File(self.path, "a", locking=self._lock is None) as file:
                 yield file
         finally:
@@ -225,10 +228,10 @@ class RunLogWriter:
             os.close(number)
 
     def close(self) -> None:
-        """Closes the file with as many whole samples as were appended; may be called twice.
+        """Closes the file with all appended samples complete; may be called twice.
 
         Raises:
-            OSError: the last ones could not be written.
+            OSError: The last samples could not be written.
         """
         if self._lock is None:
             return
@@ -257,14 +260,14 @@ class RunLogWriter:
         self.close()
 
     def _replace_log(self, path: str, results: Sequence[str]) -> tuple[h5py.File, int]:
-        """Removes what an earlier run left; returns the new file and its lock.
+        """Removes the results of an earlier run; returns the new file and its lock.
 
         Args:
-            path: as the caller wrote it, for messages.
-            results: names of files to remove.
+            path: Path as the caller wrote it, for messages.
+            results: Names of files to remove.
 
         Raises:
-            UserError: the file cannot be written.
+            UserError: The file cannot be written.
         """
         try:
             lock = locked(self.path)
@@ -279,10 +282,10 @@ class RunLogWriter:
             raise UserError(path, "", f"cannot be written as HDF5: {error}") from error
 
     def _secure_room(self, lock: int) -> None:
-        """Keeps room on the disk for the beginning and the end of the log.
+        """Reserves disk space for the beginning and the end of the log.
 
         Raises:
-            UserError: there is none; the file is removed.
+            UserError: There is not enough space; the file is removed.
         """
         try:
             if self._reserve is None:
@@ -330,12 +333,12 @@ class RunLogWriter:
         }
         for name, array in optional.items():
             if name in self._shapes:
-                # not the dataset's, which would wait for what is being written
+                # not the dataset's shape: reading it would wait for the thread that writes
                 rows[name] = np.full(self._shapes[name], np.nan) if array is None else array
         return rows
 
     def _hand_over(self, flush: bool) -> None:
-        """Has the samples since the last time written by the thread, unless it is still busy."""
+        """Passes the queued samples to the writing thread, unless it is still busy."""
         busy = self._writing is not None and not self._writing.done()
         if busy and len(self._waiting) < _MOST_BEHIND:
             return
@@ -351,17 +354,17 @@ class RunLogWriter:
             self._flushed_at = clock.monotonic()
 
     def _drain(self) -> None:
-        """Waits until the thread has written what it has.
+        """Waits until the thread has written its samples.
 
         Raises:
-            OSError: it could not.
+            OSError: The thread could not write them.
         """
         writing, self._writing = self._writing, None
         if writing is not None:
             writing.result()
 
     def _write(self, batch: list[dict[str, npt.NDArray[Any]]], flush: bool) -> None:
-        """Writes samples, all of a dataset at once."""
+        """Writes a batch of samples, one dataset after the other."""
         if batch:
             count = self._count + len(batch)
             for name in batch[0]:
@@ -376,17 +379,17 @@ class RunLogWriter:
                 self._open_anew()
 
     def _open_anew(self) -> None:
-        """Empties what HDF5 keeps of the file in memory, all of which is on the disk."""
+        """Reopens the file, to free HDF5's in-memory metadata, all of which is on disk."""
         self._file.close()
         self._file = _open(self.path, "r+")
         self._series = {name: self._file[name] for name in self._series}
         self._count_opened = self._count
 
     def _make_room(self, size: int) -> None:
-        """Has the file that is open have room for so many bytes more.
+        """Allocates `size` more bytes of disk space to the open file.
 
         Raises:
-            OSError: there is none.
+            OSError: There is not enough space.
         """
         assert self._lock is not None
         needed = self._unflushed + size
@@ -397,12 +400,12 @@ class RunLogWriter:
         self._unflushed = needed
 
     def _finish(self) -> None:
-        """Writes what is waiting and closes the file that is open."""
+        """Writes the queued samples and closes the open file."""
         try:
             self._make_room(_bytes(self._waiting))
             self._write(self._waiting, flush=False)
             self._waiting = []
-            # An interrupt may have come in the middle of a sample.
+            # An interrupt may have left a sample incomplete.
             for dataset in self._series.values():
                 if dataset.shape[0] != self._count:
                     dataset.resize(self._count, axis=0)
@@ -415,7 +418,7 @@ class RunLogWriter:
         return UserError(str(self.path), "", f"no room on the disk, expected {least} MB at least")
 
     def _release(self) -> None:
-        """Gives back what was kept back on the disk."""
+        """Releases the reserved disk space."""
         if self._reserve is not None:
             os.close(self._reserve)
             self._reserve = None
@@ -426,7 +429,7 @@ def _bytes(rows: list[dict[str, npt.NDArray[Any]]]) -> int:
 
 
 def _open(path: Path, mode: str) -> h5py.File:
-    """Returns a file that keeps its bookkeeping in memory until it is flushed."""
+    """Opens an HDF5 file that keeps its metadata in memory until it is flushed."""
     file = h5py.File(path, mode, locking=False)
     configuration = file.id.get_mdc_config()
     configuration.evictions_enabled = False

@@ -1,4 +1,4 @@
-"""What is measured at every sample of a log: the series behind the summary and the report."""
+"""Measures at every sample of a log, on which the summary and the report are based."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from drake_dress.models.dressing.linking import arm_linking_number
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
-# The arm's line is closed through the trunk: a point below the middle of the shoulders.
+# The arm's line is closed through a point in the trunk, this far below the shoulders' midpoint.
 _INTERIOR_BELOW_SHOULDERS = 0.1  # m
-EDGE_QUANTILE = 0.99  # of the edges, what "99 % of the edges" speaks of
+EDGE_QUANTILE = 0.99  # quantile of the edge strains, reported as "99 % of the edges"
 
 
 @dataclass(frozen=True)
@@ -23,16 +23,16 @@ class Measures:
     """Series over the T samples of a log; the second axis is left, right.
 
     Attributes:
-        finite: (T,) every node and force is a finite number. The others are NaN or 0 where not.
+        finite: (T,) whether every node and force is finite. If not, the other series are NaN or 0.
         linking: (T,2) linking number of the armhole loop and the arm's line.
-        cuff_linking: (T,2) that of the cuff loop.
-        edge_strain: (T,) 99th percentile over the edges of length / rest length - 1. An edge that
-            is shorter than at rest stands for wrinkles that the mesh does not have.
-        edge_strain_max: (T,) largest over the edges.
+        cuff_linking: (T,2) linking number of the cuff loop and the arm's line.
+        edge_strain: (T,) 99th percentile over the edges of length / rest length - 1; signed,
+            since a shortened edge represents wrinkles below mesh resolution.
+        edge_strain_max: (T,) largest strain of an edge.
         penetration: (T,) greatest depth of nodes, edge midpoints and face centroids in the
-            person's capsules, m; 0 where nothing penetrates.
+            person's capsules, m; 0 if nothing penetrates.
         gripper_force: (T,2) magnitude, N.
-        node_contact_force: (T,) largest at one node, N.
+        node_contact_force: (T,) largest magnitude at one node, N.
         total_contact_force: (T,) sum of the nodes' magnitudes, N.
     """
 
@@ -52,7 +52,7 @@ class Measures:
 
 
 def measure(log: RunLog) -> Measures:
-    """Measures a log, from the garment's nodes and the person's capsules in it."""
+    """Computes the measures of a log from its garment nodes and person capsules."""
     count = len(log)
     edges = unique_edges(log.faces)
     rest = np.linalg.norm(np.subtract(*log.rest_position[edges.T]), axis=1)
@@ -69,7 +69,7 @@ def measure(log: RunLog) -> Measures:
         if contact is not None:
             size = np.linalg.norm(contact, axis=1)
             node_force[i], total_force[i] = size.max(initial=0.0), size.sum()
-        # a station without truth has no force while an arm is silent
+        # a station without truth reports no force while an arm sends no messages
         known = log.estimated or bool(np.isfinite(force[i]).all())
         finite[i] = bool(np.isfinite(x).all()) and known
         if not finite[i]:
@@ -98,7 +98,7 @@ def measure(log: RunLog) -> Measures:
 
 
 def unique_edges(faces: IntArray) -> IndexArray:
-    """Returns (E,2) the edges of triangles (F,3), each once."""
+    """Returns the unique edges (E,2) of triangles (F,3)."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     return np.unique(np.sort(pairs.astype(np.int64), axis=1), axis=0)
 
@@ -111,15 +111,15 @@ def penetration_depth(
     b: FloatArray,
     radius: FloatArray,
 ) -> float:
-    """Returns how deep nodes, edge midpoints and face centroids lie in capsules, m; at least 0.
+    """Returns the greatest depth of nodes, edge midpoints and centroids in capsules, m; or 0.
 
     Args:
         position: (n,3) nodes, m.
         faces: (F,3) node indices.
         edges: (E,2) node indices.
         a: (c,3) first ends of the capsules, m.
-        b: (c,3) their second ends, m.
-        radius: (c,), m.
+        b: (c,3) second ends of the capsules, m.
+        radius: (c,) radii of the capsules, m.
     """
     x = position.astype(np.float64)
     middles = 0.5 * (x[edges[:, 0]] + x[edges[:, 1]])

@@ -1,4 +1,4 @@
-"""A self-contained page to read: its style, and charts inside it."""
+"""A self-contained HTML page: its style and embedded charts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def html_page(title: str, parts: Sequence[str]) -> str:
-    """Returns a page of HTML parts."""
+    """Returns an HTML page composed of parts."""
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -30,7 +30,7 @@ def html_page(title: str, parts: Sequence[str]) -> str:
 def chart(
     width: float, height: float, rows: int = 1, columns: int = 1
 ) -> tuple[Figure, list[Axes]]:
-    """Returns an empty chart of so many inches; axes below each other share what they run over."""
+    """Returns an empty chart, size in inches; axes in one column share their x axis."""
     figure = new_figure(width, height, layout="constrained")
     axes = list(np.ravel(figure.subplots(rows, columns, sharex=columns == 1)))
     for ax in axes:
@@ -40,8 +40,8 @@ def chart(
 
 
 def embedded(figure: Figure, title: str, note: str = "") -> str:
-    """Returns a chart as a picture inside the page."""
-    # As an image of its own: identifiers of several inline pictures would clash.
+    """Returns a chart as an image embedded in the page."""
+    # As a separate image: identifiers of several inline SVGs would clash.
     data = base64.b64encode(as_svg(figure)).decode("ascii")
     return f'<figure><h3>{title}</h3><img alt="{title}" src="data:image/svg+xml;base64,{data}">' + (
         f"<figcaption>{note}</figcaption></figure>" if note else "</figure>"

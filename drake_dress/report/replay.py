@@ -1,4 +1,4 @@
-"""A log in Drake's Meshcat, with a slider."""
+"""Replay of a log in Drake's Meshcat, with a time slider."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def show_replay(path: str | Path, port: int | None = None) -> int:
     """Shows a log in Meshcat on localhost until its Stop button or Ctrl-C; returns 0.
 
     Args:
-        path: of the run.h5.
-        port: of the page; None: the first free one from 7000.
+        path: Path of the run.h5.
+        port: Port of the page; None: the first free one from 7000.
 
     Raises:
-        UserError: the log or the port cannot be used.
+        UserError: The log or the port cannot be used.
     """
     try:
         return _shown(path, port)
@@ -55,20 +55,20 @@ def _shown(path: str | Path, port: int | None) -> int:
             replay = MeshcatReplay(meshcat, log)
             while not (replay.stopped or interrupt.wait(_POLL_PERIOD)):
                 replay.update()
-    # Ctrl-C is the usual end, other signals are not.
+    # Ctrl-C is the normal way to end; other signals are not.
     return 0 if interrupt.number == signal.SIGINT else interrupt.status
 
 
 class MeshcatReplay:
-    """Draws the sample of a log that the page's slider asks for.
+    """Draws the sample of a log at the time of the page's slider.
 
     Args:
-        meshcat: to draw in; gets a slider and two buttons.
-        log: with at least one sample.
+        meshcat: Meshcat to draw in; a slider and two buttons are added to it.
+        log: Log with at least one sample.
 
     Attributes:
-        sample: index of the one shown.
-        scene: what it is drawn with.
+        sample: Index of the sample shown.
+        scene: Scene that draws garment, grippers and stages.
     """
 
     def __init__(self, meshcat: Meshcat, log: RunLog) -> None:
@@ -82,7 +82,7 @@ class MeshcatReplay:
         start, end = float(log.time[0]), float(log.time[-1])
         step = max(1e-3, (end - start) / 1000.0)
         self._end = end
-        # A slider needs some range even where the log has a single sample.
+        # A slider needs a range even if the log has a single sample.
         meshcat.AddSlider(
             _TIME_SLIDER, start, max(end, start + step), step, start, "ArrowLeft", "ArrowRight"
         )
@@ -101,7 +101,7 @@ class MeshcatReplay:
         return self._meshcat.GetButtonClicks(_STOP_BUTTON) > 0
 
     def update(self) -> None:
-        """Moves on when playing, and draws the sample nearest to the slider's time if it is new."""
+        """Advances time while playing; draws the sample nearest to the slider if it has changed."""
         now = clock.monotonic()
         passed, self._last_update = now - self._last_update, now
         clicks = self._meshcat.GetButtonClicks(_PLAY_BUTTON)

@@ -1,8 +1,9 @@
-"""A dressing as one HTML file that moves: no server, no library, nothing loaded from elsewhere.
+"""An animated dressing as one self-contained HTML file: no server, no library, no downloads.
 
-The garment's nodes are quantised to at least 0.1 mm, each frame is stored as the difference to
-the frame before, low and high bytes apart, and the whole is deflated: a minute of 3,700 nodes
-takes some ten megabytes. The page inflates it with the browser's own DecompressionStream.
+The garment's nodes are quantised with a step of at least 0.1 mm. Each frame is stored as the
+difference to the previous one, with low and high bytes separate, and compressed with deflate. One
+minute of 3,700 nodes takes about ten megabytes. The page inflates it with the browser's own
+DecompressionStream.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.stills import floor_height
 
 MAX_BYTES = 25_000_000
-# Nodes times frames that are looked at: of hours of a garment there are more than memory holds.
+# Limit of nodes times frames: hours of a garment would not fit in memory.
 MAX_NODES = 10_000_000
 _RESOLUTION = 1e-4  # m
 _INT16_STEPS = 65_000
@@ -43,14 +44,14 @@ def write_replay_html(
     """Writes the replay of a log.
 
     Args:
-        log: with at least one sample.
-        path: of the HTML file.
-        fps: frames a second of simulated time; the page interpolates. Halved until the file fits.
-        max_bytes: size the file keeps below.
-        max_nodes: nodes times frames that it keeps below.
+        log: Log with at least one sample.
+        path: Path of the HTML file.
+        fps: Frames per second of simulated time; the page interpolates. Halved until the file fits.
+        max_bytes: Limit of the file size.
+        max_nodes: Limit of nodes times frames.
 
     Raises:
-        UserError: the log has no samples.
+        UserError: The log has no samples.
     """
     if not len(log):
         raise UserError(str(log.path), "/time", "holds no sample; expected at least one")
@@ -68,7 +69,7 @@ def write_replay_html(
 def _page(log: RunLog, fps: float) -> bytes:
     frames = _frames(log.time, fps)
     position = np.stack([log.garment_position(i) for i in frames])
-    # A run that blew up is worth watching up to there.
+    # A diverged run is shown until it diverges.
     finite = np.isfinite(position).all(axis=(1, 2))
     good = max(1, len(frames) if finite.all() else int(np.argmin(finite)))
     frames, position = frames[:good], np.nan_to_num(position[:good])
@@ -120,11 +121,11 @@ def _page(log: RunLog, fps: float) -> bytes:
 
 
 def _arm_blobs(poses: FloatArray) -> dict[str, str]:
-    """Returns the links' solids, one after the other, and where they are at (k,a,8,4,4) poses."""
+    """Returns the concatenated solids of the links, and their (k,a,8,4,4) poses packed."""
     if not poses.shape[1]:
         return dict.fromkeys(("armSize", "armVertices", "armNormals", "armFaces", "armPoses"), "")
     solids = panda_solids()
-    # of each link x, y, z (quaternion w last) and its place
+    # for each link its quaternion (x, y, z, w) and its position
     turn = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat()
     placed = np.hstack([turn, poses[..., :3, 3].reshape(-1, 3)])
     count = np.array([(len(s.vertices), s.faces.size) for s in solids])
@@ -142,7 +143,7 @@ def _arm_blobs(poses: FloatArray) -> dict[str, str]:
 
 
 def _frames(time: FloatArray, fps: float) -> IndexArray:
-    """Returns the samples nearest to a regular grid, first and last among them."""
+    """Returns the samples nearest to a regular time grid, including the first and the last."""
     count = max(1, round((time[-1] - time[0]) * fps)) + 1
     wanted = np.linspace(time[0], time[-1], count)
     right = np.clip(np.searchsorted(time, wanted), 1, max(1, len(time) - 1))
@@ -153,11 +154,11 @@ def _frames(time: FloatArray, fps: float) -> IndexArray:
 
 
 def _encode(steps: IndexArray) -> str:
-    """Returns differences in time of (frames, n, 3) modulo 2^16, byte planes apart, deflated."""
+    """Returns the deflated time differences of (frames, n, 3) modulo 2^16, by byte plane."""
     difference = np.diff(steps, axis=0, prepend=0).astype(np.uint16)
-    # x, y and z of a frame apart as well: neighbours then resemble each other.
+    # Separate x, y and z of a frame, too, so that adjacent values are similar.
     planes = difference.transpose(0, 2, 1).ravel()
-    # Zigzag: small negative differences get a zero high byte too.
+    # Zigzag encoding gives small negative differences a zero high byte, too.
     signed = planes.view(np.int16).astype(np.int32)
     zigzag = ((signed << 1) ^ (signed >> 15)).astype(np.uint16)
     raw = (zigzag & 0xFF).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes()

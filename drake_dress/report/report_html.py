@@ -1,4 +1,4 @@
-"""A run as one page to read, `report.html`: verdict, limits, course, pictures; self-contained."""
+"""Self-contained report of a run, `report.html`: verdict, limits, pictures and charts."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def write_report(
     """Writes `report.html` from `run.h5` and `summary.json` beside it; returns its path.
 
     Args:
-        run_dir: holds both.
-        rules: the limits that were asked.
-        measures: of this log where they are known already; computed otherwise.
+        run_dir: Directory with both files.
+        rules: Limits to compare with.
+        measures: Measures of this log, if already known; computed otherwise.
 
     Raises:
-        UserError: one of the two is missing or cannot be used.
+        UserError: One of the two files is missing or cannot be used.
     """
     run_dir = Path(run_dir)
     summary = read_summary(run_dir / "summary.json")
@@ -87,7 +87,7 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
 
 
 class _Row(NamedTuple):
-    """A row of the table of limits; `met` is None where nothing is asked or known."""
+    """A row of the table of limits; `met` is None if there is no limit or no value."""
 
     name: str
     asked: str
@@ -126,12 +126,12 @@ def _at_most(
     """Returns the row of a figure that must not exceed a limit.
 
     Args:
-        summary: of the run.
-        name: of the figure, for the reader.
-        key: of the figure in the summary.
-        limit: in the summary's unit.
-        text: format of figure and limit, with the unit shown.
-        scale: from the summary's unit to the one shown.
+        summary: Summary of the run.
+        name: Displayed name of the figure.
+        key: Key of the figure in the summary.
+        limit: Limit in the summary's unit.
+        text: Format of figure and limit, with the displayed unit.
+        scale: Factor from the summary's unit to the displayed one.
     """
     value = summary.get(key)
     met = None if value is None else bool(value <= limit)
@@ -139,7 +139,7 @@ def _at_most(
 
 
 def _sleeve_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
-    """Returns how far each sleeve is on, and whether arm and hand are through it."""
+    """Returns the progress of each sleeve, and whether the arm and hand are through it."""
     rows = []
     for side in SIDES:
         s = summary.get(f"s_{side}")
@@ -159,7 +159,7 @@ def _sleeve_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
 
 
 def _garment_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
-    """Returns penetration, strain and contact force of a garment whose truth is known."""
+    """Returns penetration, strain and contact force, for a run whose true garment is known."""
     return [
         _at_most(
             summary,
@@ -187,7 +187,7 @@ def _garment_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
 
 
 def _arm_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
-    """Returns the distances, joints and tracking of robot arms."""
+    """Returns distances, joint limits and tracking errors of the robot arms."""
     rows = []
     least = rules.min_arm_distance
     for name, key in (
@@ -210,7 +210,7 @@ def _arm_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
 
 
 def _safety(summary: dict[str, Any]) -> str:
-    """Returns a line on what the safety governor cut; empty where it cut nothing."""
+    """Returns a line on the requests that the safety governor limited; empty if none."""
     cuts = summary.get("safety_cut_s") or {}
     told = [
         f"{side}: " + ", ".join(f"{name} {time:.1f} s" for name, time in cuts[side].items())

@@ -1,4 +1,4 @@
-"""Still pictures of a dressing, rendered by Drake without a display."""
+"""Still images of a dressing, rendered by Drake without a display."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ _FLOOR_COLOR = (0.76, 0.77, 0.79)
 _BACKGROUND = (0.95, 0.96, 0.97)
 _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
-# A glTF file, such as a link of an arm, makes VTK shade physically, which is this much darker.
+# A glTF mesh, such as an arm's link, makes VTK use physically based shading, darker by this factor.
 _PHYSICAL = 2.6
-_LINING_OFFSET = 2e-3  # m, so that the lining does not fight with the outside for the pixel
+_LINING_OFFSET = 2e-3  # m, avoids z-fighting between the lining and the outside
 
 
 @dataclass(frozen=True)
 class CameraPose:
-    """Where a picture is taken from.
+    """Position and view of a camera.
 
     Attributes:
         eye: (3,) p_WC, m.
-        target: (3,) the point in the middle of the picture, m.
-        field_of_view: vertical, rad.
+        target: (3,) the point in the middle of the image, m.
+        field_of_view: Vertical field of view, rad.
     """
 
     eye: tuple[float, float, float]
@@ -73,16 +73,16 @@ def render_still(
     floor: float | None = None,
     arms: FloatArray | None = None,
 ) -> npt.NDArray[np.uint8]:
-    """Returns a picture (height, width, 3), RGB.
+    """Returns an image (height, width, 3), RGB.
 
     Args:
-        faces: (F,3) of the garment; a triangle's outside is where its normal points.
+        faces: (F,3) triangles of the garment; their normals point outward.
         position: (n,3) nodes, world, m.
-        person: ends (c,3), (c,3) and radii (c,) of the person's capsules, world, m.
-        grippers: (g,3), world, m.
-        camera: where it is taken from.
-        size: width, height in pixels.
-        floor: height of the floor, m; None: just below everything shown.
+        person: Ends (c,3), (c,3) and radii (c,) of the person's capsules, world, m.
+        grippers: (g,3) positions of the grippers, world, m.
+        camera: Camera pose.
+        size: Width and height, pixels.
+        floor: Height of the floor, m; None: just below garment and person.
         arms: (a,8,4,4) X_WL of base and links of robot arms.
     """
     with_arms = arms is not None and len(arms) > 0
@@ -91,7 +91,7 @@ def render_still(
     scene.add_capsules(*person, SKIN_COLOR)
     if arms is not None:
         scene.add_arms(arms)
-    # with arms, it is only what their hands hold
+    # with arms, the box is only the held cloth between the fingers
     gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
@@ -105,7 +105,7 @@ def render_still(
 def floor_height(
     position: FloatArray, capsule_a: FloatArray, capsule_b: FloatArray, capsule_radius: FloatArray
 ) -> float:
-    """Returns a height below garment (n,3) and capsules (c,3), (c,3), (c,), m."""
+    """Returns a height just below the garment (n,3) and capsules (c,3), (c,3), (c,), m."""
     low = float(position[:, 2].min())
     if len(capsule_radius):
         ends = np.minimum(capsule_a[:, 2], capsule_b[:, 2]) - capsule_radius
@@ -114,7 +114,7 @@ def floor_height(
 
 
 def node_normals(faces: IntArray, position: FloatArray) -> FloatArray:
-    """Returns (n,3) unit normals at the nodes, the area-weighted mean of the triangles'."""
+    """Returns unit normals (n,3) at the nodes: area-weighted means of the triangle normals."""
     p = position[faces]
     face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     normals = np.zeros_like(position)
@@ -125,7 +125,7 @@ def node_normals(faces: IntArray, position: FloatArray) -> FloatArray:
 
 
 class _Scene:
-    """What a picture shows: shapes in the world, each of one colour."""
+    """The scene of an image: shapes in the world, each of one colour."""
 
     def __init__(self, with_arms: bool) -> None:
         self._graph: SceneGraph = SceneGraph()
@@ -134,7 +134,7 @@ class _Scene:
         self._source = self._graph.RegisterSource("still")
 
     def add(self, shape: Shape, X_WG: RigidTransform, color: _Color | None = None) -> None:
-        """Adds a shape; one of a file that has its own colours is given none."""
+        """Adds a shape; pass no colour for a mesh file that has its own."""
         name = f"g{self._graph.model_inspector().num_geometries()}"
         instance = GeometryInstance(X_WG, shape, name)
         properties = PerceptionProperties()
@@ -145,14 +145,14 @@ class _Scene:
         self._graph.RegisterAnchoredGeometry(self._source, instance)
 
     def add_garment(self, faces: IntArray, position: FloatArray) -> None:
-        """Adds a garment (n,3), m: its outside, and the lining behind it."""
+        """Adds a garment with nodes (n,3), m: its outside, and the lining behind it."""
         normals = node_normals(faces, position)
         self.add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
         lining = position - _LINING_OFFSET * normals
         self.add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
 
     def add_arms(self, poses: FloatArray) -> None:
-        """Adds robot arms with base and links at `poses` (a,8,4,4)."""
+        """Adds robot arms with their bases and links at `poses` (a,8,4,4)."""
         for arm in poses:
             for X_WL, meshes in zip(arm, link_meshes(), strict=True):
                 for path, X_LM in meshes:
@@ -161,7 +161,7 @@ class _Scene:
     def add_capsules(
         self, first: FloatArray, second: FloatArray, radius: FloatArray, color: _Color
     ) -> None:
-        """Adds capsules with ends (c,3), (c,3) and radii (c,), m; one without length is a ball."""
+        """Adds capsules with ends (c,3), (c,3) and radii (c,), m; spheres for zero length."""
         for a, b, r in zip(first, second, radius, strict=True):
             length = float(np.linalg.norm(b - a))
             if length > 1e-6:
@@ -171,7 +171,7 @@ class _Scene:
                 self.add(Sphere(r), RigidTransform(a), color)
 
     def picture(self, camera: CameraPose, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
-        """Returns what the camera sees, (height, width, 3), RGB."""
+        """Returns the camera image (height, width, 3), RGB."""
         graph = self._graph
         query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
         image = query.RenderColorImage(_camera(camera, size), graph.world_frame_id(), _pose(camera))
@@ -187,8 +187,8 @@ def _mesh(faces: IntArray, position: FloatArray, normals: FloatArray) -> Mesh:
 
 
 def _render_parameters(brightness: float) -> RenderEngineVtkParams:
-    # A key light from the front left above casts the shadows; lamps on all sides, which cast
-    # none, keep the shaded side readable.
+    # A key light from the upper front left casts shadows; lamps on all sides, without shadows,
+    # brighten the shaded side.
     def lamp(x: float, y: float, z: float, intensity: float) -> LightParameter:
         return LightParameter(
             type="point", frame="world", position=(x, y, z), intensity=brightness * intensity

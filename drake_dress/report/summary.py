@@ -1,8 +1,8 @@
-"""The verdict on a run, `summary.json`: computed from what the log holds, not from the controller.
+"""The verdict on a run, `summary.json`, computed from the log, not from the controller.
 
-Progress s alone proves nothing: an armhole that slid up beside the arm reads s = 2 too. So the arm
-must be inside by the linking number of the armhole's nodes with the arm's line, and force,
-penetration and strain must have stayed within their limits at every sample.
+Progress s alone proves nothing: an armhole that slid up beside the arm gives s = 2, too. Therefore,
+the linking number of the armhole loop and the arm's line must show that the arm is inside, and
+force, penetration and strain must stay within their limits at every sample.
 """
 
 from __future__ import annotations
@@ -29,15 +29,16 @@ from drake_dress.report.measures import Measures, first_lasting, measure
 
 @dataclass(frozen=True)
 class SuccessRules:
-    """What a dressing must reach to count.
+    """Success criteria of a dressing.
 
     Attributes:
-        min_s: of both sleeves at the end; 2 is the shoulder.
-        max_gripper_force: at every sample, N.
-        max_penetration: of garment into person at every sample, m.
-        max_edge_strain: of 99 % of the edges at every sample.
-        min_arm_distance: of arms to each other, and of arms but for their hands to the person, at
-            every sample, m. No joint may ever be beyond its limits of position, speed, torque.
+        min_s: Least progress s of both sleeves at the end; 2 is the shoulder.
+        max_gripper_force: Limit of the gripper force at every sample, N.
+        max_penetration: Limit of the garment's penetration into the person at every sample, m.
+        max_edge_strain: Limit of the strain of 99 % of the edges at every sample.
+        min_arm_distance: Least distance between the arms, and of the arms without their hands to
+            the person, at every sample, m. Joints must also stay within their limits of position,
+            speed and torque.
     """
 
     min_s: float = 1.9
@@ -54,31 +55,30 @@ def summarize(
     rules: SuccessRules | None = None,
     measures: Measures | None = None,
 ) -> dict[str, Any]:
-    """Returns what `summary.json` holds; figures that do not exist are None.
+    """Returns the content of `summary.json`; figures that do not exist are None.
 
-    `armhole_to_shoulder_left_m`, `…_right_m` are what is left of the way at the end, along the arm.
+    `armhole_to_shoulder_left_m`, `…_right_m` are the remaining distances along the arm at the end.
     Beyond the fixed keys: `linking_number_left`, `…_right` (final), `simulated_time_s`,
     `max_edge_strain_all`, `max_total_contact_force_N`. `max_edge_strain` is the 99th percentile
-    over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` the
-    worst edge at its worst sample. `max_contact_force_N` is the largest at one node,
-    `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
+    over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` is the
+    strain of the worst edge at its worst sample. `max_contact_force_N` is the largest force at one
+    node, `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
     time from which both sleeves stay on (s and linking number). `late_plans` is the share of the
-    global controller's solves that took longer than the delay that is modelled.
-    `layers_crossed_at_end` counts edges that pierce another layer. `safety_cut_s` is, for each side
-    and each flag of the safety governor that came up, the time of the samples that have it; None
-    where not logged. Of a run on hardware, too: `command_rate_hz`, `command_latency_ms` (from the
-    sending of a status to the command that answers it), `start_up_s` (to the first command),
-    `fell_behind_s` (real time by which it was slower than asked) and `dropped_messages` (repeated
-    and late ones of each source).
-    Of a run with arms: `max_joint_speed_share`, `max_joint_torque_share` of limits,
-    `min_joint_margin_rad`, `arm_tracking_mm` (of grippers from where joints are commanded to be),
+    global controller's solves that took longer than the modelled delay. `layers_crossed_at_end`
+    counts edges that pierce another layer. `safety_cut_s` gives, for each side and each flag that
+    the safety governor raised, the total time of the samples with that flag; None if not logged.
+    Hardware runs add `command_rate_hz`, `command_latency_ms` (from the sending of a status to the
+    command that responds to it), `start_up_s` (to the first command), `fell_behind_s` (real time by
+    which the run fell behind the requested rate) and `dropped_messages` (repeated and late messages
+    by source). Runs with arms add `max_joint_speed_share`, `max_joint_torque_share` (of the
+    limits), `min_joint_margin_rad`, `arm_tracking_mm` (gripper tracking error),
     `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand).
 
     Args:
-        log: of the run.
-        wall_time: what the simulation took, s.
-        rules: of success.
-        measures: of this log where they are known already; computed otherwise.
+        log: Log of the run.
+        wall_time: Wall time of the simulation, s.
+        rules: Success criteria.
+        measures: Measures of this log, if already known; computed otherwise.
     """
     rules = rules or SuccessRules()
     m = measures if measures is not None else measure(log)
@@ -95,15 +95,15 @@ def summarize(
 
 
 def write_summary(summary: dict[str, Any], path: str | Path) -> None:
-    """Writes a summary as strict JSON (no NaN in it)."""
+    """Writes a summary as strict JSON (without NaN)."""
     write_text(Path(path), json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:
-    """Returns the summary that a run wrote.
+    """Reads the summary of a run.
 
     Raises:
-        UserError: the file is missing or cannot be used.
+        UserError: The file is missing or cannot be used.
     """
     try:
         summary = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -117,7 +117,7 @@ def read_summary(path: str | Path) -> dict[str, Any]:
 
 
 def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
-    """Returns the first rule that was broken, in words with the figure; None if none was."""
+    """Returns a sentence on the first broken rule, with its figure; None if there is none."""
     if log.ended_by is not None:
         return log.ended_by
     if not len(log):
@@ -126,7 +126,7 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
         t = log.time[np.argmin(m.finite)]
         return f"simulation diverged: positions or forces not finite at t = {t:.2f} s"
     broken = _sleeve_that_is_off(log, m, rules) or _too_large_force(log, m, rules)
-    # how far an estimate is inside the person, or strained, tells of the estimate
+    # penetration and strain of an estimate reflect errors of the estimate, so do not judge them
     return broken if broken or log.estimated else _damage(log, m, rules)
 
 
@@ -155,7 +155,7 @@ def _too_large_force(log: RunLog, m: Measures, rules: SuccessRules) -> str | Non
 
 
 def _damage(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
-    """Returns what the garment does that it must not do, to the person or to itself."""
+    """Returns a sentence on excessive penetration or strain; None if there is none."""
     i = int(np.argmax(m.penetration))
     if m.penetration[i] > rules.max_penetration:
         limit = f"{1e3 * m.penetration[i]:.1f} mm > {1e3 * rules.max_penetration:g} mm"
@@ -168,7 +168,7 @@ def _damage(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
 
 
 def _sleeve_figures(log: RunLog, m: Measures) -> dict[str, Any]:
-    """Returns how far each sleeve is on at the end."""
+    """Returns the final progress of each sleeve."""
     figures: dict[str, Any] = {}
     for side in SIDES:
         figures[f"s_{side}"] = _number(log.dressing[side][-1, 0]) if len(log) else None
@@ -185,7 +185,7 @@ def _sleeve_figures(log: RunLog, m: Measures) -> dict[str, Any]:
 def _course_figures(
     log: RunLog, m: Measures, rules: SuccessRules, wall_time: float
 ) -> dict[str, Any]:
-    """Returns times, and the largest forces, strains and penetrations of the run."""
+    """Returns times and the largest forces, strains and penetrations of the run."""
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
     on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
     dressed = first_lasting(on.all(axis=1))
@@ -229,7 +229,7 @@ def _duration(log: RunLog) -> float:
 
 
 def _to_shoulder(log: RunLog, side: Side) -> float | None:
-    """Returns how far the armhole is from the shoulder at the end, along the arm, m."""
+    """Returns the final distance of the armhole from the shoulder along the arm, m."""
     if not len(log):
         return None
     s = log.dressing[side][-1, 0]
@@ -241,9 +241,10 @@ def _to_shoulder(log: RunLog, side: Side) -> float | None:
 
 
 def _layers_crossed(log: RunLog) -> int | None:
-    """Returns how many edges pierce another layer of the garment at the end of a run.
+    """Returns the number of edges that pierce another layer of the garment at the end of a run.
 
-    What is joined to a triangle by an edge is the same layer. None where nothing is known.
+    Nodes connected to a triangle by an edge belong to the same layer. None if positions are not
+    finite or not logged.
     """
     x = log.garment_position(-1) if len(log) else None
     if x is None or not np.isfinite(x).all():
@@ -253,7 +254,7 @@ def _layers_crossed(log: RunLog) -> int | None:
 
 
 def _late_plans(log: RunLog) -> float | None:
-    """Returns which share of the global solves took longer than is modelled."""
+    """Returns the share of global solves that took longer than the modelled delay."""
     solve = log.solve_time("global")
     solve = solve[np.isfinite(solve)]
     if log.plan_delay is None or not len(solve):
@@ -273,7 +274,7 @@ def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:
 
 
 def _arm_reason(log: RunLog, arms: ArmMeasures | None, rules: SuccessRules) -> str | None:
-    """Returns the first rule that arms broke, with the figure; None if none was."""
+    """Returns a sentence on the first rule that the arms broke; None if there is none."""
     if arms is None or not len(log):
         return None
     if not arms.kept.all():
@@ -308,7 +309,7 @@ def _arm_figures(arms: ArmMeasures | None) -> dict[str, Any]:
 
 
 def _command_figures(log: RunLog) -> dict[str, Any]:
-    """Returns rate, latency and start-up of commands to hardware; nothing of a simulation."""
+    """Returns rate, latency and start-up time of commands to hardware; empty for a simulation."""
     if log.commands is None or len(log.commands[0]) < 2:
         return {}
     times, ages = log.commands

@@ -1,4 +1,4 @@
-"""A page of Meshcat on this machine."""
+"""A Meshcat page on this machine."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from drake_dress.errors import UserError
 
-# Where Meshcat looks for a port when none is given.
+# Range in which Meshcat looks for a port if none is given.
 _FIRST, _LAST = 7000, 7999
 
 
 def open_page(port: int | None = None) -> Meshcat:
-    """Returns a page that listens on localhost only.
+    """Opens a Meshcat page that listens on localhost only.
 
     Args:
-        port: from 1024 to 65535; None: the first free one from 7000.
+        port: Port from 1024 to 65535; None: the first free one from 7000.
 
     Raises:
-        UserError: the port is in use, or cannot be opened, or none is free.
+        UserError: The port is in use or cannot be opened, or no port is free.
     """
     try:
         return Meshcat(MeshcatParams(host="localhost", port=port))

@@ -1,1 +1,1 @@
-"""Drake systems, one a file."""
+"""Drake systems, one per file."""

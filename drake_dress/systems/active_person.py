@@ -1,4 +1,4 @@
-"""A person who reaches, withdraws, waves and turns as it wants."""
+"""A person who moves on their own: reaches, withdraws, waves and turns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drake_dress.models.sides import SIDES
 
 
 class ActivePerson(LeafSystem):
-    """Moves both arms and the torso by its own will; see `models/human/active.py`.
+    """Generates voluntary motion of both arms and the torso; see `models/human/active.py`.
 
     .. pydrake_system::
 
@@ -31,20 +31,21 @@ class ActivePerson(LeafSystem):
         - stance
 
     person_state: (2k,) angles, rad, then rates, rad/s, of the person's k joints. garment_position:
-    (3n,) of the true garment, m, world: the person feels and sees where the armholes are.
-    set_point, set_point_rate: (8,) of left, then right arm: abduction, extension, rotation, elbow,
-    rad, rad/s; of the state alone. stance: (2,) yaw of the torso, rad, and its rate; of time alone.
+    (3n,) of the true garment, m, world; the person knows where the armholes are. set_point,
+    set_point_rate: (8,) abduction, extension, rotation, elbow of the left, then the right arm, rad,
+    rad/s; they depend on state only. stance: (2,) yaw of the torso, rad, and its rate; it depends
+    on time only.
 
     Args:
-        arms: kinematics, joints, and the rest pose, where the set-point begins.
+        arms: Kinematics, joints and rest pose; the set-point starts at the rest pose.
         joint_count: k.
-        arm_dofs: (8,) which of them are the arms'.
-        yaw_dof: which of them turns the torso; None if it does not turn.
-        origin: of the torso's frame (3,), m, world.
-        mesh: the true garment.
-        motions: what it wants.
-        parameters: its limits.
-        period: of its discrete update, s.
+        arm_dofs: (8,) indices of the arms' joints among the k joints.
+        yaw_dof: Index of the joint that turns the torso; None if the torso does not turn.
+        origin: (3,) origin of the torso's frame, m, world.
+        mesh: The true garment.
+        motions: Motions that the person makes.
+        parameters: Limits of the motions.
+        period: Period of the discrete update, s.
     """
 
     def __init__(

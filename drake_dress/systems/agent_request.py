@@ -1,4 +1,4 @@
-"""Gripper velocities that something outside the diagram asks for."""
+"""Gripper velocities requested from outside the diagram."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drake_dress.models.sides import SIDES
 
 
 class AgentRequest(LeafSystem):
-    """Passes the velocities that an agent asks for on to the safety governor.
+    """Passes an agent's velocity requests on to the safety governor.
 
     .. pydrake_system::
 
@@ -20,9 +20,9 @@ class AgentRequest(LeafSystem):
         - right_velocity_request
         - request_time
 
-    velocity: (6,) of left, then right gripper in W, m/s. Requests (3,) m/s; request_time (1,), s:
-    now. An agent acts at a rate of its own and its request holds until the next one, so it does
-    not age. Whoever steps the diagram has to set a new request in time.
+    velocity: (6,) of left, then right gripper in W, m/s. Requests (3,) m/s; request_time (1,), the
+    current time, s. An agent acts at its own rate and a request holds until the next one, so
+    requests do not age. The caller that steps the diagram must set each new request in time.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Joint commands of two arms whose grippers follow commands in space."""
+"""Joint commands of two arms from Cartesian gripper commands."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal
 from drake_dress.models.control.person_model import PersonModel, person_capsules
 from drake_dress.models.sides import SIDES
 
-# From where it is commanded to be, beyond which a stopped arm is not drawn back there, rad.
+# Joint deviation above which a stopped arm's command is reset to its measured position, rad.
 _ELSEWHERE = 0.02
 
 
 class ArmController(LeafSystem):
-    """Turns positions commanded to grippers into joint commands that keep the arms' limits.
+    """Converts gripper position commands into joint commands within the arms' limits.
 
     .. pydrake_system::
 
@@ -41,22 +41,23 @@ class ArmController(LeafSystem):
         - clearance
         - speed_share
 
-    Commands (3,) p_WG and v_WG, m, m/s. joint_position: (18,) of the person's arms as they are
-    believed to be, m. *_arm_position: (7,) where arms are, rad. *_arm_stopped: (1,) positive while
-    an arm's driver reports that it does not follow. Arm commands (7,) rad, rad/s. clearance: (3,)
-    least distance between the arms, of the left and of the right one to the person, m.
-    speed_share: (2,) of the speed asked for that the grippers have. Outputs are of the state alone,
-    no feedthrough. A command that is not finite is not followed: the arms come to rest.
+    Commands (3,) p_WG and v_WG, m, m/s. joint_position: (18,) estimated joints of the person's
+    arms, m. *_arm_position: (7,) measured joint angles, rad. *_arm_stopped: (1,) positive while an
+    arm's driver reports that it does not follow commands. Arm commands (7,) rad, rad/s.
+    clearance: (3,) least distance between the two arms, from the left arm to the person and from
+    the right arm to the person, m. speed_share: (2,) achieved share of each gripper's requested
+    speed. Outputs depend on state only, without feedthrough. Non-finite commands are not followed:
+    the arms come to rest.
 
-    It integrates its commands itself, from `start` on. An arm whose driver has stopped by itself is
-    commanded to be where it is, so that it goes on from there.
+    The controller integrates its own commands, starting at `start`. If an arm's driver has stopped,
+    the command is reset to the arm's measured position, so that motion resumes from there.
 
     Args:
-        arms: with their limits and settings.
+        arms: The two arms, with their limits and settings.
         start: (2,7) joints at time 0, left, then right, rad.
-        period: of the commands, s.
-        person: shape of the person to keep away from.
-        offset: of the first command, s: a little after what it follows has changed.
+        period: Period of the commands, s.
+        person: Shape of the person to keep away from.
+        offset: Time of the first command, s: slightly after the gripper commands have changed.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class ArmController(LeafSystem):
                 name, rows.stop - rows.start, self._show(self._shown, rows), ticket
             )
         self.DeclarePeriodicDiscreteUpdateEvent(period, offset, self._update)
-        # compiled now and not in the first cycle, which must not wait for seconds
+        # compile now: the first cycle must not wait seconds for it
         left, right = (
             GripperGoal(arm.tool_position(q), np.zeros(3), r)
             for arm, q, r in zip(arms.arms, start, self._rotation, strict=True)
@@ -122,7 +123,7 @@ class ArmController(LeafSystem):
     def _taken_over(
         self, context: Context, q: np.ndarray, rate: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns commands (2,7) and rates, of stopped arms those of where they are."""
+        """Returns commands (2,7) and rates; a stopped arm gets its measured position at rest."""
         q, rate = q.copy(), rate.copy()
         for i, side in enumerate(SIDES):
             if not self.GetInputPort(f"{side}_arm_stopped").Eval(context)[0] > 0.0:

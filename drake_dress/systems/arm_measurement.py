@@ -1,4 +1,4 @@
-"""Where grippers are and what pulls at them, from what arms report."""
+"""Position, velocity and external force of the grippers, from the arms' measurements."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _QUANTITIES = ("position", "velocity", "force")
 
 
 class ArmMeasurement(LeafSystem):
-    """Turns joint measurements of two arms into those of their grippers.
+    """Converts joint measurements of two arms into measurements of their grippers.
 
     .. pydrake_system::
 
@@ -38,18 +38,18 @@ class ArmMeasurement(LeafSystem):
         - right_gripper_velocity
         - right_gripper_force
 
-    Inputs (7,) rad, rad/s, N·m; valid (1,), positive while what an arm reports counts. Outputs
-    (3,) p_WG, m, v_WG, m/s, and the force of the garment on the gripper, N, in W: NaN where the
-    arm's reports do not count.
+    Inputs (7,) rad, rad/s, N·m; valid (1,), positive while an arm's measurements are valid. Outputs
+    (3,) p_WG, m, v_WG, m/s, and the force of the garment on the gripper, N, in W; NaN while the
+    arm's measurements are not valid.
 
     Args:
-        arms: left, then right.
+        arms: The left, then the right arm.
     """
 
     def __init__(self, arms: Sequence[SerialArm]) -> None:
         super().__init__()
         self._arms = list(arms)
-        # compiled now and not in the first cycle, which must not wait for seconds
+        # compile now: the first cycle must not wait seconds for it
         gripper_motion(self._arms[0], *np.zeros((3, 7)))
         for side in SIDES:
             for name in ("position", "velocity", "torque_external"):

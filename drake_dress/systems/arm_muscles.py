@@ -10,7 +10,7 @@ from drake_dress.models.human.muscles import muscle_torque
 
 
 class ArmMuscles(LeafSystem):
-    """Shifts the plant's joint springs to a set-point, with the tone that carries the arm there.
+    """Shifts the plant's joint springs to a set-point and compensates gravity there.
 
     .. pydrake_system::
 
@@ -21,14 +21,14 @@ class ArmMuscles(LeafSystem):
         output_ports:
         - generalized_force
 
-    set_point: (8,) of left, then right arm: abduction, extension, rotation, elbow, rad.
-    set_point_rate: (8,), rad/s; left unconnected, the joints damp as if it were zero.
-    generalized_force: (nv,) for the plant's applied generalized force, N·m.
+    set_point: (8,) abduction, extension, rotation, elbow of the left, then the right arm, rad.
+    set_point_rate: (8,), rad/s; zero if not connected. generalized_force: (nv,) for the plant's
+    applied generalized force, N·m.
 
     Args:
-        arms: kinematics, masses and joints.
+        arms: Kinematics, masses and joints.
         velocity_count: nv of the plant.
-        velocity_index: (8,) of the arms' joints in it.
+        velocity_index: (8,) indices of the arms' joints in the plant's velocities.
     """
 
     def __init__(self, arms: Arms, velocity_count: int, velocity_index: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""What a simulated lab sends of its cameras, taken elsewhere."""
+"""Publishes camera images of a simulated lab, which are rendered elsewhere."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from drake_dress.models.supervision.injection import InjectedFault, kinds_at
 from drake_dress.systems.spoiler import Spoiler
 
-# Of looking whether a picture is there, s.
+# Period of polling for a finished image, s.
 _LOOKING_PERIOD = 0.01
-# Takes a camera's picture: its name, time, the plant's state, and the garment.
+# Renders a camera's image, given its name, the time, the plant's state and the garment.
 Take = Callable[[str, float, np.ndarray, np.ndarray], "Future[bytes]"]
 
 
 class _Awaited:
-    """The picture that is being taken, if one is; a copy of the context awaits the same one."""
+    """The image being rendered, if any; a copy of the context waits for the same image."""
 
     def __init__(self, pending: Future[bytes] | None = None) -> None:
         self.pending = pending
@@ -32,7 +32,7 @@ class _Awaited:
 
 
 class CameraOutbox(LeafSystem):
-    """Has a camera's picture taken at a fixed rate, and publishes it when it is there.
+    """Requests a camera image at a fixed rate and publishes it once it is rendered.
 
     .. pydrake_system::
 
@@ -43,18 +43,18 @@ class CameraOutbox(LeafSystem):
         - since
         output_ports: []
 
-    plant_state: of the station's plant. garment_position: (3n,) m. since: (1,) time since the first
-    command, s, to which faults are timed. A picture is late by what it takes; none is begun before
-    the one before is done.
+    plant_state: state of the station's plant. garment_position: (3n,) m. since: (1,) time since the
+    first command, s; fault times count from it. Rendering delays an image; the next one starts only
+    after the last one is done.
 
     Args:
-        name: of the camera.
-        channel: where to.
-        take: its pictures.
-        sizes: of the plant's state, and of the garment's.
-        lcm: bus.
-        period: s.
-        faults: what goes wrong, and when.
+        name: Name of the camera.
+        channel: LCM channel.
+        take: Renders an image.
+        sizes: Sizes of the plant's state and of the garment's positions.
+        lcm: LCM bus.
+        period: Period of the requests, s.
+        faults: Faults to inject, with their times.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class CameraOutbox(LeafSystem):
         self._name, self._channel, self._take, self._lcm = name, channel, take, lcm
         self._faults = tuple(faults)
         self._spoiler = Spoiler(lcmt_image_array)
-        # events that publish may not change state: this is changed in place
+        # publish events may not change state, so this object is changed in place
         self._awaited = self.DeclareAbstractState(Value(_Awaited()))
         for port, size in zip(("plant_state", "garment_position"), sizes, strict=True):
             self.DeclareVectorInputPort(port, size)

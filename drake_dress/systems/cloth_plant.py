@@ -25,14 +25,14 @@ from drake_dress.models.sides import SIDES
 from drake_dress.systems.garment_steps import Steps, StepsHere, StepsInWorker, Surroundings
 from drake_dress.systems.person_bodies import PersonBodies
 
-# By which a rehearsal lets the garment into the person, m.
+# Penetration of the garment into the person in a rehearsal, m.
 _REHEARSED_DEPTH = 2e-3
-# Share of its depth to which a rehearsal squashes the garment: its layers meet then.
+# Factor by which a rehearsal flattens the garment, so that its layers touch.
 _REHEARSED_FLATNESS = 0.02
 
 
 class ClothPlant(LeafSystem):
-    """The true garment: finer and stepped finer than the controller's, and with its own scheme.
+    """The true garment: finer mesh and time step than the controller's, and its own integrator.
 
     .. pydrake_system::
 
@@ -56,23 +56,23 @@ class ClothPlant(LeafSystem):
     garment_position, garment_velocity: (3n,) row-major (n,3), m, m/s, world. contact: (n,) 0 none,
     1 stick, 2 slip. contact_force: (3n,) of the person on the garment, N. *_gripper_force: (3,)
     of the garment on the gripper, N. person_forces: list of ExternallyAppliedSpatialForce, one for
-    each body that is touched. All outputs depend on discrete state only.
+    each body in contact. All outputs depend on discrete state only.
 
-    What a gripper holds gives way to a person who comes to where it is (`contact/grasp.py`).
+    Held cloth is displaced by a person who moves into it (`contact/grasp.py`).
 
-    The garment is one step behind bodies and grippers: a step that begins at k·h, from what they do
-    then, ends at (k + 1)·h, and may go on beside the rest of the diagram meanwhile.
+    The garment lags bodies and grippers by one step: a step that starts at k·h, from their motion
+    at that time, ends at (k + 1)·h. Meanwhile it may run in parallel with the rest of the diagram.
 
     Args:
-        cloth: the integrator; its held nodes are those of the left, then of the right gripper.
-        held_count: how many nodes the left and the right gripper hold.
+        cloth: The integrator; its held nodes are those of the left, then of the right gripper.
+        held_count: Number of nodes held by the left and by the right gripper.
         start: (n,3) garment at time 0, m.
         start_grippers: (2,3) p_WG of left and right at time 0, m.
-        person: its capsules, and the plant's bodies that they are fixed in.
-        grasp_stiffness: of a gripper's arm and grasp against the person, N/m.
-        mounts: how grippers and limbs give way; rigid by default. Reported are the grippers and
-            limbs that do not know of it.
-        in_worker: whether a worker process makes the steps, on another core.
+        person: The person's capsules and the plant's bodies that they are fixed in.
+        grasp_stiffness: Stiffness of a gripper's arm and grasp against the person, N/m.
+        mounts: Compliance of grippers and limbs; rigid by default. Measured gripper and limb
+            positions do not include their deflection.
+        in_worker: Whether a worker process computes the steps, on another core.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class ClothPlant(LeafSystem):
         self._person = person
         self._surroundings = Surroundings(person.radius, len(cloth.held))
         self._steps: Steps = (StepsInWorker if in_worker else StepsHere)(cloth, self._surroundings)
-        # what the step under way was begun with
+        # inputs of the step in progress
         self._begun: tuple[ClothState, FloatArray] | None = None
 
         self._mounts = mounts or Mounts([])
@@ -108,7 +108,7 @@ class ClothPlant(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(cloth.time_step, 0.0, self._update)
 
     def _declare_state(self) -> None:
-        """Declares what is carried from one step to the next: garment, forces, mounts."""
+        """Declares the state carried from step to step: garment, forces, mounts."""
         n, held_count = self._n, len(self.cloth.held)
         self._x = self.DeclareDiscreteState(self.start_position.ravel())
         self._v = self.DeclareDiscreteState(np.zeros(3 * n))
@@ -117,12 +117,12 @@ class ClothPlant(LeafSystem):
         self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
         self._solver = self.DeclareDiscreteState(np.full(2 * (n + 1), -1.0))
         self._tangled = self.DeclareDiscreteState(np.zeros(n))
-        # Force and moment about the body's origin, of the garment on each body.
+        # Moment about the body's origin, then force, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._person.index)))
-        # of the person on the held nodes, N
+        # force of the person on the held nodes, N
         self._pressing = self.DeclareDiscreteState(np.zeros(3 * held_count))
         self._mount = self.DeclareDiscreteState(MountState.at_rest(self._person.limb_count).flat())
-        # what the step under way depends on beside the garment; not finite before the first one
+        # surroundings of the step in progress; NaN before the first step
         self._around = self.DeclareDiscreteState(np.full(self._surroundings.size, np.nan))
 
     def _declare_inputs(self) -> None:
@@ -157,11 +157,11 @@ class ClothPlant(LeafSystem):
         )
 
     def obstacles(self, context: Context) -> Obstacles:
-        """Returns the person's capsules in the world, as the body ports say."""
+        """Returns the person's capsules in the world, from the body input ports."""
         return self._person.obstacles(self._poses.Eval(context), self._velocities.Eval(context))
 
     def rehearse(self, context: Context) -> None:
-        """Steps the garment on the person and squashed, so that nothing is compiled later."""
+        """Steps the garment in contact with the person, then flattened, to compile all kernels."""
         bodies = self.obstacles(context)
         if not bodies.count:
             return
@@ -173,7 +173,7 @@ class ClothPlant(LeafSystem):
         for _ in range(2):
             self._steps.begin(state, self._surroundings.flat(bodies, still))
             state = self._steps.end()
-        # layers that meet, and some that might have crossed
+        # layers in contact, and some marked as possibly crossed
         x = self.start_position.copy()
         thin = int(np.argmin(np.ptp(x, axis=0)))
         x[:, thin] = x[:, thin].mean() + _REHEARSED_FLATNESS * (x[:, thin] - x[:, thin].mean())
@@ -183,8 +183,8 @@ class ClothPlant(LeafSystem):
         self._steps.end()
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        # between the end of a step and the begin of the next one nothing is done that could be
-        # done while one is under way
+        # between the end of a step and the start of the next, do only what cannot be done while a
+        # step is in progress
         h = self.cloth.time_step
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
         bodies = self.obstacles(context)
@@ -213,11 +213,11 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._wrench, self._wrenches(context, after, pressing).ravel())
 
     def _taken(self, target: FloatArray, bodies: Obstacles) -> tuple[FloatArray, Pressing]:
-        """Returns where held nodes (k,3) are taken in a step, m, and how bodies press on them.
+        """Returns the held nodes' target positions (k,3), m, and how bodies press on them.
 
         Args:
-            target: (2,3) of the grippers, m.
-            bodies: at the begin of the step.
+            target: (2,3) positions of the grippers, m.
+            bodies: Capsules at the start of the step.
         """
         taken = target[self._side] + self._offset
         bodies = _after(bodies, self.cloth.time_step)
@@ -225,9 +225,9 @@ class ClothPlant(LeafSystem):
         return taken + pressing.displacement[self._side], pressing
 
     def _stepped(self, context: Context) -> ClothState:
-        """Returns the garment after the step under way, if there is one."""
+        """Returns the garment after the step in progress, or as it is if there is none."""
         n = self._n
-        # copies: of what may not be written, kernels would be compiled once more
+        # copies, since kernels would be compiled again for read-only arrays
         state = ClothState(
             context.get_discrete_state(self._x).value().reshape(n, 3).copy(),
             context.get_discrete_state(self._v).value().reshape(n, 3).copy(),
@@ -241,7 +241,7 @@ class ClothPlant(LeafSystem):
         if not np.isfinite(around).all():
             return state
         if not self._is_under_way(state, around):
-            # another context than the one that began it
+            # the step in progress belongs to another context
             self._begin(state, around.copy())
         self._begun = None
         try:
@@ -254,7 +254,7 @@ class ClothPlant(LeafSystem):
         self._begun = state, around
 
     def _is_under_way(self, state: ClothState, around: FloatArray) -> bool:
-        """Returns whether the step that was begun last is the one of these."""
+        """Returns whether the last step was started with these arguments."""
         if self._begun is None:
             return False
         begun, with_this = self._begun
@@ -263,7 +263,7 @@ class ClothPlant(LeafSystem):
         )
 
     def _mounted(self, context: Context, state: ClothState) -> MountState:
-        """Returns how far grippers and limbs have given way at the end of this step."""
+        """Returns the deflection of grippers and limbs at the end of this step."""
         pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
         mount = MountState.of(context.get_discrete_state(self._mount).value())
         force = limb_forces(self._person.limb_of, len(mount.limb), state.owner, state.reaction)
@@ -271,7 +271,7 @@ class ClothPlant(LeafSystem):
         return self._mounts.step(mount, np.stack(pulled), force, h, self._moved_mass)
 
     def _wrenches(self, context: Context, after: ClothState, pressing: Pressing) -> FloatArray:
-        """Returns (bodies,6) moment about the body origin, then force, of the garment, world."""
+        """Returns (bodies,6) moment about the body origin, then force, by the garment, world."""
         origin = self._person.origins(self._poses.Eval(context))
         owner, reaction = after.owner, after.reaction
         if (pressing.owner >= 0).any():
@@ -322,6 +322,6 @@ class ClothPlant(LeafSystem):
 
 
 def _after(bodies: Obstacles, h: float) -> Obstacles:
-    """Returns capsules where they will be `h` s later."""
+    """Returns the capsules `h` s later, with zero velocity."""
     end = bodies.velocity + np.cross(bodies.angular_velocity, bodies.b - bodies.a)
     return Obstacles.resting(bodies.a + h * bodies.velocity, bodies.b + h * end, bodies.radius)

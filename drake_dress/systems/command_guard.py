@@ -1,4 +1,4 @@
-"""What an arm's driver makes of its commands."""
+"""An arm driver's check of its commands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drake_dress.models.arm.command_guard import DriveState, follow
 
 
 class CommandGuard(LeafSystem):
-    """Follows joint commands that are sound, and brakes by itself where they are not.
+    """Follows valid joint commands and brakes on its own when commands are invalid.
 
     .. pydrake_system::
 
@@ -27,15 +27,15 @@ class CommandGuard(LeafSystem):
         - velocity_commanded
         - stop
 
-    Commands (7,) rad, rad/s. fresh: (1,) positive while commands still come; taken as so where
-    nothing is connected. desired_state: (14,) for a plant's drives. *_commanded: (7,) the halves
-    of it. stop: (1,) of `models.arm.command_guard.Stop`. Outputs are of the state alone.
+    Commands (7,) rad, rad/s. fresh: (1,) positive while commands keep arriving; assumed positive if
+    not connected. desired_state: (14,) for a plant's drives. *_commanded: (7,) its two halves.
+    stop: (1,) a `models.arm.command_guard.Stop`. Outputs depend on state only.
 
     Args:
         start: (7,) joints at time 0, rad.
-        limits: of the joints.
-        period: s.
-        has_position, has_velocity: what the mode has.
+        limits: Limits of the joints.
+        period: Period of the discrete update, s.
+        has_position, has_velocity: Whether the control mode commands this quantity.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class CommandGuard(LeafSystem):
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), ticket)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
-        # compiled now and not in the first cycle, which must not wait for seconds
+        # compile now: the first cycle must not wait seconds for it
         follow(DriveState.at_rest(start), start, np.zeros(7), True, limits, period)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:

@@ -1,4 +1,4 @@
-"""When commands left, and how old was what they answer."""
+"""Times at which commands were sent, and the age of the statuses they respond to."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.lcm_inbox import Received
 
-# Of a status stamped by a clock of this machine, at most, s: others tell nothing.
+# Greatest plausible age of a status, s; a larger age means a clock of another machine.
 _LONGEST = 10.0
 _KEPT = 60_000
 
 
 class CommandMeter(LeafSystem):
-    """Notes the time of each command, and the age of the newest status, at the commands' rate.
+    """Records the time of each command and the age of the newest status, at the command rate.
 
     .. pydrake_system::
 
@@ -29,15 +29,15 @@ class CommandMeter(LeafSystem):
         - right
         output_ports: []
 
-    Inputs: `Received` of lcmt_panda_status. The age is from the status's robot_utime, which a lab
-    on this machine stamps as it sends, to now: what was on its way, waited, and was worked on.
+    Inputs: `Received` of lcmt_panda_status. The age is the time since the status's robot_utime,
+    which a lab on this machine sets when it sends. It covers transport, waiting and processing.
 
     Args:
-        period, offset: of the commands, s.
+        period, offset: Period and offset of the commands, s.
 
-    The newest commands are kept, as many as a few minutes have, however long a run takes. They are
-    kept outside the context: they tell of this process and its clock, not of what is simulated, and
-    nothing in a diagram reads them.
+    Only the commands of the last few minutes are kept, however long a run takes. They are kept
+    outside the context: they describe this process and its clock, not the simulation, and nothing
+    in a diagram reads them.
     """
 
     def __init__(self, period: float, offset: float) -> None:
@@ -71,7 +71,7 @@ class CommandMeter(LeafSystem):
 
 
 def process_age(at: float) -> float:
-    """Returns how old this process was at a time of the monotonic clock, s."""
+    """Returns the age of this process at a time of the monotonic clock, s."""
     fields = Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()
     began = float(fields[19]) / os.sysconf("SC_CLK_TCK")
     since_boot = clock.clock_gettime(clock.CLOCK_BOOTTIME)

@@ -1,4 +1,4 @@
-"""A vector that arrives late."""
+"""A delayed vector signal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drake_dress.models.arrays import FloatArray
 
 
 class Delay(LeafSystem):
-    """Holds a vector back by a whole number of periods.
+    """Delays a vector by a whole number of periods.
 
     .. pydrake_system::
 
@@ -26,13 +26,13 @@ class Delay(LeafSystem):
         output_ports:
         - delayed_value
 
-    Both (k,). Before the first delay has passed the output is `start`. (Drake's DiscreteTimeDelay
-    starts from zero, which is no place for a gripper.)
+    Both (k,). Until the first delay has passed, the output is `start`. (Drake's DiscreteTimeDelay
+    starts from zero, which is not a valid gripper position.)
 
     Args:
-        start: (k,) output at first.
-        period: s.
-        delay: s, rounded to a whole number of periods, one at least.
+        start: (k,) initial output.
+        period: Sample period, s.
+        delay: Delay, rounded to a whole number of periods, at least one, s.
     """
 
     def __init__(self, start: FloatArray, period: float, delay: float) -> None:
@@ -58,7 +58,7 @@ class Delay(LeafSystem):
 def delayed(
     builder: DiagramBuilder, port: OutputPort, start: FloatArray, period: float, delay: float
 ) -> OutputPort:
-    """Returns `port` held back by a `Delay`; itself where the delay, s, is not positive."""
+    """Returns `port` delayed by a `Delay`, or `port` itself if the delay, s, is not positive."""
     if delay <= 0.0:
         return port
     line = builder.AddSystem(Delay(start, period, delay))

@@ -1,7 +1,7 @@
-"""Checks the estimates of a person and of a garment, message by message.
+"""Checks estimates of the person and the garment, message by message.
 
-The laws are in `models/supervision/`; a check keeps what they remember. It belongs to the decoder
-of one channel, which calls it once with each message.
+The rules are in `models/supervision/`; a check holds their state. It belongs to the decoder of one
+channel, which calls it once for each message.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class PersonCheck:
     """Checks estimates of the person's arms.
 
     Args:
-        bounds: of what is believed.
+        bounds: Bounds on plausible estimates.
     """
 
     def __init__(self, bounds: PersonBounds) -> None:
@@ -48,9 +48,9 @@ class GarmentCheck:
     """Checks estimates of the garment.
 
     Args:
-        count: of its nodes.
-        bounds: of what is believed.
-        grippers: returns (2,3) where left and right gripper are, m; None where that is not known.
+        count: Number of its nodes.
+        bounds: Bounds on plausible estimates.
+        grippers: Returns the positions (2,3) of left and right gripper, m; None if not known.
     """
 
     def __init__(

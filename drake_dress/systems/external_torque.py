@@ -1,4 +1,4 @@
-"""What an arm feels beyond its own motion."""
+"""Estimate of the external torques on an arm's joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 
 class ExternalTorque(LeafSystem):
-    """Estimates the torques of the surroundings on an arm's joints, as its own control does.
+    """Estimates the external torques on an arm's joints, as the arm's own controller does.
 
     .. pydrake_system::
 
@@ -21,13 +21,13 @@ class ExternalTorque(LeafSystem):
         - torque_external
 
     state: (14,) joints, rad, rad/s. torque_measured: (7,) of the drives, N·m. torque_external: (7,)
-    N·m, positive where the surroundings push a joint forward: M(q) dv/dt + C(q,v) v less what
-    the drives do, low-passed. The arm carries its own weight.
+    N·m, positive if the surroundings push a joint in its positive direction: M(q) dv/dt + C(q,v) v
+    minus the measured torque, low-pass filtered. Gravity is compensated by the arm itself.
 
     Args:
-        arm: continuous plant with the arm alone, without gravity.
-        period: of the estimate, s.
-        filter_time: of its low-pass, s.
+        arm: Continuous plant with the arm alone, without gravity.
+        period: Period of the estimate, s.
+        filter_time: Time constant of the low-pass filter, s.
     """
 
     def __init__(self, arm: MultibodyPlant, period: float, filter_time: float) -> None:
@@ -36,7 +36,7 @@ class ExternalTorque(LeafSystem):
         self._share = min(1.0, period / filter_time) if filter_time > 0.0 else 1.0
         self._context = arm.CreateDefaultContext()
         self._none = MultibodyForces(arm)
-        # last velocities, the estimate, and whether there are last velocities
+        # previous velocities, the estimate, and whether previous velocities exist
         self._memory = self.DeclareDiscreteState(np.zeros(15))
         self.DeclareVectorInputPort("state", 14)
         self.DeclareVectorInputPort("torque_measured", 7)

@@ -1,4 +1,4 @@
-"""When things go wrong in a simulated lab."""
+"""Timing of the faults injected into a simulated lab."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import InjectedFault, kinds_at
 
-# Before the first command, s.
+# Value of `since` before the first command, s.
 NOT_BEGUN = -1.0
 
 
 class FaultPlayer(LeafSystem):
-    """Keeps the time since commands began, to which faults are timed, and plays those of arms.
+    """Keeps the time since the first command, which fault times refer to, and plays arm faults.
 
     .. pydrake_system::
 
@@ -30,20 +30,20 @@ class FaultPlayer(LeafSystem):
         - push
         - idle
 
-    *_valid: (1,) 1 while an arm's commands come and are sound. since: (1,) time since both came
-    first, s, or -1. *_fresh: (1,) 1 while an arm hears its commands. push: (6,) N, on the grippers,
-    to the outside and back. idle: (1,) since when no commands come, s.
+    *_valid: (1,) 1 while an arm's commands arrive and are valid. since: (1,) time since both arms
+    first had valid commands, s, or -1. *_fresh: (1,) 1 while an arm receives its commands. push:
+    (6,) N, on the grippers, outward and backward. idle: (1,) time since the last valid command, s.
 
     Args:
-        faults: what goes wrong.
-        push: size of a push, N.
-        period: of looking, s.
+        faults: Faults to inject.
+        push: Size of a push, N.
+        period: Period of the discrete update, s.
     """
 
     def __init__(self, faults: Sequence[InjectedFault], push: float, period: float) -> None:
         super().__init__()
         self._faults, self._push = tuple(faults), push
-        # when commands began, and since when there are none
+        # time of the first commands, and time of the last valid command
         self._begun = self.DeclareDiscreteState([np.inf, 0.0])
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_valid", 1)

@@ -1,4 +1,4 @@
-"""A gripper that goes where it is told, within its speed and acceleration."""
+"""A free-floating gripper with limited speed and acceleration."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class FloatingGripper(LeafSystem):
         - position_measured
         - velocity_measured
 
-    position_command: (3,) p_WG wanted, m. position_measured, velocity_measured: (3,) m, m/s, of
-    the state alone, no feedthrough. A command that is not finite is ignored: the gripper stops.
+    position_command: (3,) desired p_WG, m. position_measured, velocity_measured: (3,) m, m/s;
+    they depend on state only, without feedthrough. On a non-finite command the gripper stops.
 
     Args:
         start: (3,) p_WG at time 0, m.
-        period: of its discrete update, s.
-        max_speed: m/s. max_acceleration: m/s².
+        period: Period of the discrete update, s.
+        max_speed: Speed limit, m/s. max_acceleration: Acceleration limit, m/s².
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class FloatingGripper(LeafSystem):
             offset = command - position
             distance = np.linalg.norm(offset)
             if distance > 1e-9:
-                # fastest speed from which the gripper still stops at the command
+                # highest speed from which the gripper can still stop at the command
                 brake = np.sqrt(self._max_acceleration * distance)
                 speed = min(self._max_speed, distance / self._period, brake)
                 wanted = offset / distance * speed

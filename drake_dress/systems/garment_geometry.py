@@ -1,4 +1,4 @@
-"""The garment for a SceneGraph, so that cameras see it."""
+"""The garment as SceneGraph geometry, so that cameras see it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from pydrake.systems.framework import Context, LeafSystem
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.shell import Shell, make_shell
 
-# What labels its pixels in a label image.
+# Label of the garment's pixels in a label image.
 GARMENT_LABEL = 100
 _COLOR = Rgba(0.22, 0.44, 0.70, 1.0)
 _THICKNESS = 0.002  # m
 
 
 class GarmentGeometry(LeafSystem):
-    """Tells a SceneGraph where the garment is: a deformable geometry, a thin shell of tetrahedra.
+    """Updates the garment in a SceneGraph: a deformable geometry, a thin shell of tetrahedra.
 
     .. pydrake_system::
 
@@ -39,11 +39,11 @@ class GarmentGeometry(LeafSystem):
         - configuration
 
     garment_position: (3n,) row-major (n,3), m, world. configuration: GeometryConfigurationVector
-    for the scene graph's port of `source`.
+    for the scene graph's configuration port of `source`.
 
     Args:
-        scene_graph: in which the garment is registered.
-        mesh: of the garment.
+        scene_graph: Scene graph in which the garment is registered.
+        mesh: Mesh of the garment.
     """
 
     def __init__(self, scene_graph: SceneGraph, mesh: GarmentMesh) -> None:

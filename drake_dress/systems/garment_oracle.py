@@ -1,4 +1,4 @@
-"""What a perfect garment tracker would tell the controller."""
+"""A perfect garment tracker."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class GarmentOracle(LeafSystem):
         - estimated_velocity
 
     Inputs (3n,) of the true garment, outputs (3m,) of the controller's, row-major, m and m/s. It
-    stands where a garment tracker will: it alone may read a `cheat_` port of the station.
+    takes the place of a garment tracker, so it may read the station's `cheat_` ports.
 
     Args:
-        transfer: (m,n) barycentric weights, rows sum to 1.
-        effects: those on cameras displace what is seen.
+        transfer: (m,n) barycentric weights; rows sum to 1.
+        effects: Physical effects; those of cameras displace the observed garment.
     """
 
     def __init__(self, transfer: sp.csr_array, effects: Sequence[Effect] = ()) -> None:

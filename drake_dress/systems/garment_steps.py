@@ -1,7 +1,7 @@
-"""Steps of a garment that go on while the rest of a diagram does: here, or in a process beside it.
+"""Steps the garment in-process or in a worker, in parallel with the rest of the diagram.
 
-A step is begun with all that it depends on, and its result is asked for a period later. Which of
-the two it is makes no difference to the numbers.
+A step starts with all its inputs, and its result is read one period later. Both variants give the
+same numbers.
 """
 
 from __future__ import annotations
@@ -25,20 +25,19 @@ from drake_dress.models.cloth.state import ClothState
 from drake_dress.systems.shared_memory import SharedMemory
 from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 
-# The fields of a state that are vectors of the nodes, those that are numbers of theirs, and what
-# solvers go on with.
+# Fields of a state: vectors per node, integers per node, and the warm start of the solvers.
 _VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner", "tangled"), "solver"
-# What is said of a step that begins: it goes on from the last one, or from a state that is given.
+# Message that starts a step: it continues from the last state, or from a given one.
 _GO_ON, _FROM_GIVEN = b"\0", b"\1"
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """How all that a step depends on beside the garment stands in one array.
+    """Packs all inputs of a step other than the garment into one array.
 
     Attributes:
-        radius: (m,) of the capsules, m.
-        held_count: of nodes with prescribed motion.
+        radius: (m,) radii of the capsules, m.
+        held_count: Number of nodes with prescribed motion.
     """
 
     radius: FloatArray
@@ -46,48 +45,48 @@ class Surroundings:
 
     @property
     def size(self) -> int:
-        """Of the array."""
+        """Size of the array."""
         return 12 * len(self.radius) + 3 * self.held_count
 
     def flat(self, capsules: Obstacles, held_velocity: FloatArray) -> FloatArray:
-        """Returns the array of `size` for capsules and the velocities (k,3) of the held nodes."""
+        """Returns the array of `size` that packs capsules and the held nodes' velocities (k,3)."""
         c = capsules
         parts = (c.a, c.b, c.velocity, c.angular_velocity, held_velocity)
         return np.concatenate([p.ravel() for p in parts])
 
     def of(self, flat: FloatArray) -> tuple[Obstacles, FloatArray]:
-        """Returns capsules and velocities (k,3) that stand in an array."""
+        """Returns the capsules and held velocities (k,3) packed in an array."""
         end = 12 * len(self.radius)
         a, b, velocity, omega = flat[:end].reshape(4, -1, 3)
         return Obstacles(a, b, self.radius, velocity, omega), flat[end:].reshape(-1, 3)
 
 
 class Steps(Protocol):
-    """Steps of a garment, one at a time."""
+    """Steps a garment, one step at a time."""
 
     def begin(self, state: ClothState, around: FloatArray) -> None:
-        """Begins a step from `state`, `around` as `Surroundings` has it.
+        """Starts a step from `state`, with `around` packed by `Surroundings`.
 
-        One that was begun and not ended is forgotten.
+        A step that was started but not ended is discarded.
         """
 
     def end(self) -> ClothState:
-        """Returns the state after the step that was begun last.
+        """Returns the state after the last step started.
 
-        Its arrays may be written to by the step after the next one.
+        The step after the next one may overwrite its arrays.
 
         Raises:
-            ValueError: something in it is not finite.
-            RuntimeError: no step was begun, or what steps the garment is gone.
+            ValueError: The state is not finite.
+            RuntimeError: No step was started, or the worker process has ended.
         """
 
 
 class StepsHere:
-    """Steps that are made when their result is asked for.
+    """Computes a step in this process when its result is requested.
 
     Args:
-        cloth: steps the garment.
-        surroundings: of it.
+        cloth: Integrator of the garment.
+        surroundings: Layout of the surroundings.
     """
 
     def __init__(self, cloth: Integrator, surroundings: Surroundings) -> None:
@@ -109,16 +108,16 @@ class StepsHere:
 class StepsInWorker:
     """Steps the garment in a worker process.
 
-    States come in shared memory, in two places in turn, so that one is read while the next is made.
-    The worker starts at once and ends with this process, however that ends.
+    States are double-buffered in shared memory, so that one is read while the next is computed.
+    The worker starts at once and ends with this process, even if this process crashes.
 
     Args:
-        cloth: steps the garment; it is copied.
-        surroundings: of it.
+        cloth: Integrator of the garment; it is copied.
+        surroundings: Layout of the surroundings.
     """
 
     def __init__(self, cloth: Integrator, surroundings: Surroundings) -> None:
-        # forked from a process with threads, Numba and BLAS may hang
+        # with fork from a process that has threads, Numba and BLAS may hang
         context = multiprocessing.get_context("spawn")
         shared = _Shared(cloth.elements.node_count, surroundings.size)
         self._places, self._around = shared.states(), shared.around()
@@ -132,9 +131,9 @@ class StepsInWorker:
         start_process(self._process)
         kill_at_exit(self._process)
         other.close()
-        # Of a process that has ended already, the first step tells.
+        # If the process has already ended, the first step reports it.
         with contextlib.suppress(OSError):
-            # an effect on the garment may be of a class that the process cannot import
+            # the worker may be unable to import the class of an effect
             self._pipe.send_bytes(cloudpickle.dumps((cloth, surroundings)))
         self._under_way = False
         self._place = 0
@@ -166,7 +165,7 @@ class StepsInWorker:
         return self._last
 
     def _answer(self) -> str:
-        """Waits for the step under way; returns what was wrong with it, if anything."""
+        """Waits for the step in progress; returns its error message, empty if it succeeded."""
         self._under_way, self._last = False, None
         try:
             return self._pipe.recv_bytes().decode()
@@ -179,11 +178,11 @@ class StepsInWorker:
 
 
 class _Shared:
-    """What two processes share: two states, and what is around.
+    """Memory shared by the two processes: two states and the surroundings.
 
     Args:
-        n: nodes.
-        size: of what is around.
+        n: Number of nodes.
+        size: Size of the surroundings' array.
     """
 
     def __init__(self, n: int, size: int) -> None:
@@ -196,11 +195,11 @@ class _Shared:
         return n * (3 * 8 * len(_VECTORS) + 4 * len(_NUMBERS)) + 4 * 2 * (n + 1)
 
     def around(self) -> FloatArray:
-        """Returns the array."""
+        """Returns the array of the surroundings."""
         return np.frombuffer(self._block.memory, np.float64, self._size)
 
     def states(self) -> list[ClothState]:
-        """Returns the states whose arrays are that memory."""
+        """Returns the two states, whose arrays are views of the shared memory."""
         found, memory, n = [], self._block.memory, self._n
         for k in range(2):
             at = 8 * self._size + k * self._state_bytes

@@ -1,4 +1,4 @@
-"""The garment, the grippers and what they aim at, live in Meshcat."""
+"""The garment, the grippers and their targets, live in Meshcat."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ class GarmentVisualizer(LeafSystem):
         - gripper_position (optional)
         output_ports: []
 
-    garment_position: (3n,) row-major (n,3), m. targets: (6,) where the left and the right armhole
-    should go, m; NaN hides one. stage: (2,) 0 prepare, 1 dress, 2 done; written above
+    garment_position: (3n,) row-major (n,3), m. targets: (6,) target positions of the left and
+    the right armhole, m; NaN hides one. stage: (2,) 0 prepare, 1 dress, 2 done; written above
     the garment. gripper_position: (6,) left, right, m. All in the world frame. The person is
     drawn by Drake's MeshcatVisualizer.
 
     Args:
-        meshcat: to draw in.
-        faces: (F,3) triangles; the outside is where their normals point.
+        meshcat: Meshcat instance to draw in.
+        faces: (F,3) triangles; their normals point outward.
         node_count: n.
-        period: of publishing, s.
-        path: in Meshcat's tree under which all is drawn.
+        period: Period of publishing, s.
+        path: Path in Meshcat's tree under which everything is drawn.
     """
 
     def __init__(
@@ -78,15 +78,15 @@ class GarmentVisualizer(LeafSystem):
 
 
 class DressingScene:
-    """Draws in Meshcat what a dressing shows beside the person; live and in the replay.
+    """Draws everything except the person in Meshcat, both live and in the replay.
 
     Args:
-        meshcat: to draw in.
-        faces: (3,F) triangles, as Meshcat takes them.
-        path: in Meshcat's tree under which all is drawn.
+        meshcat: Meshcat instance to draw in.
+        faces: (3,F) triangles, as Meshcat expects them.
+        path: Path in Meshcat's tree under which everything is drawn.
 
     Attributes:
-        label: the stages as they are written.
+        label: Text that shows the stages.
     """
 
     def __init__(self, meshcat: Meshcat, faces: IntArray, path: str) -> None:
@@ -96,16 +96,16 @@ class DressingScene:
         self._drawn: set[str] = set()
         self._label_at: FloatArray | None = None
         self.label = ""
-        # what draws text is imported, and finds its fonts, now and not while arms move
+        # import the text renderer and find its fonts now, not while arms move
         _text_mesh("left", _TEXT_HEIGHT)
 
     def show_garment(self, position: FloatArray) -> None:
-        """Draws the nodes (n,3), m: outside and lining in a colour each."""
+        """Draws the garment from its nodes (n,3), m; outside and lining differ in colour."""
         vertices = np.asfortranarray(position.T)
         if self._label_at is None and np.isfinite(position).all():
             self._label_at = position.mean(axis=0)
             self._label_at[2] = position[:, 2].max() + _TEXT_ABOVE
-        # Two one-sided meshes rather than one double-sided: inside and outside can be told apart.
+        # Two one-sided meshes, not one double-sided mesh, so that inside and outside differ.
         for name, color, side in (
             ("outside", UNLISTED, Meshcat.SideOfFaceToRender.kFrontSide),
             ("lining", LINING, Meshcat.SideOfFaceToRender.kBackSide),
@@ -120,19 +120,19 @@ class DressingScene:
             self._place(f"{self._path}/gripper/{side}", Box(0.05, 0.05, 0.05), _GRIPPER, p)
 
     def show_targets(self, position: FloatArray) -> None:
-        """Draws where the armholes should go (2,3), m; NaN hides one."""
+        """Draws the target positions (2,3) of the armholes, m; NaN hides one."""
         for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
 
     def show_stage(self, stage: npt.ArrayLike) -> None:
-        """Writes the stages (2,) of left and right above where the garment was first shown."""
+        """Writes the stages (2,) of left and right above the garment's first position."""
         names = [STAGE_NAMES[int(np.clip(s, 0, 2))] for s in np.ravel(np.asarray(stage))]
         label = f"left: {names[0]}   right: {names[1]}"
         if label == self.label or self._label_at is None:
             return
         self.label = label
-        # Meshcat knows no text, so its pixels are drawn: twice, to be read from the front and
-        # from behind, each with the person's left where the viewer sees it.
+        # Meshcat has no text, so its pixels are drawn: once readable from the front, once from
+        # behind, each with the person's left on the side where the viewer sees it.
         written = f"right: {names[1]}   left: {names[0]}"
         for name, text, toward in (("front", written, 1.0), ("back", label, -1.0)):
             flat, triangles = _text_mesh(text, _TEXT_HEIGHT)
@@ -155,7 +155,7 @@ class DressingScene:
 
 @plain_settings()
 def _text_mesh(text: str, height: float) -> tuple[FloatArray, IntArray]:
-    """Returns points (2,k), m, centred, and triangles (3,t) that cover the pixels of a text."""
+    """Returns centred points (2,k), m, and triangles (3,t) that cover the pixels of a text."""
     figure = new_figure(0.18 * len(text) + 0.4, 0.6, dpi=72)
     figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")
     ink = pixels(figure)[:, :, 0] < 128

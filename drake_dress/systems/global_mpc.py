@@ -19,9 +19,9 @@ from drake_dress.models.dressing.stages import Stage
 from drake_dress.models.immutable import Immutable
 from drake_dress.systems.worker_process import WorkerProcess
 
-# Between looks for a plan where the world does not wait, s.
+# Polling period for a finished plan if `waits` is False, s.
 _LOOKING_PERIOD = 0.01
-# Between looks whether to give up a rehearsal, s.
+# Polling period for the request to stop a rehearsal, s.
 _REHEARSAL_STEP = 0.05
 
 
@@ -35,15 +35,15 @@ class _Finished:
 
 @dataclass(frozen=True)
 class _Progress(Immutable):
-    """The solve under way in a context, if there is one.
+    """The solve in progress in a context, if any.
 
-    A copy of the context awaits the same result: what a solve gives depends on what it was begun
-    with alone, and a Future can be read more than once.
+    A copy of the context waits for the same result: a solve depends on its inputs only, and a
+    Future can be read more than once.
 
     Attributes:
-        pending: the result, None while no solve is under way.
-        begun_at: when the last solve was begun, s.
-        failure: why there are no more solves.
+        pending: Future result; None while no solve is in progress.
+        begun_at: Start time of the last solve, s.
+        failure: Reason why planning has ended; None otherwise.
     """
 
     pending: Future[_Finished] | None = None
@@ -53,7 +53,7 @@ class _Progress(Immutable):
 
 @dataclass(frozen=True)
 class _Solve:
-    """One solve, anywhere."""
+    """One solve, in a thread or a worker process."""
 
     policy: DressingPolicy
 
@@ -76,7 +76,7 @@ def _submitted(pool: ThreadPoolExecutor, work: _Solve, *arguments: Any) -> Futur
 
 
 class GlobalMpc(LeafSystem):
-    """Solves for a plan at a fixed rate and hands it out after a modelled delay.
+    """Solves for a plan at a fixed rate and outputs it after a modelled delay.
 
     .. pydrake_system::
 
@@ -93,32 +93,33 @@ class GlobalMpc(LeafSystem):
         - age
 
     garment_*: (3m,) of the controller's garment, m, m/s. plan: GlobalPlan. stage: (2,) 0 prepare,
-    1 dress, 2 done. target: (6,) where left and right armhole shall be next, m. solve_time: (2,)
-    wall time of the last solve that ended, s, and the count of solves ended. age: (1,) since what
-    the plan in use answers was seen, s.
+    1 dress, 2 done. target: (6,) target positions of left and right armhole, m. solve_time: (2,)
+    wall time of the last finished solve, s, and the number of finished solves. age: (1,) time since
+    the observation that the plan in use is based on, s.
 
-    A solve starts from what is seen at k·period, and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine. It runs on a background thread,
-    or with `in_worker` in a worker process, which the rest of the diagram slows down less.
+    A solve starts from the observation at k·period, and its plan is used from k·period + delay on,
+    however long the solve takes: the run is the same on any machine. Solves run on a background
+    thread. With `in_worker=True` they run in a worker process, which competes less with the rest of
+    the diagram.
 
-    Where the world does not wait, `waits` is False. Solves then run in a worker process, one at a
-    time, and a plan is used from k·period + delay on, or as soon as it is there if that is later.
-    The prediction includes what the last plan does until then. If no new plan has come a period
-    after the end of the last one, the grippers rest. A solve that fails, or takes longer than
+    With `waits=False`, time does not wait for a solve (hardware). Solves then run in a worker
+    process, one at a time. A plan is used from k·period + delay on, or once it is ready if that is
+    later. The prediction includes the last plan's motion until then. If no new plan arrives within
+    one period after the last one ends, the grippers rest. A solve that fails, or takes longer than
     `patience`, ends planning.
 
     Args:
-        policy: does the work.
-        period: time between solves, s.
-        delay: time from an observation to the use of its plan, s; less than the period and as long
-            as the policy's committed steps.
-        waits: whether the world waits for a solve that takes longer than its delay.
-        patience: longest time of a solve where the world does not wait, s.
-        in_worker: whether solves run in a worker process where the world waits, too.
+        policy: Computes the plans.
+        period: Time between solves, s.
+        delay: Time from an observation to the use of its plan, s; less than the period and equal to
+            the duration of the policy's committed steps.
+        waits: Whether simulated time waits for a solve that takes longer than its delay.
+        patience: Longest permitted solve if `waits` is False, s.
+        in_worker: Whether solves run in a worker process even if `waits` is True.
 
-    All that a run changes stands in its context: several simulators of one diagram give what each
-    gives alone. They share the thread or process that solves, one solve after another; where the
-    world does not wait, a failure of one ends the solve under way of another, too.
+    All state of a run is in its context, so several simulators of one diagram give the same results
+    as each alone. They share the thread or process that solves, one solve after another. With
+    `waits=False`, a failure in one also ends the solve in progress of another.
     """
 
     def __init__(
@@ -152,7 +153,7 @@ class GlobalMpc(LeafSystem):
         self._plan = self.DeclareAbstractState(Value(self._idle))
         self._memory = self.DeclareAbstractState(Value(policy.initial_state()))
         self._progress = self.DeclareAbstractState(Value(_Progress()))
-        # what `_show` shows, and the time of the observation that the plan in use is based on
+        # the outputs of `_show`, and the time of the observation that the plan in use is based on
         self._shown = self.DeclareDiscreteState(np.zeros(11))
         self.DeclareVectorInputPort("garment_position", 3 * m)
         self.DeclareVectorInputPort("garment_velocity", 3 * m)
@@ -165,7 +166,7 @@ class GlobalMpc(LeafSystem):
             self.DeclarePeriodicUnrestrictedUpdateEvent(_LOOKING_PERIOD, 0.0, self._look)
 
     def _declare_outputs(self) -> None:
-        """Declares the output ports; all but the age depend on state only."""
+        """Declares the output ports; all except `age` depend on state only."""
         self.DeclareAbstractOutputPort(
             "plan",
             lambda: Value(self._idle),
@@ -186,14 +187,14 @@ class GlobalMpc(LeafSystem):
     def rehearse(
         self, x: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool]
     ) -> GlobalPlan | None:
-        """Returns a plan of where a run begins, of which the run does not know.
+        """Solves once from the start of a run without affecting the run, and returns the plan.
 
-        The first solve anywhere may take a minute, in which its kernels are compiled.
+        The first solve may take a minute, because it compiles its kernels.
 
         Args:
-            x: (m,3) of the controller's garment, m.
-            joints: (6,3) where they stay, m.
-            stopped: whether to give up; None is returned then.
+            x: (m,3) controller's garment, m.
+            joints: (6,3) joints, assumed to stay at rest, m.
+            stopped: Returns whether to give up; the result is then None.
         """
         p = self._policy.parameters
         solving = self._submit(
@@ -210,7 +211,7 @@ class GlobalMpc(LeafSystem):
         return self._plan_of(solving.result(), 0.0)
 
     def _plan_of(self, finished: _Finished, start: float) -> GlobalPlan:
-        """Returns the plan from the end of its committed steps on, which is at `start`."""
+        """Returns the plan after its committed steps, which end at time `start`."""
         decision, p = finished.decision, self._policy.parameters
         first = p.committed_steps
         return GlobalPlan(
@@ -223,13 +224,14 @@ class GlobalMpc(LeafSystem):
         )
 
     def failure(self, context: Context) -> str | None:
-        """Returns why there are no plans any more, in its own context; None while there are."""
+        """Returns why planning has ended, from this system's own context; None if it has not."""
         return self._progress_in(context).failure
 
     def is_finished(self, context: Context) -> bool:
-        """Returns whether both sleeves are done, and still on as they are seen now, in its context.
+        """Returns whether both sleeves are done and still on, from this system's own context.
 
-        Stages are those of the plan in use, which is of a second ago: a sleeve may have slipped.
+        The stages are those of the plan in use, about a second old. A sleeve may have slipped since
+        then, so the current observation is checked, too.
         """
         if np.any(context.get_discrete_state(self._shown).value()[:2] < Stage.DONE):
             return False
@@ -250,7 +252,7 @@ class GlobalMpc(LeafSystem):
         v = self.get_input_port(1).Eval(context).reshape(-1, 3).copy()
         joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3).copy()
         memory = context.get_abstract_state(self._memory).get_value()
-        # periods that were missed are gone, too
+        # count missed periods as elapsed
         periods = max(1, round((now - progress.begun_at) / self._period))
         steps = periods * self._period / self._policy.parameters.time_step
         pending = self._submit(memory, x, v, joints, now, steps)
@@ -282,7 +284,7 @@ class GlobalMpc(LeafSystem):
         self._set_progress(state, _Progress(None, progress.begun_at, f"global controller: {why}"))
         state.get_mutable_abstract_state(self._plan).set_value(self._idle)
         if self._worker is not None:
-            # nobody waits for it, the end of this process included
+            # nothing waits for the worker any more, and it must not delay the end of this process
             self._worker.kill()
 
     def _finish(self, context: Context, state: State) -> None:
@@ -319,7 +321,7 @@ class GlobalMpc(LeafSystem):
 
 
 def _check_delay(policy: DressingPolicy, period: float, delay: float) -> None:
-    """Raises a ValueError if a plan would not be used when its committed steps end."""
+    """Raises a ValueError unless the delay equals the duration of the committed steps."""
     if not 0.0 < delay < period:
         raise ValueError(f"delay is {delay} s, expected between 0 and the period {period} s")
     committed = policy.parameters.committed_steps * policy.parameters.time_step

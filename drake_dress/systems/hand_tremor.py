@@ -1,4 +1,4 @@
-"""Hands that tremble."""
+"""Tremor of the arms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drake_dress.models.human.tremor import TremorWave
 
 
 class HandTremor(LeafSystem):
-    """Shakes both arms, each in its own time; see `models/human/tremor.py`.
+    """Applies tremor torques to both arms, independently; see `models/human/tremor.py`.
 
     .. pydrake_system::
 
@@ -17,14 +17,15 @@ class HandTremor(LeafSystem):
         output_ports:
         - generalized_force
 
-    generalized_force: (nv,) for the plant's applied generalized force, N·m; of time alone.
+    generalized_force: (nv,) for the plant's applied generalized force, N·m; it depends on
+    time only.
 
     Args:
-        torque: (8,) amplitudes of left, then right arm's joints, N·m.
-        frequency: Hz.
-        seed: of phases and wandering; the same seed trembles the same.
+        torque: (8,) amplitudes at the left, then the right arm's joints, N·m.
+        frequency: Mean frequency, Hz.
+        seed: Seed of phases and frequency drift; equal seeds give equal tremor.
         velocity_count: nv of the plant.
-        velocity_index: (8,) of the arms' joints in it.
+        velocity_index: (8,) indices of the arms' joints in the plant's velocities.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Where the person's arms will be."""
+"""Prediction of the person's arms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drake_dress.models.human.prediction import MotionPredictor, resampled
 
 
 class HumanPredictor(LeafSystem):
-    """Remembers how the arms moved, and asks a predictor how they move on.
+    """Stores the history of the arms and predicts their motion from it.
 
     .. pydrake_system::
 
@@ -19,15 +19,15 @@ class HumanPredictor(LeafSystem):
         output_ports:
         - predicted_joint_position
 
-    joint_position: (18,) row-major (6,3), m, NaN where a joint is not seen; sampled at the
-    predictor's period. predicted_joint_position: ((steps+1)·18,) row-major (steps+1,6,3), m, row 0
-    is now, then every `time_step`. It is as fresh as its input: now is the last of the history,
-    the samples before it are taken at whole periods before now. Before time 0 nothing was seen.
+    joint_position: (18,) row-major (6,3), m, NaN for a joint that is not seen; sampled at the
+    predictor's period. predicted_joint_position: ((steps+1)·18,) row-major (steps+1,6,3), m: row 0
+    is the current time, then one row every `time_step`. The history ends with the current input;
+    earlier samples are resampled to whole periods before now. It is NaN before time 0.
 
     Args:
-        predictor: does the work.
-        time_step: between predicted rows, s.
-        steps: how many rows beyond now.
+        predictor: Predicts the motion.
+        time_step: Time between predicted rows, s.
+        steps: Number of rows after the current one.
     """
 
     def __init__(self, predictor: MotionPredictor, time_step: float, steps: int) -> None:

@@ -1,4 +1,4 @@
-"""What a perfect pose estimator would tell of the person's arms."""
+"""A perfect estimator of the person's arm pose."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drake_dress.systems.body_frames import world_points
 
 
 class JointOracle(LeafSystem):
-    """Reads shoulder, elbow and hand of both arms off the true person.
+    """Outputs shoulder, elbow and hand of both arms of the true person.
 
     .. pydrake_system::
 
@@ -28,8 +28,8 @@ class JointOracle(LeafSystem):
     joint_position: (18,) row-major (6,3): shoulder, elbow, hand of left, then of right, m, world.
 
     Args:
-        points: body index and point in the body's frame (3,), m, for each of the six joints.
-        effects: those on cameras displace what is seen.
+        points: Body index and point in the body's frame (3,), m, for each of the six joints.
+        effects: Physical effects; those of cameras displace the observed joints.
     """
 
     def __init__(

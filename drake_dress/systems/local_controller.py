@@ -24,7 +24,7 @@ from drake_dress.models.sides import SIDES
 
 @dataclass(frozen=True)
 class _Memory(Immutable):
-    """What was solved last: of it the newest plan is handed out once its delay has passed."""
+    """Result of the last solve; its plan is output once its delay has passed."""
 
     state: LocalState
     plan: LocalPlan
@@ -33,13 +33,13 @@ class _Memory(Immutable):
 
 @dataclass(frozen=True)
 class _Solving(Immutable):
-    """The result of the solve under way on the thread, if there is one; copies await the same."""
+    """The solve in progress on the thread, if any; copies wait for the same result."""
 
     pending: Future[_Memory] | None = None
 
 
 class LocalCompensation(LeafSystem):
-    """Solves local problems at a fixed rate, and corrects between two solves by their gains.
+    """Solves the local problem at a fixed rate; applies its feedback gains between solves.
 
     .. pydrake_system::
 
@@ -57,24 +57,24 @@ class LocalCompensation(LeafSystem):
         - solve_time
 
     plan: GlobalPlan. garment_position: (3m,) of the controller's garment, m.
-    predicted_joint_position: ((M+1)·18,), m, row 0 now, then every `joints_step`. Gripper positions
-    and requests: (3,) m and m/s. request_time: (1,) time of the observation that the requests are
-    based on, s; old if a solver hangs. solve_time: (2,) wall time of the last finished solve, s,
-    and the number of finished solves.
+    predicted_joint_position: ((M+1)·18,), m: row 0 is now, then one row every `joints_step`.
+    Gripper positions and requests: (3,) m and m/s. request_time: (1,) time of the observation that
+    the requests are based on, s; old if a solver hangs. solve_time: (2,) wall time of the last
+    finished solve, s, and the number of finished solves.
 
-    A solve starts from what is seen at k·period, and its plan is used from k·period + delay on,
-    however long it really took: the run is the same on any machine. With `in_worker`, it solves on
-    a background thread.
+    A solve starts from the observation at k·period, and its plan is used from k·period + delay on,
+    however long the solve takes: the run is the same on any machine. With `in_worker=True` it
+    solves on a background thread.
 
     Args:
-        controller: does the work.
-        period: time between solves, s.
-        delay: time from an observation to the use of its plan, s; less than the period.
-        joints_step: between predicted joints, s.
-        joints_count: M, how many there are beyond now.
-        feedback: whether to correct between solves.
-        record: takes each problem solved, if given, of all contexts.
-        in_worker: whether to solve on a background thread.
+        controller: Solves the local problem.
+        period: Time between solves, s.
+        delay: Time from an observation to the use of its plan, s; less than the period.
+        joints_step: Time between predicted joint positions, s.
+        joints_count: M, number of predicted positions after the current one.
+        feedback: Whether to apply feedback gains between solves.
+        record: List to which each solved problem of every context is appended, if given.
+        in_worker: Whether to solve on a background thread.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class LocalCompensation(LeafSystem):
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (joints_count + 1))
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
-        # of both grippers, (2,3): the garment is looked at once
+        # for both grippers (2,3), so that the garment is evaluated once
         self._velocity = self.DeclareCacheEntry(
             "velocity",
             ValueProducer(allocate=Value(np.zeros((2, 3))).Clone, calc=self._calc_velocity),
@@ -151,7 +151,7 @@ class LocalCompensation(LeafSystem):
             state.get_mutable_abstract_state(self._memory).set_value(self._solved(looked, *seen))
 
     def _solved(self, looked: float, *seen: Any) -> _Memory:
-        """Returns what is known after a solve, for which it took `looked`, s, to see."""
+        """Returns the result of a solve; reading its inputs took `looked`, s."""
         begin = clock.perf_counter()
         outcome = self._controller.solve(*seen)
         if self._record is not None and outcome.problem is not None:

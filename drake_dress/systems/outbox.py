@@ -1,4 +1,4 @@
-"""What a simulated lab sends, and how it goes wrong when it is asked to."""
+"""Publishes messages of a simulated lab, with optional fault injection."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drake_dress.systems.spoiler import Spoil, Spoiler
 
 
 class Outbox(LeafSystem):
-    """Publishes a message at a fixed rate, as LcmPublisherSystem does, unless a fault is on.
+    """Publishes a message at a fixed rate, like LcmPublisherSystem, but with injected faults.
 
     .. pydrake_system::
 
@@ -29,17 +29,17 @@ class Outbox(LeafSystem):
         - since (optional)
         output_ports: []
 
-    since: (1,) time since the first command, s, to which faults are timed.
+    since: (1,) time since the first command, s; fault times count from it.
 
     Args:
-        source: the message's name among faults.
-        channel: where to.
-        serializer: of the message.
-        lcm_type: Python class of it.
-        lcm: bus.
-        period: s. offset: of the first message, s.
-        faults: what goes wrong, and when.
-        spoils: what kinds of faults do to a message, beside those that `Spoiler` knows.
+        source: Name of the message's source in faults.
+        channel: LCM channel.
+        serializer: Serializer of the message.
+        lcm_type: Python class of the message.
+        lcm: LCM bus.
+        period: Period, s. offset: Time of the first message, s.
+        faults: Faults to inject, with their times.
+        spoils: By kind of fault, how it changes a message; adds to those built into `Spoiler`.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Outbox(LeafSystem):
         self.DeclarePeriodicPublishEvent(period, offset, self._publish)
 
     def _stamped(self, context: Context, encoded: bytes) -> bytes:
-        """Returns what is sent in place of a message that nothing is wrong with."""
+        """Returns the bytes to send for a message before faults are applied."""
         return encoded
 
     def _publish(self, context: Context) -> EventStatus:
@@ -79,7 +79,7 @@ class Outbox(LeafSystem):
 
 
 class StatusOutbox(Outbox):
-    """Publishes an arm's status, with what Drake's PandaStatusSender leaves out.
+    """Publishes an arm's status, including fields that Drake's PandaStatusSender omits.
 
     .. pydrake_system::
 
@@ -90,9 +90,9 @@ class StatusOutbox(Outbox):
         - stop
         output_ports: []
 
-    stop: (1,) why the arm's driver does not follow, of `models.arm.command_guard.Stop`. It becomes
-    the message's robot_mode: moving, idle, or reflex. robot_utime is this machine's monotonic
-    clock, µs, by which latency is measured.
+    stop: (1,) a `models.arm.command_guard.Stop`: why the arm's driver does not follow commands. It
+    sets the message's robot_mode: moving, idle or reflex. robot_utime is this machine's monotonic
+    clock, µs; it is used to measure latency.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
@@ -111,6 +111,6 @@ _TAIL = struct.Struct(">bqb")
 
 
 def with_tail(encoded: bytes, robot_mode: int, robot_utime: int) -> bytes:
-    """Returns the bytes of a lcmt_panda_status with another mode and time of the robot."""
+    """Returns the bytes of a lcmt_panda_status with its robot mode and time replaced."""
     *_, control_mode = _TAIL.unpack(encoded[-_TAIL.size :])
     return encoded[: -_TAIL.size] + _TAIL.pack(robot_mode, robot_utime, control_mode)

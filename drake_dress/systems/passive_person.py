@@ -10,7 +10,7 @@ from drake_dress.models.human.following import FollowingParameters, following_ra
 
 
 class PassivePerson(LeafSystem):
-    """Holds both arms where the garment has led them; see `models/human/following.py`.
+    """Holds both arms where the garment has moved them; see `models/human/following.py`.
 
     .. pydrake_system::
 
@@ -21,14 +21,15 @@ class PassivePerson(LeafSystem):
         - set_point
 
     person_state: (2k,) angles, rad, then rates, rad/s, of the person's k joints. set_point: (8,)
-    of left, then right arm: abduction, extension, rotation, elbow, rad; of the state alone.
+    abduction, extension, rotation, elbow of the left, then the right arm, rad; it depends on state
+    only.
 
     Args:
-        arms: kinematics, joints, and the rest pose, where the set-point begins.
+        arms: Kinematics, joints and rest pose; the set-point starts at the rest pose.
         joint_count: k.
-        arm_dofs: (8,) which of them are the arms'.
-        parameters: of the following.
-        period: of its discrete update, s.
+        arm_dofs: (8,) indices of the arms' joints among the k joints.
+        parameters: How the arms follow the garment.
+        period: Period of the discrete update, s.
     """
 
     def __init__(

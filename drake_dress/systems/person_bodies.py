@@ -16,18 +16,18 @@ from drake_dress.systems.body_frames import frames
 
 
 class PersonBodies:
-    """Where the person's capsules are, from the poses and velocities that a plant reports.
+    """Computes the person's capsules from the body poses and velocities of a plant.
 
     Args:
-        capsules: of the person, fixed in their bodies.
-        body_indices: body name to its index in the plant.
+        capsules: Capsules of the person, fixed in their bodies.
+        body_indices: Body name to its index in the plant.
 
     Attributes:
-        index: of the bodies in the plant, one for each body that has capsules.
+        index: Indices in the plant of the bodies that have capsules.
         body_of: (k,) for each capsule, the position of its body in `index`.
         limb_of: (k,) for each capsule, the number of its limb; −1 on the trunk and legs.
-        limb_count: number of limbs: upper arms and forearms.
-        radius: (k,) m.
+        limb_count: Number of limbs: upper arms and forearms.
+        radius: (k,) radii of the capsules, m.
     """
 
     def __init__(self, capsules: Sequence[Capsule], body_indices: Mapping[str, BodyIndex]) -> None:
@@ -47,8 +47,8 @@ class PersonBodies:
         """Returns the capsules in the world.
 
         Args:
-            poses: of all bodies of the plant, in the world.
-            velocities: of the same bodies, in the world.
+            poses: Poses of all bodies of the plant, in the world.
+            velocities: Velocities of the same bodies, in the world.
         """
         frame = frames(poses, self.index)[self.body_of]
         rotation, origin = frame[:, :, :3], frame[:, :, 3]

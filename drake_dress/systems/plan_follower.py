@@ -1,4 +1,4 @@
-"""From plan to gripper velocities."""
+"""Gripper velocities from a plan."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drake_dress.models.sides import SIDES
 
 
 class PlanFollower(LeafSystem):
-    """Asks for the plan's velocities, each at its time.
+    """Requests the plan's velocity at the current time.
 
     .. pydrake_system::
 
@@ -24,9 +24,9 @@ class PlanFollower(LeafSystem):
         - right_velocity_request
         - request_time
 
-    Requests (3,) m/s; request_time (1,) when they were made, s: now. A plan that has run out, or
-    has not begun, means rest. Without state: what the grippers do with a request is not its
-    concern, so that nothing winds up here while they are held back.
+    Requests (3,) m/s; request_time (1,) time of the requests, s: now. Before the plan starts and
+    after it ends, the requests are zero. The system has no state and does not integrate the
+    tracking error, so it cannot wind up while the grippers are held back.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
-"""Points that an estimator reports, as `lcmt_point_cloud`: of the garment, or of the person's arms.
+"""Estimated points of the garment or of the person's arms, as `lcmt_point_cloud`.
 
-A message has one row a point, in the order of the controller's nodes or joints, with fields x, y,
-z, m, and vx, vy, vz, m/s, where it has velocities: float32, in the world frame.
+A message has one row per point, in the order of the controller's nodes or joints. Its fields are x,
+y, z, m, and optionally vx, vy, vz, m/s: float32, in the world frame.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def encode_points(time: float, *columns: FloatArray) -> lcmt_point_cloud:
 
 
 def decode_points(message: Any) -> FloatArray | None:
-    """Returns (m,3) or (m,6) positions, m, and velocities, m/s; None if it is something else."""
+    """Returns (m,3) or (m,6) positions, m, and velocities, m/s; None for any other message."""
     names = tuple(entry.name for entry in message.fields)
     width = len(names)
     if (
@@ -62,20 +62,21 @@ def decode_points(message: Any) -> FloatArray | None:
 
 
 def check_points(count: int) -> Callable[[Any], Finding]:
-    """Returns a check of messages of so many points."""
+    """Returns a check of messages with `count` points."""
     return lambda message: read_points(message, count)[0]
 
 
 def read_points(message: Any, count: int, names: Sequence[str] = ()) -> tuple[Finding, FloatArray]:
-    """Returns whether a message is of so many points, all finite, and the points.
+    """Checks that a message has `count` finite points, and returns them.
 
     Args:
         message: `lcmt_point_cloud`.
-        count: of the points.
-        names: of the points, where they have some.
+        count: Expected number of points.
+        names: Names of the points, if any.
 
     Returns:
-        what is wrong, and (count,3) or (count,6) as of `decode_points`; (0,3) if something is.
+        What is wrong, and the points (count,3) or (count,6) as in `decode_points`; (0,3) on a
+        fault.
     """
     values, none = decode_points(message), np.zeros((0, 3))
     if values is None:
@@ -90,7 +91,7 @@ def read_points(message: Any, count: int, names: Sequence[str] = ()) -> tuple[Fi
 
 
 class PointSender(LeafSystem):
-    """Makes messages of points.
+    """Converts points into messages.
 
     .. pydrake_system::
 
@@ -105,7 +106,7 @@ class PointSender(LeafSystem):
 
     Args:
         count: m.
-        has_velocity: whether there are velocities.
+        has_velocity: Whether messages have velocities.
     """
 
     def __init__(self, count: int, has_velocity: bool) -> None:
@@ -125,7 +126,7 @@ class PointSender(LeafSystem):
 
 
 class PointReceiver(LeafSystem):
-    """Hands out the points of the last sound message.
+    """Outputs the points of the last valid message.
 
     .. pydrake_system::
 
@@ -136,11 +137,11 @@ class PointReceiver(LeafSystem):
         - position
         - velocity
 
-    received: of `LcmInbox` kind. Outputs (3m,) row-major (m,3), m, m/s; velocities are 0 where
-    messages have none.
+    received: a `Received`. Outputs (3m,) row-major (m,3), m, m/s; velocities are 0 if messages have
+    none.
 
     Args:
-        start: (m,3) what is handed out before the first message, m.
+        start: (m,3) output before the first message, m.
     """
 
     def __init__(self, start: FloatArray) -> None:

@@ -1,4 +1,4 @@
-"""Noise of a tracker's points."""
+"""Measurement noise of tracked points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 
 class PointNoise(LeafSystem):
-    """Adds noise to points: a function of the time alone, the same for the same seed.
+    """Adds noise to points; the noise depends on time and seed only.
 
     .. pydrake_system::
 
@@ -21,8 +21,8 @@ class PointNoise(LeafSystem):
 
     Args:
         count: m.
-        deviation: standard deviation on each axis, m.
-        seed: of the noise.
+        deviation: Standard deviation on each axis, m.
+        seed: Seed of the noise.
     """
 
     def __init__(self, count: int, deviation: float, seed: int) -> None:
@@ -33,7 +33,7 @@ class PointNoise(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         position = self.get_input_port().Eval(context)
-        # µs since the diagram's beginning, which may be negative by rounding alone
+        # time in µs, which rounding may make negative
         moment = max(0, round(1e6 * context.get_time()))
         noise = np.random.default_rng([self._seed, moment]).normal(size=position.shape)
         output.SetFromVector(position + self._deviation * noise)

@@ -20,7 +20,7 @@ from drake_dress.report.arm_extremes import ArmExtremes
 from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
 from drake_dress.systems.body_frames import world_points
 
-# In the order of `ArmSample`.
+# Ports of an arm, in the order of `ArmSample`.
 _OF_ARM = ("position", "velocity", "command", "torque")
 
 
@@ -57,26 +57,26 @@ class RunRecorder(LeafSystem):
         - clearance
         - active
 
-    Sizes and units as at the ports of station and controllers. Of the verdicts (2,) between two
-    samples nothing is lost: a sample holds all their flags. local_solve_time is there where there
-    is a local controller; of what it solves between samples the last is kept. The ports after it
-    are there with arms; of their clearance the least between two samples is kept, of joints,
-    speeds, torques what was largest at any `arm_period`. contact,
-    contact_force, body_poses are there where truth is known; stage, solve_time, verdict, clearance
-    where there are controllers. Where something is connected to active (1,), samples are taken
-    while it is positive, and time counts from the first.
+    Sizes and units are those of the ports of station and controllers. A sample combines the flags
+    of all verdicts (2,) since the previous sample. local_solve_time exists only with a local
+    controller; a sample holds its last solve time. The arm ports and clearance exist only with
+    arms. A sample holds the least clearance since the previous sample, and the extremes of joint
+    positions, speeds and torques, observed every `arm_period`. contact, contact_force and
+    body_poses exist only if the truth is known; stage, solve_time, verdict and clearance only with
+    controllers. If active (1,) is connected, samples are taken only while it is positive, and time
+    counts from the first sample.
 
     Args:
-        writer: the open log.
-        mesh: the plant's garment.
-        estimate_count: nodes of the controller's garment.
-        capsules: of the person, with the index of the body each is fixed in; or, where truth is
-            not known, the person as controllers know it.
-        period: between samples, s.
-        verdict_period: between verdicts, s.
-        has_local: whether there is a local controller.
-        arm_period: between looks at the arms, s; None: there are none.
-        has_control: whether there are controllers.
+        writer: The open log.
+        mesh: The plant's garment.
+        estimate_count: Number of nodes of the controller's garment.
+        capsules: Capsules of the person, each with the index of its body; or, if the truth is not
+            known, the controllers' model of the person.
+        period: Time between samples, s.
+        verdict_period: Time between verdicts, s.
+        has_local: Whether there is a local controller.
+        arm_period: Time between observations of the arms, s; None without arms.
+        has_control: Whether there are controllers.
     """
 
     def __init__(
@@ -165,12 +165,12 @@ class RunRecorder(LeafSystem):
         self._writer.append(self._sample(context, context.get_time() - self._begun))
 
     def _is_active(self, context: Context) -> bool:
-        """Returns whether samples are taken: always, where nothing is connected to `active`."""
+        """Returns whether to take samples: always, if `active` is not connected."""
         active = self.GetInputPort("active")
         return not active.HasValue(context) or bool(active.Eval(context)[0] > 0.0)
 
     def _has_heard(self, context: Context) -> bool:
-        """Returns whether the grippers are known: of hardware, only after its first messages."""
+        """Returns whether gripper positions are known: on hardware, after the first messages."""
         if self._model is None or self._heard:
             return True
         grippers = [self._value(context, f"{side}_gripper_position") for side in SIDES]
@@ -178,7 +178,7 @@ class RunRecorder(LeafSystem):
         return self._heard
 
     def _sample(self, context: Context, time: float) -> Sample:
-        """Returns the sample of an instant; what was collected since the last one starts anew."""
+        """Returns the current sample and resets what was collected since the last one."""
 
         def value(name: str) -> np.ndarray:
             return self._value(context, name)
@@ -223,7 +223,7 @@ class RunRecorder(LeafSystem):
     def _dressing(
         self, x: np.ndarray, joints: np.ndarray
     ) -> dict[Side, tuple[float, float, float]]:
-        """Returns (s, l, theta) of both sleeves of the garment (n,3) on joints (6,3)."""
+        """Returns (s, l, theta) of both sleeves, from the garment (n,3) and joints (6,3)."""
         interior = torso_interior(joints[0], joints[3])
         dressing = {}
         for i, side in enumerate(SIDES):
@@ -232,7 +232,7 @@ class RunRecorder(LeafSystem):
             loop = self._mesh.loops[f"{side}_armhole"]
             s, l, theta = axis.coordinates(sleeve_state(x, loop, self._signs[i]).p_c)
             inside = arm_linking_number(x[loop], shoulder, elbow, hand, interior)
-            # a sleeve that does not cover its arm has no progress, wherever its centre is
+            # a sleeve that does not enclose its arm has no progress, wherever its centre is
             dressing[side] = (s if inside else 0.0, l, theta)
         return dressing
 
@@ -258,9 +258,9 @@ class RunRecorder(LeafSystem):
         return a, b
 
     def _ended(self, context: Context, name: str) -> tuple[float, int]:
-        """Returns the last solve's time, s, and how many ended since the sample before.
+        """Returns the last solve time, s, and the number of solves since the last sample.
 
-        The time is NaN where none did.
+        The time is NaN if there were none.
         """
         if not self._has_control or (name == "local_solve_time" and not self._has_local):
             return np.nan, 0

@@ -1,4 +1,4 @@
-"""What stands between a controller and two arms."""
+"""The safety layer between the controller and both arms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from drake_dress.models.sides import SIDES
 
 
 class SafetyGovernor(LeafSystem):
-    """Turns velocity requests into position commands that obey limits, whatever is requested.
+    """Converts velocity requests into position commands that always obey the limits.
 
     .. pydrake_system::
 
@@ -44,24 +44,24 @@ class SafetyGovernor(LeafSystem):
         - right_velocity_command
         - verdict
 
-    Requests (3,) m/s in W; request_time (1,) when the controller made both, s, of the diagram's
-    clock. Positions (3,) p_WG, m; forces (3,) of the garment on the gripper, N. verdict (2,): of
-    left and right, the flags of `models.control.safety.Verdict` as a number. joint_position (18,):
-    shoulder, elbow, hand of left, then right arm in W, m; may be left open. Outputs are of the
-    state alone, no feedthrough. Any input may be NaN or infinite.
+    Requests (3,) m/s in W; request_time (1,) time of both requests, s, on the diagram's clock.
+    Positions (3,) p_WG, m; forces (3,) of the garment on the gripper, N. verdict (2,): flags of
+    `models.control.safety.Verdict` for left and right, as a number. joint_position (18,): shoulder,
+    elbow, hand of left, then right arm in W, m; optional. Outputs depend on state only, without
+    feedthrough. Any input may be NaN or infinite.
 
-    The law is that of `models/control/safety.py`. The governor integrates its commands itself: it
+    The control law is in `models/control/safety.py`. The governor integrates its own commands and
     takes no position from a controller.
 
     Args:
         start: (2,3) p_WG of left and right at time 0, m.
-        period: of the commands, s.
-        limits: which are kept.
-        person: their shape; None: grippers may touch them.
-        held: of left and right, (k,3) where the cloth that it holds is from the gripper, m.
+        period: Period of the commands, s.
+        limits: Limits to enforce.
+        person: Shape of the person; with None, grippers may touch them.
+        held: For left and right, (k,3) positions of the held cloth relative to the gripper, m.
 
     Raises:
-        ValueError: the start is outside the limits of place.
+        ValueError: The start is outside the position limits.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class SafetyGovernor(LeafSystem):
         self._period = period
         self._limits = limits
         self._person = person
-        # of each gripper itself, then of what it holds, and by how much nearer that may be
+        # offsets of each gripper and of its held cloth, which may come `nearer` to the person
         offsets = [np.vstack([np.zeros((1, 3)), *held[i : i + 1]]) for i in range(len(SIDES))]
         self._offset = np.vstack(offsets)
         self._side = np.repeat([0, 1], [len(k) for k in offsets])
@@ -105,7 +105,7 @@ class SafetyGovernor(LeafSystem):
             "verdict", 2, self._calc_verdict, {self.discrete_state_ticket(self._verdict)}
         )
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
-        # compiled now and not when something is first cut, which must not wait half a second
+        # compile now: the first limited request must not wait half a second for it
         too_fast = Request(np.full((2, 3), limits.max_speed), 0.0)
         step(GovernorState(start), too_fast, Measurement(start, 0.0 * start), limits, 0.0, period)
         if person is not None:
@@ -133,7 +133,7 @@ class SafetyGovernor(LeafSystem):
         discrete.set_value(self._verdict, [float(v) for v in verdicts])
 
     def _skin(self, context: Context, position: np.ndarray) -> Skin | None:
-        """Returns the person next to `position` (2,3), m; None where they are not seen."""
+        """Returns the person's surface near `position` (2,3), m; None if the person is not seen."""
         joints = self.GetInputPort("joint_position")
         if self._person is None or not joints.HasValue(context):
             return None
@@ -143,9 +143,9 @@ class SafetyGovernor(LeafSystem):
         return self._beside(self._person, seen, position)
 
     def _beside(self, person: PersonModel, joints: np.ndarray, position: np.ndarray) -> Skin:
-        """Returns the person whose joints (6,3) are seen next to `position` (2,3), m.
+        """Returns the surface of a person with joints (6,3) near `position` (2,3), m.
 
-        The gripper or the cloth in it, whichever has less room.
+        Of each gripper and its held cloth, the point with the least clearance counts.
         """
         bodies = Obstacles.resting(*person_capsules(person, joints))
         near = find_proximity(position[self._side] + self._offset, bodies, 0.0)

@@ -1,4 +1,4 @@
-"""Memory that two processes share, without /dev/shm, which containers may lack."""
+"""Memory shared by processes, without /dev/shm, which containers may lack."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from typing import Any
 
 
 class SharedMemory:
-    """Memory that a process has in common with those that it starts and passes this to.
+    """Memory that a process shares with child processes to which it is passed.
 
-    It can be pickled only for a process that is being started.
+    It can be pickled only while a child process is being started.
 
     Args:
-        size: bytes, more than 0.
+        size: Number of bytes, more than 0.
 
     Attributes:
-        memory: the bytes, 0 at first.
+        memory: The bytes, initially 0.
     """
 
     def __init__(self, size: int) -> None:
@@ -38,7 +38,7 @@ class SharedMemory:
 
 
 def _file() -> int:
-    """Returns an open file that is in memory alone, or without a name where that is not known."""
+    """Returns an open file in memory, or an unnamed temporary file if memfd is not available."""
     try:
         return os.memfd_create("drake-dress")
     except (AttributeError, OSError):

@@ -1,4 +1,4 @@
-"""What is sent in place of a message while faults are on."""
+"""Changes messages while faults are active."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from drake_dress.models.supervision.injection import (
 from drake_dress.models.supervision.wrong_points import Moment, WrongPoints
 from drake_dress.systems.point_messages import decode_points
 
-# Changes a decoded message in place, given the first message of the fault and the number of this
-# one.
+# Changes a decoded message in place, given the first message of the fault and the number of
+# messages since then.
 Spoil = Callable[[Any, Any, int], None]
 _SILENT = {"stale", "bus_lost", "arm_lost"}
 _SHIFTS = {"time_back": TIME_BACK, "clock_jump": CLOCK_JUMP, "set_back": SET_BACK}
 
 
 class Spoiler:
-    """Plays the faults of one source; remembers how each began.
+    """Injects the faults of one source; stores how each fault began.
 
     Args:
         lcm_type: Python class of the messages.
-        spoils: what kinds of faults do to a message, beside those of any source.
+        spoils: By kind of fault, how it changes a message; adds to those common to all sources.
     """
 
     def __init__(self, lcm_type: Any, spoils: Mapping[str, Spoil] | None = None) -> None:
         self._type, self._spoils = lcm_type, dict(spoils or {})
         self._rng = np.random.default_rng(0)
-        # of each fault that is on, the message that it remembers and how many came since
+        # for each active fault, its stored message and the number of messages since
         self._begun: dict[str, tuple[Any, int]] = {}
 
     def __call__(self, encoded: bytes, on: set[str]) -> list[bytes]:
-        """Returns what is sent in place of a message.
+        """Returns the messages to send in place of one message.
 
         Args:
-            encoded: the message.
-            on: kinds of faults, of `models.supervision.injection`.
+            encoded: The message.
+            on: Active kinds of faults, from `models.supervision.injection`.
         """
         self._begun = {kind: begun for kind, begun in self._begun.items() if kind in on}
         if on & _SILENT:
@@ -65,7 +65,7 @@ class Spoiler:
         return changed
 
     def _in_order(self, encoded: bytes, on: set[str]) -> list[bytes]:
-        """Returns what is sent now; each is alone, since a bus may keep the last of two."""
+        """Returns at most one message, since a bus may keep only the last of two."""
         kind = next((k for k in ("reordered", "duplicated", "second_sender") if k in on), None)
         if kind is None:
             return [encoded]
@@ -89,12 +89,12 @@ class Spoiler:
 
 
 def _dated(message: Any) -> Any:
-    """Returns what of a message has the utime."""
+    """Returns the part of a message that has the utime: the message or its header."""
     return message if hasattr(message, "utime") else message.header
 
 
 def spoil_points(wrong: WrongPoints) -> Spoil:
-    """Returns what makes the points of a `lcmt_point_cloud` wrong."""
+    """Returns a function that corrupts the points of a `lcmt_point_cloud`."""
 
     def spoil(message: Any, first: Any, number: int) -> None:
         values, before = decode_points(message), decode_points(first)

@@ -1,4 +1,4 @@
-"""Looks after what a station hears, and says whether arms may move."""
+"""Monitors the messages that a station receives and decides whether arms may move."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from drake_dress.models.supervision.supervision import (
 from drake_dress.models.supervision.watch import Arrival, WatchSettings, WatchState, watch
 from drake_dress.systems.lcm_inbox import Received
 
-# Changes that are remembered, from the first on; a source that flaps must not fill the memory.
+# Number of events kept, from the first on; a source that flaps must not fill the memory.
 _REMEMBERED = 10_000
 
 
@@ -29,14 +29,14 @@ _REMEMBERED = 10_000
 class _Memory(Immutable):
     watched: tuple[WatchState, ...]
     supervised: SupervisionState
-    # what changed, when: s and a line
+    # time, s, and description of each change
     events: tuple[tuple[float, str], ...] = ()
-    # messages of each source so far that were repeated or late
+    # number of repeated or late messages of each source
     dropped: tuple[int, ...] = ()
 
 
 class StationWatch(LeafSystem):
-    """Watches sources of messages; see `models/supervision/`.
+    """Monitors message sources; see `models/supervision/`.
 
     .. pydrake_system::
 
@@ -50,18 +50,18 @@ class StationWatch(LeafSystem):
         - source_valid (one for each)
         - source_stopped (one for each)
 
-    Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) of each source, flags
+    Sources: `Received`. permission: (1,) 1 while arms may move. faults: (k,) for each source, flags
     of `models.supervision.watch.Fault`. ended_by: (1,) number of the source that ends the run, -1
-    while none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it
-    reports that it does not follow. Beside the ports, `events` tells what changed in a context, and
-    `dropped` counts the repeated and late messages of each source.
+    if none does. *_valid: (1,) 1 while the source has no fault; *_stopped: (1,) 1 while it reports
+    that it does not follow commands. In addition to the ports, `events` returns the changes in a
+    context, and `dropped` the number of repeated and late messages of each source.
 
     Args:
-        sources: by name, what is asked of each.
-        patience: with faults.
-        period: of looking, s.
-        wall: whether to take time from this machine's monotonic clock and not from the diagram,
-            which falls behind while a step takes long.
+        sources: By name, the requirements on each source.
+        patience: How long faults are tolerated.
+        period: Period of the update, s.
+        wall: Whether to use this machine's monotonic clock instead of the diagram's time, which
+            falls behind during long steps.
     """
 
     def __init__(
@@ -148,17 +148,17 @@ class StationWatch(LeafSystem):
         return self.sources[i].replace("_", " ")
 
     def events(self, context: Context) -> tuple[tuple[float, str], ...]:
-        """Returns what changed, and when, s, in its own context."""
+        """Returns the changes and their times, s, from this system's own context."""
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
         return memory.events
 
     def dropped(self, context: Context) -> dict[str, int]:
-        """Returns how many messages of each source were repeated or late, in its own context."""
+        """Returns the number of repeated or late messages by source, from the system's context."""
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
         return dict(zip(self.sources, memory.dropped, strict=True))
 
     def conclusion(self, context: Context) -> str | None:
-        """Returns why the run ends, in its own context; None while it goes on."""
+        """Returns why the run ends, from this system's own context; None while it continues."""
         memory: _Memory = context.get_abstract_state(self._memory).get_value()
         i = memory.supervised.ended_by
         if i is None:

@@ -1,4 +1,4 @@
-"""What an arm's driver reports, as `lcmt_panda_status`, and whether it can be believed."""
+"""Checks the plausibility of an arm driver's `lcmt_panda_status` messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MODE_NAMES = {
     for name in vars(lcmt_panda_status)
     if name.startswith("k") and isinstance(getattr(lcmt_panda_status, name), int)
 }
-# Beside those that a check of joints looks at; ports hand them out, too.
+# Arrays that the check of joints does not cover but that ports output, too.
 _OTHER_ARRAYS = (
     "joint_position_desired",
     "joint_velocity_desired",
@@ -27,10 +27,10 @@ _OTHER_ARRAYS = (
 
 
 class StatusCheck:
-    """Checks an arm's statuses in the order in which they come.
+    """Checks an arm's status messages in order of arrival.
 
     Args:
-        bounds: of what is believed.
+        bounds: Bounds on plausible statuses.
     """
 
     def __init__(self, bounds: JointBounds) -> None:
@@ -63,8 +63,8 @@ class StatusCheck:
 def mode_finding(mode: int) -> Finding:
     """Returns whether an arm follows commands in a mode of `lcmt_panda_status`.
 
-    It follows in kMove alone. In kIdle it takes up commands that go on from where it is. In all
-    others, known or not, it does not follow.
+    It follows commands in kMove only. In kIdle it accepts commands that start at its position. In
+    all other modes, known or unknown, it does not follow.
     """
     if mode == lcmt_panda_status.kMove:
         return Finding()

@@ -1,4 +1,4 @@
-"""What a garment does to the grippers of arms in a plant."""
+"""Forces of the garment on the grippers of arms in a plant."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drake_dress.models.sides import SIDES
 
 
 class ToolLoad(LeafSystem):
-    """Turns forces on both tools into what a plant takes.
+    """Converts forces on both tools into applied spatial forces of a plant.
 
     .. pydrake_system::
 
@@ -27,11 +27,11 @@ class ToolLoad(LeafSystem):
         output_ports:
         - spatial_forces
 
-    Forces (3,) on the tools' origins, N, in W; push (6,) what else pushes left and right.
+    Forces (3,) on the tools' origins, N, in W; push (6,) additional forces on left and right, N.
     spatial_forces: list of ExternallyAppliedSpatialForce.
 
     Args:
-        tools: bodies of left and right tool.
+        tools: Bodies of left and right tool.
     """
 
     def __init__(self, tools: Sequence[BodyIndex]) -> None:

@@ -1,4 +1,4 @@
-"""Where the grippers of arms in a plant are."""
+"""Motion of the grippers of arms in a plant."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drake_dress.models.sides import SIDES
 
 
 class ToolMotion(LeafSystem):
-    """Reads the motion of both tools from that of all bodies.
+    """Selects the motion of both tools from that of all bodies.
 
     .. pydrake_system::
 
@@ -32,7 +32,7 @@ class ToolMotion(LeafSystem):
     Positions p_WT (3,), m, velocities v_WT (3,), m/s.
 
     Args:
-        tools: bodies of left and right tool.
+        tools: Bodies of left and right tool.
     """
 
     def __init__(self, tools: Sequence[BodyIndex]) -> None:

@@ -1,4 +1,4 @@
-"""Calls in a worker process, which take no time from the process that waits for them."""
+"""Function calls in a worker process, which do not slow down the calling process."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _worker: Callable[..., Any] | None = None
 class WorkerProcess:
     """Calls `work` in a worker process, one call at a time.
 
-    The worker starts at once, ends with this process however that ends, and ignores Ctrl-C.
+    The worker starts at once and ignores Ctrl-C. It ends with this process, even on a crash.
 
     Args:
-        work: can be pickled, as can what it takes and returns.
+        work: Function to call; it, its arguments and its result must be picklable.
     """
 
     def __init__(self, work: Callable[..., Any]) -> None:
@@ -31,13 +31,13 @@ class WorkerProcess:
         self._pool = WorkerPool(1, initializer=_begin, initargs=(self._work,))
 
     def submit(self, *arguments: Any) -> Future[Any]:
-        """Returns what will be the result; where the process has ended, another one begins."""
+        """Returns a future of the result; starts a new process if the old one has ended."""
         if not self._pool.alive:
             self._start()
         return self._pool.submit(_work, *arguments)
 
     def kill(self) -> None:
-        """Ends the process whatever it does; results that are awaited become exceptions."""
+        """Ends the process immediately; pending results become exceptions."""
         self._pool.kill()
 
 
@@ -45,7 +45,7 @@ def _begin(work: Callable[..., Any]) -> None:
     global _worker
     _worker = work
     gc.freeze()
-    # who sends commands goes first where cores are few
+    # with few cores, the process that sends commands has priority
     os.nice(_NICENESS)
 
 

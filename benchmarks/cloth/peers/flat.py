@@ -1,4 +1,4 @@
-"""Each triangle of a mesh laid flat, and the stiffness of its hinges, as other simulators ask."""
+"""Flattened triangles and hinge stiffnesses of a mesh, as other simulators require them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drake_dress.models.arrays import FloatArray, IntArray
 
 
 def flat_triangles(position: FloatArray, faces: IntArray) -> FloatArray:
-    """Returns (F,3,2), m: each triangle in its own plane, corner 0 at 0, corner 1 on the x axis."""
+    """Returns each triangle in its plane (F,3,2), m; corner 0 at 0, corner 1 on the x axis."""
     first = position[faces[:, 1]] - position[faces[:, 0]]
     second = position[faces[:, 2]] - position[faces[:, 0]]
     length = np.linalg.norm(first, axis=1)
@@ -23,17 +23,17 @@ def flat_triangles(position: FloatArray, faces: IntArray) -> FloatArray:
 def dihedral_stiffness(
     position: FloatArray, edge: IntArray, opposite: IntArray, bending: float
 ) -> FloatArray:
-    """Returns (E,) moment per angle and per length of edge, N, of a fabric of stiffness `bending`.
+    """Returns (E,) moment per angle and edge length, N, for a bending stiffness `bending`.
 
-    A hinge of this package has the energy ½ B (l θ)² / (A₀ + A₁) for small angles; one of a
-    dihedral model ½ k l θ². So k = B l / (A₀ + A₁). Edges with one face only (an opposite corner
+    For small angles, a hinge of this package has the energy ½ B (l θ)² / (A₀ + A₁), one of a
+    dihedral model ½ k l θ². Therefore, k = B l / (A₀ + A₁). Boundary edges (an opposite corner
     below 0) get 0.
 
     Args:
         position: (n,3) rest shape, m.
-        edge: (E,2) its ends.
-        opposite: (E,2) the corners that face it.
-        bending: N·m.
+        edge: (E,2) end nodes of the edges.
+        opposite: (E,2) corners opposite to the edges.
+        bending: Bending stiffness, N·m.
     """
     inner = (opposite >= 0).all(axis=1)
     stiffness = np.zeros(len(edge))

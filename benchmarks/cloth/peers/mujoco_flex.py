@@ -1,20 +1,20 @@
-"""MuJoCo's flex: Saint Venant-Kirchhoff triangles and hinges of flat rest shape.
+"""MuJoCo's flex: Saint Venant-Kirchhoff triangles and hinges with a flat rest shape.
 
 Young's modulus and thickness follow from E·t = stretch stiffness and E t³ / 12 = bending stiffness;
-Poisson's ratio is 0, as it is here. The integrator is `discrete`,
-implicit in position and velocity; islands are off. Fastest settings that stayed stable:
+Poisson's ratio is 0, as here. The integrator is `discrete`, implicit in position and velocity;
+islands are off. Fastest stable settings:
 
 - without obstacles: CG, tolerance 1e-2 (1e-8 takes twice as long and moves nodes by a hundredth of
   a millimetre; the Newton solver is not faster);
-- with obstacles: CG of 100 iterations, tolerance 1e-5, solref 1 ms, which the integrator replaces
-  by the stiffest row without rebound. At a tolerance of 1e-2 garments fall through a table, with
-  the default solref it sinks in by centimetres; the Newton solver takes twice as long;
+- with obstacles: CG with 100 iterations, tolerance 1e-5, solref 1 ms, which the integrator replaces
+  by the stiffest row without rebound. At a tolerance of 1e-2 garments fall through a table; with
+  the default solref they sink in by centimetres; the Newton solver takes twice as long;
 - the same with passive contact: a penalty instead of the contact solver, faster and without
   friction, tolerance 1e-2.
 
-Held nodes are bodies of 1,000 kg that carry their own weight and whose position and velocity are
-set before each step: pinned vertices could not move, and vertices on a driven body cost more. With
-pins a step takes as long within the noise. The garment's contact with itself is off, as here.
+Held nodes are gravity-compensated bodies of 1,000 kg, whose position and velocity are set before
+each step: pinned vertices could not move, and vertices on a driven body cost more. With pins a step
+takes equally long within the noise. Self-collision is off, as here.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from drake_dress.models.cloth.matrices import lumped_mass
 
 _GRIPPER_MASS = 1000.0  # kg; 1 N moves it by 1e-7 m in 0.01 s
 _GRAVITY = 9.81
-# Of a plane's picture; in contact it is infinite.
+# Displayed size of a plane, m; for contact it is infinite.
 _PLANE_SIZE = 5.0
 
 
@@ -39,15 +39,15 @@ class MujocoFlex:
     """A garment as a MuJoCo flex.
 
     Args:
-        scene: what is simulated.
+        scene: Scene to simulate.
         time_step: h, s.
-        passive: contact by MuJoCo's frictionless penalty.
+        passive: Whether contact is MuJoCo's frictionless penalty.
     """
 
     def __init__(self, scene: Scene, time_step: float, passive: bool = False) -> None:
         import mujoco
 
-        # Warnings would go to a log file in the current folder; they are counted in MjData.
+        # Warnings would go to a log file in the current folder; MjData counts them.
         mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco = mujoco
         self._h = time_step
@@ -59,7 +59,7 @@ class MujocoFlex:
         mass[scene.held] = _GRIPPER_MASS
         self.model.body_mass[body] = mass
         mujoco.mj_setConst(self.model, self.data)
-        # The solver's tolerance is relative to the mean inertia; the grippers would spoil it.
+        # The solver's tolerance is relative to the mean inertia, which the grippers would distort.
         self.model.stat.meaninertia = typical
         self._axis = np.arange(3)
         self._dof = self.model.body_dofadr[body]
@@ -82,13 +82,13 @@ class MujocoFlex:
         self._held_now = held
 
     def positions(self) -> FloatArray:
-        """Returns (n,3), m."""
+        """Returns the positions (n,3), m."""
         dof = self._dof[:, None] + self._axis
         return np.asarray(self._rest + self.data.qpos[dof])
 
     @property
     def unconverged(self) -> int:
-        """Steps whose solve of the elastic system MuJoCo warned of."""
+        """Number of steps for which MuJoCo warned about the solve of the elastic system."""
         return int(self.data.warning[self._mujoco.mjtWarning.mjWARN_INERTIA].number)
 
 
@@ -145,7 +145,7 @@ def _missing() -> str | None:
 
 
 def recipe(passive: bool = False) -> Recipe:
-    """Returns MuJoCo's flex; with `passive`, contact without friction."""
+    """Returns MuJoCo's flex; with `passive`, contact is frictionless."""
 
     def make(scene: Scene, time_step: float) -> Engine:
         return MujocoFlex(scene, time_step, passive)

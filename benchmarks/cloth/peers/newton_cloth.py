@@ -1,4 +1,4 @@
-"""What both solvers of Newton share: the model, obstacles, held nodes, stepping on the CPU."""
+"""Common part of both Newton solvers: model, obstacles, held nodes, stepping on the CPU."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import numpy as np
 from benchmarks.cloth.scene import Scene
 from drake_dress.models.arrays import FloatArray
 
-# Penalty of a contact, N/m: at 1e3 Style3D sinks into a table by centimetres, at 1e4 not at all.
+# Contact penalty, N/m: at 1e3 Style3D sinks into a table by centimetres, at 1e4 not at all.
 _CONTACT_STIFFNESS = 1.0e5
 _CONTACT_DAMPING = 1.0e-5
-# Nodes this near to an obstacle get a contact, m; more than a node moves in a step.
+# Distance to an obstacle below which a node gets a contact, m; more than its motion in a step.
 _CONTACT_MARGIN = 0.05
 
 
 def missing() -> str | None:
-    """Returns why Newton cannot be used, None if it can."""
+    """Returns why Newton is not available; None if it is."""
     for package in ("newton", "warp"):
         found: Any = importlib.util.find_spec(package)
         if not found:
@@ -30,7 +30,7 @@ def missing() -> str | None:
 
 
 def load() -> Any:
-    """Returns the module, with its start-up messages silenced."""
+    """Imports and returns the module without its start-up messages."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -43,7 +43,7 @@ def load() -> Any:
 
 @contextlib.contextmanager
 def silence() -> Iterator[None]:
-    """Swallows greetings, and what a constructor prints of its own timing."""
+    """Suppresses start-up messages and the timings that constructors print."""
     sink = io.StringIO()
     with contextlib.redirect_stdout(sink), contextlib.redirect_stderr(sink):
         yield
@@ -53,9 +53,9 @@ class NewtonCloth:
     """Steps a Newton model with one of its solvers; subclasses make both.
 
     Args:
-        scene: what is simulated.
+        scene: Scene to simulate.
         time_step: h, s.
-        substeps: solver steps per time step.
+        substeps: Number of solver steps per time step.
     """
 
     def __init__(self, scene: Scene, time_step: float, substeps: int) -> None:
@@ -141,9 +141,9 @@ class NewtonCloth:
         self._held_now = held
 
     def _place_held(self, held: FloatArray) -> None:
-        # On the CPU an array's numpy view shares its memory.
+        # On the CPU, `numpy()` is a view of the array's memory.
         self._now.particle_q.numpy()[self._scene.held] = held
 
     def positions(self) -> FloatArray:
-        """Returns (n,3), m."""
+        """Returns the positions (n,3), m."""
         return np.asarray(self._now.particle_q.numpy().astype(np.float64))

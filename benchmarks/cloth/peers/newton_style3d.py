@@ -1,10 +1,10 @@
 """Newton's Style3D: projective dynamics with Jacobi-preconditioned conjugate gradients.
 
-Stretch along weft and warp has the stretch stiffness, shear half of it, which is this package's
-energy to second order; bending is the same hinge energy with a flat rest shape. Nonlinear
-iterations are a choice: one (with ten linear ones) is the fastest setting and stable at every time
-step of the benchmark, ten the solver's default. Its contact of the garment with itself is off, as
-here. Velocities are scaled by 0.998 a step by the solver itself.
+Weft and warp have the stretch stiffness, shear has half of it, which equals this package's energy
+to second order. Bending is the same hinge energy with a flat rest shape. The number of nonlinear
+iterations is a choice: one (with ten linear ones) is the fastest setting and stable at every time
+step of the benchmark; ten is the solver's default. Self-collision is off, as here. The solver
+itself scales velocities by 0.998 per step.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class NewtonStyle3D(NewtonCloth):
     """A garment in Style3D.
 
     Args:
-        scene: what is simulated.
+        scene: Scene to simulate.
         time_step: h, s.
-        iterations: nonlinear ones per step.
+        iterations: Nonlinear iterations per step.
     """
 
     def __init__(self, scene: Scene, time_step: float, iterations: int) -> None:
@@ -44,7 +44,7 @@ class NewtonStyle3D(NewtonCloth):
             vel=warp.vec3(0.0, 0.0, 0.0),
             vertices=scene.position.tolist(),
             indices=scene.faces.ravel().tolist(),
-            # every triangle is its own panel: a garment's rest shape is not one flat piece
+            # each triangle is a panel, since a garment's rest shape is not one flat piece
             panel_verts=flat_triangles(scene.position, scene.faces).reshape(-1, 2).tolist(),
             panel_indices=np.arange(3 * len(scene.faces)).tolist(),
             density=m.surface_density,
@@ -66,7 +66,7 @@ class NewtonStyle3D(NewtonCloth):
 
 
 def recipe(iterations: int) -> Recipe:
-    """Returns Style3D with so many nonlinear iterations a step."""
+    """Returns Style3D with `iterations` nonlinear iterations per step."""
 
     def make(scene: Scene, time_step: float) -> Engine:
         return NewtonStyle3D(scene, time_step, iterations)

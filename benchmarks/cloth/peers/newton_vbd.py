@@ -1,10 +1,9 @@
 """Newton's VBD: vertex block descent over coloured vertices.
 
-Its membrane is a Neo-Hookean one with μ = half the stretch stiffness and λ = 0, which is this
-package's to second order; its hinges are dihedral ones with their rest angle. Fewest solver steps
-and iterations that kept the 99 % edge strain of the stiff fabric near 1 % at h = 10 ms: ten steps
-of five iterations (one of ten: 33 %, one of fifty: 8 %, five of ten: 2.4 %). The garment's contact
-with itself is off, as here.
+Its membrane is Neo-Hookean with μ = half the stretch stiffness and λ = 0, which equals this
+package's to second order. Its hinges are dihedral with their rest angle. Ten solver steps of five
+iterations are the fewest that kept the 99 % edge strain of the stiff fabric near 1 % at h = 10 ms
+(one of ten: 33 %, one of fifty: 8 %, five of ten: 2.4 %). Self-collision is off, as here.
 """
 
 from __future__ import annotations
