@@ -38,19 +38,19 @@ _SIZES = 1e-3, 1e3
 _MOST_MARKER_NOISE, _MOST_FORCE_NOISE = 1.0, 100.0
 # Name to what it measures; the first is the default.
 BENCHMARKS = {
-    "cloth": "accuracy and speed of the garment, beside other simulators where installed",
-    "arms": "every scenario with floating grippers and with two arms; what the arms do",
-    "dressing": "persons and coats under many seeds, by each method of control",
-    "explain": "hidden effects that are named right",
-    "gym": "speed of the Gymnasium environment, and dressings through its actions",
-    "hardware": "rates, latency, faults and memory of a run and a lab in two processes",
-    "inputs": "what becomes of drawn bad scenarios, garment files, measured logs and messages",
-    "killed": "what runs leave that are killed, terminated or out of disk",
-    "local": "constrained DDP beside the exact optimum",
-    "delay": "how long plans take on this machine",
-    "plant": "how far the plant's garment is from a finer one, and what its steps take",
-    "repeat": "whether the same seed gives the same numbers, under any load",
-    "mutation": "faults put into central modules, and whether tests notice them",
+    "cloth": "accuracy and speed of the cloth schemes, beside other simulators where installed",
+    "arms": "every scenario with floating grippers and with two arms; load of the arms",
+    "dressing": "success rate over persons, coats and seeds, for each control method",
+    "explain": "share of hidden effects that are named correctly",
+    "gym": "speed of the Gymnasium environment, and dressings controlled through it",
+    "hardware": "command rate, latency, fault reactions and memory; run and lab in two processes",
+    "inputs": "reaction to damaged scenarios, garment files, measured logs and messages",
+    "killed": "files left by runs that are killed, terminated or out of disk space",
+    "local": "constrained DDP compared with the exact optimum",
+    "delay": "solve time of the global controller on this machine",
+    "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
+    "repeat": "whether the same seed gives the same log bit for bit under any load",
+    "mutation": "share of mutants of central modules that the tests detect",
 }
 
 _EXAMPLES = """examples:
@@ -66,10 +66,10 @@ _EXAMPLES = """examples:
   drake-dress replay out/dummy_standing-seed0/run.h5
   drake-dress bench cloth --only draping,growth --json cloth.json
 
-exit status: 0 both sleeves on, 1 it ran and did not succeed, 2 unusable input"""
+exit status: 0 both sleeves on, 1 the run finished but the dressing failed, 2 unusable input"""
 
 
-_OF_SCENARIO = "a YAML file, or the name of a scenario that ships; see drake-dress scenarios"
+_OF_SCENARIO = "a YAML file, or the name of a built-in scenario; see drake-dress scenarios"
 # Return type of `add_subparsers`.
 _Verbs: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
@@ -153,7 +153,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_explain(verbs)
     _add_dataset(verbs)
     shipped = verbs.add_parser(
-        "scenarios", help="list the scenarios that ship, which verbs take by name"
+        "scenarios", help="list the built-in scenarios, which all commands accept by name"
     )
     shipped.set_defaults(command=_scenarios)
     verbs.add_parser(
@@ -171,27 +171,27 @@ def _add_run(verbs: _Verbs) -> None:
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="change a value of the scenario by its dotted key; may be given again",
+        help="set a value of the scenario by its dotted key; can be repeated",
     )
     run.add_argument("--seed", type=_seed, metavar="N", help="in place of the scenario's seed")
     run.add_argument(
         "--meshcat",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="show the run live on a page of this machine",
+        help="show the run live in Meshcat on localhost",
     )
     run.add_argument(
         "--realtime-rate",
         type=_rate,
         default=0.0,
         metavar="R",
-        help="at most R simulated seconds per second; 0: as fast as it goes (default)",
+        help="at most R simulated seconds per second; 0: no limit (default)",
     )
     run.add_argument(
         "--one-process",
         action="store_true",
-        help="simulate the garment and solve for plans in this process, too, where other runs use "
-        "the other cores; the numbers are the same",
+        help="simulate the garment and solve for plans in this process instead of worker "
+        "processes, for example beside other runs; the results are identical",
     )
     _add_plugin(run)
     _add_report(run)
@@ -200,7 +200,8 @@ def _add_run(verbs: _Verbs) -> None:
 
 def _add_sim_station(verbs: _Verbs) -> None:
     lab = verbs.add_parser(
-        "sim-station", help="play the lab behind the messages of hardware, for a run to drive"
+        "sim-station",
+        help="simulate the lab behind the hardware messages, for a run on hardware",
     )
     lab.add_argument("scenario", metavar="SCENARIO", help=_OF_SCENARIO)
     lab.add_argument("--out", metavar="DIR", help="default: out/<scenario>-seed<N>-lab")
@@ -220,10 +221,13 @@ def _add_sim_station(verbs: _Verbs) -> None:
 
 def _add_calibrate(verbs: _Verbs) -> None:
     calibrate = verbs.add_parser(
-        "calibrate", help="find where a camera stands, by a ChArUco board in a gripper"
+        "calibrate", help="estimate a camera's pose from pictures of a board in a gripper"
     )
     calibrate.add_argument(
-        "directory", metavar="DIR", nargs="?", help="with poses.csv (image,q1,…,q7) and pictures"
+        "directory",
+        metavar="DIR",
+        nargs="?",
+        help="folder with poses.csv (image,q1,…,q7) and pictures",
     )
     calibrate.add_argument(
         "--scenario", metavar="SCENARIO", help="default: lab.yaml of the program's own"
@@ -239,7 +243,9 @@ def _add_calibrate(verbs: _Verbs) -> None:
         help="m; default: %(default)s",
     )
     calibrate.add_argument(
-        "--camera", metavar="NAME", help="of the scenario, for its intrinsics; default: find them"
+        "--camera",
+        metavar="NAME",
+        help="scenario camera with the intrinsics; default: estimate them",
     )
     calibrate.add_argument("--out", metavar="FILE", help="default: DIR/calibration.json")
     calibrate.add_argument("--print-board", metavar="FILE.png", help="write the board to print")
@@ -255,7 +261,7 @@ def _add_replay(verbs: _Verbs) -> None:
 
 def _add_explain(verbs: _Verbs) -> None:
     explain = verbs.add_parser(
-        "explain", help="show what the simulation gets wrong about measured data, and why"
+        "explain", help="show where the simulation differs from measured data, and why"
     )
     explain.add_argument("measured", metavar="MEASURED", nargs="+", help=".h5, .npz or .csv")
     explain.add_argument("--scenario", metavar="SCENARIO", required=True)
@@ -271,7 +277,9 @@ def _add_explain(verbs: _Verbs) -> None:
 def _add_dataset(verbs: _Verbs) -> None:
     dataset = verbs.add_parser("dataset", help="make data")
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
-    hidden = kinds.add_parser("measured", help="what a lab would measure, with an effect hidden")
+    hidden = kinds.add_parser(
+        "measured", help="synthetic measurements of a lab with a hidden effect"
+    )
     hidden.add_argument(
         "--motions",
         metavar="NAME,…",
@@ -285,7 +293,10 @@ def _add_dataset(verbs: _Verbs) -> None:
     )
     hidden.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
     hidden.add_argument(
-        "--size", type=_between(*_SIZES), default=1.0, help="of the effect; default 1"
+        "--size",
+        type=_between(*_SIZES),
+        default=1.0,
+        help="factor on the strength of the hidden effect; default 1",
     )
     hidden.add_argument(
         "--marker-noise",
@@ -311,7 +322,7 @@ def _add_plugin(verb: argparse.ArgumentParser) -> None:
         metavar="FILE.py|MODULE",
         action="append",
         default=[],
-        help="import code that registers effects of your own; may be given again",
+        help="import code that registers effects, costs or predictors; can be repeated",
     )
 
 
@@ -320,7 +331,7 @@ def _add_report(verb: argparse.ArgumentParser) -> None:
         "--report",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="write report and replay beside log and summary",
+        help="also write report.html and replay.html",
     )
 
 

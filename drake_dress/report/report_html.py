@@ -59,7 +59,7 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
     parts = [
         f'<header class="{"good" if success else "bad"}"><h1>{verdict}</h1>'
         f"<p>{html.escape(detail)}</p></header>",
-        "<h2>Limits asked and reached</h2>",
+        "<h2>Limits</h2>",
         _limits(summary, rules, log.estimated),
         _safety(summary),
         "<h2>Pace</h2>",
@@ -68,8 +68,8 @@ def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules
     if log.estimated:
         parts.insert(
             parts.index("<h2>Pace</h2>"),
-            '<p class="note">Garment and person are as they were estimated: penetration and strain '
-            "would tell of the estimate, and are not judged.</p>",
+            '<p class="note">Garment and person are estimates, so penetration and strain are '
+            "not judged.</p>",
         )
     if log.events:
         lines = "".join(f"<li>{html.escape(line)}</li>" for line in log.events)
@@ -115,7 +115,7 @@ def _limits(summary: dict[str, Any], rules: SuccessRules, estimated: bool) -> st
         for name, asked, reached, met in rows
     )
     return (
-        "<table><thead><tr><th></th><th>asked</th><th>reached</th><th></th></tr></thead>"
+        "<table><thead><tr><th></th><th>limit</th><th>measured</th><th></th></tr></thead>"
         f"<tbody>{body}</tbody></table>"
     )
 
@@ -191,8 +191,8 @@ def _arm_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
     rows = []
     least = rules.min_arm_distance
     for name, key in (
-        ("arms apart, least", "min_arms_apart_m"),
-        ("arm to person but for hands, least", "min_arm_to_person_m"),
+        ("distance between the arms, smallest", "min_arms_apart_m"),
+        ("distance from arms to person except hands, smallest", "min_arm_to_person_m"),
     ):
         value = summary[key]
         asked, met = f"≥ {100 * least:g} cm", value is not None and value >= least
@@ -202,10 +202,12 @@ def _arm_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
         rows.append(_at_most(summary, name, key, 1.0, "{:.2f}"))
     margin = summary["min_joint_margin_rad"]
     kept = margin is not None and margin >= 0.0
-    rows.append(_Row("joint to its limit, least", "≥ 0", _figure(margin, "{:.3f} rad"), kept))
+    rows.append(
+        _Row("margin to a joint limit, smallest", "≥ 0", _figure(margin, "{:.3f} rad"), kept)
+    )
     tracking = summary["arm_tracking_mm"]
     shown = f"{tracking['median']:.1f} mm (median), {tracking['p99']:.1f} mm (99 %)"
-    rows.append(_Row("gripper off its joints' command", "", shown, None))
+    rows.append(_Row("gripper tracking error", "", shown, None))
     return rows
 
 
@@ -220,7 +222,7 @@ def _safety(summary: dict[str, Any]) -> str:
     if not told:
         return ""
     line = html.escape("; ".join(told))
-    return f'<p class="note">Requests were cut by the safety governor. {line}.</p>'
+    return f'<p class="note">The safety governor limited the requested motion. {line}.</p>'
 
 
 def _pace(summary: dict[str, Any]) -> str:
@@ -237,7 +239,7 @@ def _pace(summary: dict[str, Any]) -> str:
         p99 = _figure(solve.get("p99"), "{:.1f} ms")
         rows.append((f"{name} controller", f"{rate}, solves {median} (median), {p99} (99 %)"))
     late = summary.get("late_plans")
-    rows.append(("plans later than is modelled", _figure(late, "{:.0f} %", 100.0)))
+    rows.append(("plans later than the modelled delay", _figure(late, "{:.0f} %", 100.0)))
     if "command_rate_hz" in summary:
         latency = summary["command_latency_ms"]
         rate = _figure(summary["command_rate_hz"], "{:.1f} Hz")

@@ -250,7 +250,7 @@ def _layers_crossed(log: RunLog) -> int | None:
     if x is None or not np.isfinite(x).all():
         return None
     elements = make_elements(log.rest_position, log.faces)
-    return len(piercing_edges(x, elements, rings=1))
+    return len(np.unique(piercing_edges(x, elements, rings=1)[:, 0]))
 
 
 def _late_plans(log: RunLog) -> float | None:
