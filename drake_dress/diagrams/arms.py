@@ -63,12 +63,14 @@ class ArmPlacement:
     Attributes:
         distance_behind: of the bases, m. spread: between them, m. height: of both, m.
         tilt: of the hands, which point forward and this much down, rad.
+        control: settings of the control of the joints.
     """
 
     distance_behind: float
     spread: float
     height: float
     tilt: float
+    control: RateParameters = RateParameters()
 
     def base(self, side: Side) -> np.ndarray:
         """Returns X_WB (4,4) of an arm."""
@@ -103,7 +105,6 @@ def set_up_arms(
     placement: ArmPlacement,
     grippers: np.ndarray,
     person: Capsules,
-    parameters: RateParameters | None = None,
 ) -> ArmSetup:
     """Returns two arms whose grippers are at `grippers` (2,3), p_WG, m.
 
@@ -111,7 +112,6 @@ def set_up_arms(
         placement: of the arms.
         grippers: left, then right.
         person: to keep away from.
-        parameters: of the arms' control.
 
     Raises:
         ArmReachError: one cannot get there; the message tells which and by how much.
@@ -121,9 +121,7 @@ def set_up_arms(
         replace(arm, limits=arm.limits.within(_SPEED_SHARE, _ROOM))
         for arm in (panda(placement.base(side)) for side in SIDES)
     )
-    pair = ArmPair(
-        (left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, parameters or RateParameters()
-    )
+    pair = ArmPair((left, right), (SHAPE, SHAPE), np.stack([HOME, HOME]), 2, placement.control)
     still = np.zeros_like(pair.home)
     goals = _goals(grippers, placement)
     what = "its gripper's place at the start"

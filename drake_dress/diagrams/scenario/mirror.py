@@ -34,18 +34,18 @@ def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirr
     model as its `MODEL` beforehand.
 
     Args:
-        model: frozen dataclass, all of whose fields have defaults.
+        model: frozen dataclass or named tuple, all of whose fields have defaults.
         without: its fields that the scenario has elsewhere.
     """
 
     def decorate(cls: type[Mirror]) -> type[Any]:
         hints = typing.get_type_hints(model)
         entries = []
-        for entry in dataclasses.fields(model):
-            if entry.name in without:
+        for name in _field_names(model):
+            if name in without:
                 continue
-            default = getattr(model(), entry.name)
-            entries.append((entry.name, _plain_type(hints[entry.name]), _field(default)))
+            default = getattr(model(), name)
+            entries.append((name, _plain_type(hints[name]), _field(default)))
         namespace = {"__doc__": cls.__doc__, "__module__": cls.__module__, "MODEL": model}
         made = dataclasses.make_dataclass(
             cls.__name__, entries, bases=(Mirror,), namespace=namespace
@@ -65,6 +65,14 @@ def model_of(values: Mirror, **elsewhere: Any) -> Any:
     """
     given = {e.name: _frozen(getattr(values, e.name)) for e in dataclasses.fields(values)}
     return values.MODEL(**given, **elsewhere)
+
+
+def _field_names(model: type) -> list[str]:
+    """Returns the fields of a dataclass or a named tuple."""
+    if dataclasses.is_dataclass(model):
+        return [entry.name for entry in dataclasses.fields(model)]
+    names: tuple[str, ...] = model._fields  # type: ignore[attr-defined]
+    return list(names)
 
 
 # Mirrors by the model's class.
@@ -87,11 +95,9 @@ def _field(default: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_plain(item) for item in value]
     mirror = _MIRRORS.get(type(value))
     if mirror is None:
-        return value
+        return [_plain(item) for item in value] if isinstance(value, tuple) else value
     return mirror(**{e.name: _plain(getattr(value, e.name)) for e in dataclasses.fields(mirror)})
 
 

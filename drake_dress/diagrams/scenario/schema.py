@@ -16,6 +16,7 @@ from typing import Any
 from drake_dress.diagrams.person import JointParameters
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
+from drake_dress.models.arm import resolved_rate
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth import material
 from drake_dress.models.control import costs, local_model, policy, safety, task_parameters
@@ -24,7 +25,7 @@ from drake_dress.models.dressing import stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.load import MeshOptions
-from drake_dress.models.human import body, following, motions, tremor
+from drake_dress.models.human import body, following, motions, prediction, tremor
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
@@ -448,6 +449,7 @@ class Local:
         released_share: share of that span below which the sleeves are decoupled again.
         feedback: whether the solution's feedback gains correct the command between solves.
         solver: `constrained_ddp`, or `cone`: Clarabel, which is exact and slower.
+        prediction_step: time step of the prediction of the person's arms, s.
     """
 
     period: float = 0.02
@@ -469,6 +471,12 @@ class Local:
     released_share: float = _LOCAL.released_share
     feedback: bool = True
     solver: str = "constrained_ddp"
+    prediction_step: float = 0.2
+
+
+@mirror_of(prediction.ConstantVelocityPredictor)
+class ConstantVelocity(Mirror):
+    """The predictor `constant_velocity`; see models/human/prediction.py."""
 
 
 @dataclass
@@ -485,6 +493,7 @@ class Controller:
         stages: thresholds between the stages.
         local: the local controller.
         predictor: how the person's arms are predicted to move.
+        constant_velocity: settings of the predictor of that name.
         costs: registered costs of the plan by name, each with its fields.
         command_rate: rate of the grippers' commands, Hz.
     """
@@ -497,6 +506,7 @@ class Controller:
     stages: Stages = field(default_factory=Stages)
     local: Local = field(default_factory=Local)
     predictor: str = "still"
+    constant_velocity: ConstantVelocity = field(default_factory=ConstantVelocity)
     costs: ValuesByName = field(default_factory=dict)
     command_rate: float = 100.0
 
@@ -585,6 +595,11 @@ class Start:
     lateral_offset: float = 0.0
 
 
+@mirror_of(resolved_rate.RateParameters)
+class ResolvedRate(Mirror):
+    """Control of the arms' joints; see models/arm/resolved_rate.py."""
+
+
 @dataclass
 class Arms:
     """What carries the grippers.
@@ -597,6 +612,7 @@ class Arms:
         tilt_deg: downward tilt of the hands, which point forward, degrees.
         rate: rate of the joint commands, Hz.
         mode: what a joint command contains: position and velocity, or one of them.
+        resolved_rate: control of the joints.
     """
 
     model: str = "floating"
@@ -606,6 +622,7 @@ class Arms:
     tilt_deg: float = 35.0
     rate: float = 200.0
     mode: str = "position_velocity"
+    resolved_rate: ResolvedRate = field(default_factory=ResolvedRate)
 
 
 @dataclass

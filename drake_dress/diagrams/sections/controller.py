@@ -68,10 +68,6 @@ def solve_budget(g: schema.GlobalMpc, in_real_time: bool) -> Budget:
     return Budget(iterations=g.budget)
 
 
-# Time step of the prediction that the local controller uses, s.
-_JOINTS_STEP = 0.2
-
-
 def local_setup(c: schema.Controller, policy: DressingPolicy) -> LocalSetup | None:
     """Returns the local controller; None where the grippers follow the global plan directly."""
     if c.method == "global":
@@ -90,11 +86,14 @@ def local_setup(c: schema.Controller, policy: DressingPolicy) -> LocalSetup | No
         values.period,
         values.delay,
         values.feedback,
-        _JOINTS_STEP,
-        math.ceil(values.horizon * values.time_step / _JOINTS_STEP),
+        values.prediction_step,
+        math.ceil(values.horizon * values.time_step / values.prediction_step),
     )
 
 
 def predictor(c: schema.Controller) -> MotionPredictor:
     """Returns the predictor of the person's arms."""
+    if c.predictor == "constant_velocity":
+        own: MotionPredictor = model_of(c.constant_velocity)
+        return own
     return PREDICTORS[c.predictor]()

@@ -10,6 +10,7 @@ import numpy as np
 from drake_dress.diagrams.arms import ArmPlacement
 from drake_dress.diagrams.cameras import Camera
 from drake_dress.diagrams.scenario import schema
+from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.diagrams.sections.person import measures, posture
 from drake_dress.models.human.body import shoulder_height
 
@@ -40,4 +41,5 @@ def placement(arms: schema.Arms, person: schema.Person) -> ArmPlacement | None:
         arms.spread,
         shoulders + arms.height_offset,
         math.radians(arms.tilt_deg),
+        model_of(arms.resolved_rate),
     )

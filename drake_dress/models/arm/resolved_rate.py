@@ -45,12 +45,13 @@ class RateParameters(NamedTuple):
     """Settings of the arms' control: plain numbers, for compiled kernels.
 
     Attributes:
-        position_gain: gain on a gripper's position error, 1/s. rotation_gain: on a hand's, 1/s.
+        position_gain: gain on a gripper's position error, 1/s.
+        rotation_gain: gain on a hand's rotation error, 1/s.
         outward_gain: gain of link 3 away from the other arm, 1/s (implicitly 1/s in the paper).
         outward_distance: distance of both links 3 beyond which they are not moved outward, m.
         home_gain: gain of the joints toward home, 1/s.
         max_turning: largest turning speed of a hand, rad/s.
-        rotation_weight: of a hand's turning rate, relative to joint rates, s²/rad² · rad²/s².
+        rotation_weight: weight of the hands' turning rates relative to that of the joint rates.
         slowdown_weight: weight of a gripper's relative slowdown.
         least_distance: least distance between the arms, and from arm to person, m.
         seen_distance: distance below which a pair is constrained, m.
