@@ -3,8 +3,8 @@
 A plan is a velocity of each gripper for each of N steps. A rollout of the garment model against the
 predicted person gives sleeve states, gripper forces and stage costs of every step. The adjoint of
 the rollout, with contact frozen, gives the gradient. The descent is projected onto the speed limit.
-The gradient of each velocity is scaled by the number of steps that it still affects. A step is
-accepted only if it lowers the cost sufficiently.
+The gradient of each velocity is scaled according to the number of steps that it still affects. A
+step is accepted only if it lowers the cost sufficiently.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class LocalParameters:
         max_speed: speed limit of a gripper, m/s.
         beside: greatest distance of the armhole of a sleeve on its arm from the arm axis, m (φ_x).
         beside_speed: greatest speed of that armhole across the arm, m/s (φ_v).
-        return_speed: speed at which bounds that are exceeded now are restored without a plan, m/s.
+        return_speed: speed at which exceeded bounds are restored if there is no plan, m/s.
         stretch: share of the garment's reach, φ_c and φ_f, that is used. A taut garment is pulled
             by both arms.
         dragged: displacement of a hand from the plan's assumption that is attributed to the

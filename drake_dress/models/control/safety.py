@@ -10,10 +10,10 @@ The new velocity v of a gripper is the point nearest to the request in an inters
     speed          |v| ≤ max_speed
     acceleration   |v - v_last| ≤ max_acceleration dt, or max_braking dt (below)
     force          n·v ≤ c(force, request), n the direction that pulls against the garment
-    person         least distance to the skin: slower toward it, or away from it
+    person         least distance to the skin: limits the approach, or demands retreat
     distance       least and largest between the grippers: each may use half of the margin
     workspace      a box
-    lead           of the command ahead of the measured gripper
+    lead           greatest lead of the command over the measured gripper
 
 All are balls and half-spaces, and the nearest point is found exactly (`projection.py`). Position
 limits are kept by stopping in time. Along a fixed direction (workspace, least distance, a person

@@ -75,8 +75,8 @@ class TaskParameters:
         led_approach: way to approach a hand that was pulled inward.
         flat: horizontal part of the forearm's direction above which the forearm is flat.
         steep: horizontal part of the forearm's direction below which the forearm is steep.
-        behind_distance: greatest distance behind the hand at which a sleeve waits until it is in
-            line, m.
+        behind_distance: greatest distance behind the hand at which a sleeve waits until it is
+            aligned, m.
         retreat_distance: how much further back a sleeve goes after it missed the hand, m.
         passing_back: the same of a tethered sleeve, m. The front panel needs this distance to pass
             behind the hand; further back, the sleeve pulls the first one off its arm.
@@ -84,19 +84,20 @@ class TaskParameters:
         swing_reach: distance from the first armhole to which the second one swings back, as a share
             of their distance at rest.
         swing_outward: outward part of that motion per backward part.
-        widening: growth of the bound of l_h with each attempt that missed the hand.
+        widening: relative growth of the bound of l_h with each of the first three misses.
         passing_outward: lateral distance outward of an unseen hand at which a tethered armhole
             ends, m. The panel in front of it is as wide.
         passing_behind: distance behind an unseen hand at which a tethered armhole ends, m.
         passing_from: distance outward of the hand at which a tethered armhole begins to come
             forward, m. Any closer and the panel would get in front of the hand.
-        passing_beside: distance outward of the hand at which it is all the way forward, m.
+        passing_beside: distance outward of the hand at which that armhole is all the way forward,
+            beside the hand, m.
         outlook_distance: distance from the hand within which a sleeve that missed it moves to where
             the hand sees the opening, m.
         longest_reach: assumed greatest distance between the armholes, as a share of their distance
             at rest.
-        clear_sight: share of the opening that the hand must see for a tethered sleeve to be drawn
-            straight at the hand.
+        clear_sight: share of the opening that the hand must see for a tethered sleeve, or one that
+            missed the hand, to be drawn straight at the hand.
         funnel_wide: lateral distance of the hand from the normal of a clearly seen opening above
             which the opening is aligned first, m.
         funnel_narrow: lateral distance below which the aligned opening is drawn on, m.

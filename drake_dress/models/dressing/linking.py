@@ -71,7 +71,7 @@ def arm_linking_number(
         loop: (k,3) nodes of the armhole (or cuff) in order, m, world or any frame.
         shoulder: (3,) joint of the arm, m, same frame.
         elbow: (3,) likewise.
-        hand: (3,) likewise; the arm's line ends there.
+        hand: (3,) likewise; the arm's centre line begins there.
         interior: (3,) a point in the torso where the arm's centre line ends, m, same frame.
 
     Raises:
