@@ -1,4 +1,4 @@
-"""Constrained optimal control without Drake: linear dynamics, quadratic costs, bounds on norms.
+"""Constrained optimal control without Drake: linear dynamics, quadratic costs, norm bounds.
 
     from drake_dress import control
 
@@ -8,8 +8,8 @@
     solution = control.solve(problem)
     gains = control.feedback_gains(problem, solution)
 
-The method is constrained DDP, as the local controller of the dressing uses it. A bound is left out
-where there is none. What stands in `__all__` is public.
+The method is constrained DDP, as in the local controller of the dressing. Bounds are optional.
+The names in `__all__` are public.
 """
 
 from drake_dress.models.control.constrained_ddp import Settings, feedback_gains, solve

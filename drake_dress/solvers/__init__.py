@@ -1,1 +1,1 @@
-"""Solvers that come with Drake, behind the interfaces of `models/`."""
+"""Solvers from Drake, behind the interfaces of `models/`."""

@@ -20,9 +20,10 @@ def solve_cone_programme(
     """Returns the optimum of a local problem, without multipliers, and Clarabel's own time, s.
 
     Args:
-        problem: any; bounds that nothing keeps are exceeded at its price.
-        tolerance: of Clarabel's gap and feasibility.
-        spills: whether bounds may be exceeded; else a problem may have no solution.
+        problem: any local problem.
+        tolerance: Clarabel's tolerance of gap and feasibility.
+        spills: whether bounds may be exceeded, at the problem's price; otherwise a problem may be
+            infeasible.
     """
     p = problem
     steps, m = p.input_weight.shape
@@ -66,7 +67,7 @@ def solve_cone_programme(
 
 
 def cone_programme(problem: LocalProblem, before: Solution | None) -> Solution:
-    """Solves a local problem as a cone programme; Clarabel starts anew each time."""
+    """Solves a local problem as a cone programme; Clarabel has no warm start."""
     return solve_cone_programme(problem, spills=True)[0]
 
 

@@ -1,1 +1,1 @@
-"""Planning of the grippers through the garment model."""
+"""Gripper planning and control: global MPC, local constrained DDP, and safety limits."""

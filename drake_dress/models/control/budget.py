@@ -1,7 +1,7 @@
-"""What a solve may take, and what it has taken: a plan is of use at any time, late ones are not.
+"""Computation budget of a solve: a plan can be used at any stage of the descent, but not late.
 
-In simulation a solve is counted in iterations of linear solves, so that a run is the same on any
-machine under any load; on hardware, in seconds.
+In simulation the budget counts iterations of the linear solver, so that a run is reproducible on
+any machine under any load. On hardware it counts seconds.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Cost:
-    """What a part of a solve took: iterations of linear solves, and s."""
+    """Cost of a part of a solve: iterations of the linear solver, and time in s."""
 
     iterations: int = 0
     seconds: float = 0.0
@@ -21,11 +21,11 @@ class Cost:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a solve may take; None: as much as it likes.
+    """Limits of a solve; None means unlimited.
 
     Attributes:
-        iterations: of linear solves.
-        seconds: of this machine's clock.
+        iterations: iterations of the linear solver.
+        seconds: wall-clock time on this machine.
     """
 
     iterations: int | None = None
@@ -34,11 +34,11 @@ class Budget:
 
 @dataclass
 class Spending:
-    """What a solve has taken since this was made.
+    """Tracks what a solve has spent since this object was created.
 
     Attributes:
-        budget: of it.
-        clock: seconds that go on.
+        budget: limits of the solve.
+        clock: returns a monotonic time, s.
     """
 
     budget: Budget
@@ -51,7 +51,7 @@ class Spending:
         self._begin = self._last = self.clock()
 
     def charge(self, iterations: int) -> Cost:
-        """Returns what a part that ends now took, and has it count."""
+        """Returns the cost of the part that ends now, and adds it to the total."""
         now = self.clock()
         cost = Cost(iterations, now - self._last)
         self._last = now
@@ -59,7 +59,7 @@ class Spending:
         return cost
 
     def allows(self, *parts: Cost) -> bool:
-        """Returns whether parts that take as much as these are within the budget."""
+        """Returns whether further parts of these costs fit into the budget."""
         b = self.budget
         iterations = self.iterations + sum(part.iterations for part in parts)
         if b.iterations is not None and iterations > b.iterations:

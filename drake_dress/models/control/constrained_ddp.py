@@ -1,17 +1,17 @@
 """Constrained differential dynamic programming (Alg. cddp) for linear-quadratic problems.
 
-Backward pass: the cost-to-go is a quadratic of the state. Active bounds are linear in the step's
-state and input; what of them no input can change, the null space, is a condition on the state and
-is handed to the step before (Eq. future-constraint). Forward pass: the feedback law gives a new
-trajectory and the bounds' multipliers, which travel the other way: a condition that was handed to
-an earlier step hands its multiplier back. Bounds with a negative multiplier are let go, bounds that
-the new trajectory exceeds are taken in (Eq. sigma_j), and the step is shortened until cost and
-excess together fall.
+Backward pass: the cost-to-go is quadratic in the state. Active bounds are linearized in the state
+and input of a step. The part that no input can change, the null space, is a constraint on the state
+and is passed to the preceding step (Eq. future-constraint). Forward pass: the feedback law gives
+the new trajectory and the multipliers of the bounds. Multipliers travel the other way: a constraint
+that was passed to an earlier step passes its multiplier back. Bounds without a positive multiplier
+leave the active set, and bounds that the new trajectory exceeds enter it (Eq. sigma_j). A line
+search shortens the step until the sum of cost and priced excess falls.
 
-Three things are more than the print has, each for a reason. Rows carry what is missing to their
-bound, as a tangent plane alone drifts off a ball. A ball's curvature, weighted by its multiplier,
-is part of the cost: with it the passes converge quadratically and end on the bounds to rounding.
-And rows that depend on each other are dropped, as seven bounds on six inputs may be.
+Three things are added to the paper's method. Each row carries the residual of its bound, because a
+tangent plane alone drifts off a ball. The curvature of a ball, weighted by its multiplier, is part
+of the cost; with it the passes converge quadratically and end on the bounds to rounding error.
+Linearly dependent rows, such as seven bounds on six inputs, are dropped.
 """
 
 from __future__ import annotations
@@ -32,15 +32,16 @@ from drake_dress.models.control.solution import Solution
 
 @dataclass(frozen=True)
 class Settings:
-    """When to give up.
+    """Iteration limits and tolerance.
 
     Attributes:
-        warm_sweeps: backward and forward passes from an earlier solution's multipliers, before the
-            interior point method is asked.
-        max_sweeps: such passes after it.
-        max_halvings: of a step that does not lower cost and excess.
-        max_interior_steps: of the interior point method; from a guess a third of them.
-        tolerance: at which that one ends, see `interior_point`.
+        warm_sweeps: limit of sweeps, each a backward and a forward pass, from the multipliers of an
+            earlier solution, before the interior point method is used.
+        max_sweeps: limit of sweeps after the interior point method.
+        max_halvings: limit of halvings of a step that does not reduce cost and excess.
+        max_interior_steps: iteration limit of the interior point method; a third of it applies from
+            an initial guess.
+        tolerance: tolerance of the interior point method, see `interior_point`.
     """
 
     warm_sweeps: int = 4
@@ -51,30 +52,30 @@ class Settings:
 
 
 class Problem(Protocol):
-    """What can be solved: `LocalProblem`, `LinearQuadraticProblem`."""
+    """Interface of a solvable problem, such as `LocalProblem` or `LinearQuadraticProblem`."""
 
     @property
     def state_bounds(self) -> NormBounds:
-        """On x_0 … x_N."""
+        """Bounds on x_0 … x_N."""
 
     @property
     def price(self) -> float:
-        """Of the sum of all excesses."""
+        """Penalty on the sum of all excesses."""
 
     def states(self, v: FloatArray) -> FloatArray:
-        """Returns (N+1,n) the states that inputs `v` (N,m) lead to."""
+        """Returns the states (N+1,n) that result from inputs `v` (N,m)."""
 
     def cost(self, v: FloatArray) -> float:
         """Returns the cost of inputs `v` (N,m)."""
 
     def violation(self, v: FloatArray) -> float:
-        """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""
+        """Returns the largest bound violation of inputs `v` (N,m); 0 if none."""
 
     def reduced(self) -> ReducedProblem:
-        """Returns it in the fewest states that its optimum needs."""
+        """Returns the problem in the fewest states that its optimum depends on."""
 
     def about_start(self) -> ReducedProblem:
-        """Returns it in all n states."""
+        """Returns the problem in all n states."""
 
 
 def solve_constrained_ddp(
@@ -87,11 +88,12 @@ def solve_constrained_ddp(
     """Returns the optimum of a problem.
 
     Args:
-        problem: to solve; bounds on states may depend on each other.
-        guess: (N,m) inputs to start from; zero if None.
-        state_multiplier: (N+1,K) of an earlier solution; positive ones start as active.
+        problem: problem to solve; bounds on states may be linearly dependent.
+        guess: (N,m) initial inputs; zero if None.
+        state_multiplier: (N+1,K) of an earlier solution; bounds with a positive multiplier start
+            in the active set.
         input_multiplier: (N,L) likewise.
-        settings: when to give up.
+        settings: iteration limits and tolerance.
     """
     p = problem
     passes = _prepared(p, guess, state_multiplier, input_multiplier)
@@ -124,13 +126,13 @@ def solve_constrained_ddp(
 def solve(
     problem: Problem, before: Solution | None = None, settings: Settings = Settings()
 ) -> Solution:
-    """Returns the optimum of a problem, from the solution of a similar one if there is one.
+    """Returns the optimum of a problem, warm-started from an earlier solution if one is given.
 
     Args:
-        problem: to solve.
-        before: of a problem of the same size, such as that of a moment ago: its inputs are the
-            start, and its active bounds are tried first.
-        settings: when to give up.
+        problem: problem to solve.
+        before: solution of a problem of the same size, such as that of the preceding time step. Its
+            inputs are the initial guess, and its active set is tried first.
+        settings: iteration limits and tolerance.
     """
     if before is None:
         return solve_constrained_ddp(problem, settings=settings)
@@ -141,14 +143,14 @@ def solve(
 
 @dataclass(frozen=True)
 class _Passes:
-    """A problem in the coordinates of the passes, and the solution so far; arrays change in place.
+    """A reduced problem and its current iterate; arrays change in place.
 
     Attributes:
-        of: the problem, with contiguous arrays.
-        price: of the excess of a bound.
-        cost: of states and inputs.
+        of: the reduced problem, with contiguous arrays.
+        price: penalty on the excess of a bound.
+        cost: cost of states and inputs.
         on_x, on_v: bounds on states and inputs, with multipliers.
-        v: (N,m) inputs. start: (N,m) those that were given.
+        v: (N,m) inputs. start: (N,m) initial inputs.
         x: (N+1,n) states, filled by the passes.
     """
 
@@ -162,7 +164,7 @@ class _Passes:
     x: FloatArray
 
     def sweep(self, most: int, max_halvings: int) -> tuple[int, bool]:
-        """Makes passes; returns how many, and whether they ended at an optimum."""
+        """Runs up to `most` sweeps; returns their number and whether they converged."""
         sweep: Any = ddp_passes.sweep
         a, b = self.of.a, self.of.b
         if b is None:
@@ -174,9 +176,9 @@ class _Passes:
 
     @property
     def are_within_price(self) -> bool:
-        """Whether no multiplier is beyond the price of an excess.
+        """Whether no multiplier exceeds the price of an excess.
 
-        Of bounds that only just leave room, sweeps may end on multipliers beyond all measure.
+        If the bounds barely leave a feasible set, sweeps may end in arbitrarily large multipliers.
         """
         return all(b.multiplier.max(initial=0.0) <= self.price for b in (self.on_x, self.on_v))
 
@@ -187,14 +189,14 @@ def _prepared(
     state_multiplier: FloatArray | None,
     input_multiplier: FloatArray | None,
 ) -> _Passes:
-    """Returns a problem for the passes, with what an earlier solution suggests."""
+    """Returns the reduced problem, initialized from an earlier solution if one is given."""
     of = p.reduced().contiguous()
     shape = of.r.shape
     v = np.zeros(shape) if guess is None else np.array(of.unmapped(guess), dtype=np.float64)
     cost = QuadraticCost(of.w, of.w_x, of.r, of.r_v)
     on_x, on_v = _about(of.state_bounds, 1), _about(of.input_bounds, 0)
     if state_multiplier is not None:
-        # those of the start are passed over
+        # no input changes x_0, so its bounds are skipped
         on_x.multiplier[1:] = state_multiplier[1:]
     if input_multiplier is not None:
         on_v.multiplier[:] = input_multiplier
@@ -202,10 +204,10 @@ def _prepared(
 
 
 def _start_inside(passes: _Passes, guessed: bool, settings: Settings) -> tuple[int, bool]:
-    """Fills inputs and multipliers by the interior point method, and widens what nothing keeps.
+    """Fills inputs and multipliers by the interior point method, and widens infeasible bounds.
 
     Returns:
-        Its iterations, and whether they sufficed.
+        The number of iterations, and whether the method converged.
     """
     method: Any = interior_point
     on_x, on_v, v, of = passes.on_x, passes.on_v, passes.v, passes.of
@@ -226,16 +228,16 @@ def _start_inside(passes: _Passes, guessed: bool, settings: Settings) -> tuple[i
             break
     on_x.multiplier[1:], on_v.multiplier[:] = multiplier[:, :n_x], multiplier[:, n_x:]
     if near:
-        # by as little as can be
+        # by the least total excess
         _widen(on_x.radius[1:], excess[:, :n_x])
         _widen(on_v.radius, excess[:, n_x:])
     return total, near
 
 
 def _beside(of_x: FloatArray, of_v: FloatArray) -> FloatArray:
-    """Returns parts of bounds on states and on inputs, (N,K,…) and (N,L,…), as (N,K+L,…).
+    """Returns arrays of bounds on states (N,K,…) and on inputs (N,L,…), joined to (N,K+L,…).
 
-    The last dimension of matrices, that of states or inputs, is filled up with zeros.
+    The last dimension of matrices, that of states or inputs, is padded with zeros.
     """
     width = max(of_x.shape[-1], of_v.shape[-1])
     if of_x.ndim < 4:
@@ -245,10 +247,10 @@ def _beside(of_x: FloatArray, of_v: FloatArray) -> FloatArray:
 
 
 def _polish(passes: _Passes, settings: Settings) -> tuple[int, bool]:
-    """Makes passes from where the interior point method ended, and takes back what is worse.
+    """Runs sweeps from the interior point solution, and restores it where they fail.
 
     Returns:
-        How many, and whether they ended at an optimum.
+        The number of sweeps, and whether they converged.
     """
     v, on_x, on_v = passes.v, passes.on_x, passes.on_v
     inside = v.copy(), on_x.multiplier.copy(), on_v.multiplier.copy()
@@ -261,13 +263,13 @@ def _polish(passes: _Passes, settings: Settings) -> tuple[int, bool]:
 
 
 def _widen(radius: FloatArray, excess: FloatArray) -> None:
-    """Widens bounds (T,K) in place to √(φ² + 2 φ t), those with no excess t not at all."""
+    """Widens bounds (T,K) with an excess t > 0 to √(φ² + 2 φ t), in place."""
     wide = excess > 0.0
     radius[wide] = np.sqrt(radius[wide] * (radius[wide] + 2.0 * excess[wide]))
 
 
 def _about(bounds: NormBounds, first: int) -> MeasuredBounds:
-    """Returns bounds that hold from time `first` on, of which nothing is measured yet."""
+    """Returns bounds that apply from time step `first` on, not yet evaluated."""
     shape = bounds.radius.shape
     return MeasuredBounds(
         np.ascontiguousarray(bounds.matrix),
@@ -283,16 +285,16 @@ def _about(bounds: NormBounds, first: int) -> MeasuredBounds:
 
 
 def feedback_gains(problem: Problem, solution: Solution) -> FloatArray:
-    """Returns (N,m,n) ∂v/∂x about a solution, along the bounds that are active there.
+    """Returns the feedback gains ∂v/∂x (N,m,n) about a solution, along its active bounds.
 
-    It is a backward pass with all n states, not only those m that the inputs reach: what is
-    measured between two solves need not lie among them.
+    The backward pass uses all n states, not only the m that the inputs reach, because a state
+    measured between two solves need not be reachable.
     """
     of = problem.about_start().contiguous()
     (steps, m), n = of.r.shape, of.w_x.shape[1]
     on_x = _at(problem.state_bounds, solution.x, solution.state_multiplier)
     on_v = _at(of.input_bounds, of.unmapped(solution.v), solution.input_multiplier)
-    # gains do not depend on slopes, which only move the feedforward
+    # slopes affect only the feedforward, not the gains
     x_slope, v_slope = np.zeros((steps + 1, n)), np.zeros((steps, m))
     rows = on_x.radius.shape[1] + on_v.radius.shape[1] + n
     backward: Any = ddp_passes.backward
@@ -305,7 +307,7 @@ def feedback_gains(problem: Problem, solution: Solution) -> FloatArray:
 
 
 def _at(bounds: NormBounds, z: FloatArray, multiplier: FloatArray) -> MeasuredBounds:
-    """Returns bounds about a solution `z` (T,d)."""
+    """Returns bounds evaluated at `z` (T,d), active where the multiplier is positive."""
     found = _about(bounds, 0)
     measure: Any = ddp_passes.measure
     measure(found, z)

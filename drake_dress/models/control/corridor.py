@@ -1,10 +1,10 @@
-"""The way that a hand goes on along its forearm, and the place that a forearm takes then.
+"""Cost of cloth in the path of a hand and in the place of its forearm, with its derivative.
 
-A panel or a rim before a hand is met by it, folds up and takes the opening along. How far nodes
-stand in a cylinder ahead of the hand is a cost that says so before they touch, with a derivative.
-The same cylinder from the armhole back up the forearm, as it would lie with the hand in the
-armhole, tells whether the arm gets in at all: the cloth between armhole and neck lies across a
-steep one, however well the armhole faces the hand.
+If a hand meets a panel or a rim, the cloth folds up and drags the opening along. The cost measures
+how deep nodes lie in a cylinder ahead of the hand, so it acts before they touch. The same cylinder
+also stands for the forearm as it would lie with the hand in the armhole. It then shows whether the
+arm can enter at all: the cloth between armhole and neck lies across a steep forearm, however well
+the armhole faces the hand.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 
-# The cylinder begins this far behind the hand's centre, and fades over this at both ends, m.
+# Start of the cylinder behind the hand's centre, and length of the fade at both ends, m.
 _BEHIND, _FADE = 0.02, 0.04
 
 
@@ -24,8 +24,8 @@ class Corridor:
     """Cylinders ahead of a hand, at each of N steps.
 
     Attributes:
-        hand: (N,3) m, where they begin.
-        into: (N,3) unit vectors, from elbow to hand.
+        hand: (N,3) hand positions, where the cylinders begin, m.
+        into: (N,3) unit vectors from elbow to hand.
     """
 
     hand: FloatArray
@@ -41,10 +41,10 @@ def corridor_cost(
 
     Args:
         x: (n,3) nodes, m.
-        hand: (3,) where the cylinder begins, m.
-        into: (3,) unit vector along it.
-        radius: r, m.
-        length: from the hand on, m.
+        hand: (3,) start of the cylinder, m.
+        into: (3,) unit vector along its axis.
+        radius: radius r of the cylinder, m.
+        length: length of the cylinder ahead of `hand`, m.
     """
     offset = x - hand
     along = offset @ into

@@ -1,10 +1,10 @@
-"""What a step of a plan costs: each cost an object with its value and its slope.
+"""Stage costs of a plan: each cost is an object with a value and a gradient.
 
-A cost of a sleeve looks at one side at a time, a cost of the garment at the whole. Slopes are added
-to those of the step: by nodes, by what the grippers hold, by forces, and by the sleeves' centres
-and directions, which `StageCosts` passes on to the nodes of the armholes. A new cost is a class
-with `value` and `add_slope`; `tests/models/control/test_costs.py` holds all of them against finite
-differences.
+A `SleeveCost` is evaluated for one side at a time, a `GarmentCost` for the whole garment. Each cost
+adds its gradient to the `Slope` of the step: with respect to nodes, held nodes, grippers, forces,
+and the centres and directions of the sleeves. `StageCosts` propagates the last two to the nodes of
+the armholes. A new cost is a class with `value` and `add_slope`;
+`tests/models/control/test_costs.py` checks all of them against finite differences.
 """
 
 from __future__ import annotations
@@ -39,20 +39,21 @@ class Weights:
         safety: w_s, weight of the gripper force beyond `free_force`, 1/N².
         free_force: gripper force that costs nothing, N.
         separation: weight of the grippers' distance beyond the rest span of the garment between
-            them, 1/m². It acts before the garment is taut, when the force does not say anything
-            yet. It also weighs what the distance falls short of `least_spread` of that span, where
+            them, 1/m². It acts before the garment is taut, while the force carries no information.
+            It also weighs the shortfall of the distance below `least_spread` of that span, where
             the garment collapses.
         least_spread: smallest distance of the grippers that costs nothing, as a share of the rest
             span.
         entering_spread: replaces `least_spread` while a hand enters a sleeve. A stretched garment
             holds the armhole open and turns it to the hand; a slack one hangs, and the hand pushes
             it away.
-        level: weight of what the left gripper falls short of being `least_level` of the rest span
-            further left than the right one, as the person sees it, 1/m². A garment on edge turns
-            its openings away from both hands and does not come back by itself.
+        level: weight of the shortfall of the left gripper's lateral lead, to the person's left,
+            below `least_level` of the rest span, 1/m². A garment on edge turns its openings away
+            from both hands and does not recover by itself.
         least_level: lateral lead of the left gripper that costs nothing, as a share of the rest
             span.
-        clearance: weight of how much closer than `free_clearance` a gripper is to the person, 1/m².
+        clearance: weight of the shortfall of a gripper's distance to the person below
+            `free_clearance`, 1/m².
         free_clearance: distance of a gripper from the person's skin that costs nothing, m.
         corridor: weight of cloth that hangs ahead of a hand about to enter, 1/m²; see corridor.py.
         corridor_radius: radius of the cylinder ahead of that hand, m.
@@ -88,9 +89,9 @@ class Grip:
     """The nodes that the grippers hold.
 
     Attributes:
-        nodes: (k,) of the garment: those of left, then right gripper.
-        of_side: indices into `nodes` of the left and of the right gripper.
-        span: distance of the grippers at rest, m.
+        nodes: (k,) held nodes of the garment: left, then right gripper.
+        of_side: indices into `nodes`, for the left and for the right gripper.
+        span: distance between the grippers at rest, m.
     """
 
     nodes: IndexArray
@@ -106,15 +107,15 @@ class Grip:
 
 @dataclass(frozen=True)
 class PlannedStep:
-    """One step of a plan, as costs see it.
+    """One time step of a plan, the input of the costs.
 
     Attributes:
-        index: of the step, from 0.
-        x: (n,3) nodes at its end, m.
-        reaction: (k,3) force of the garment on what holds its held nodes, N.
+        index: index of the step, from 0.
+        x: (n,3) nodes at the end of the step, m.
+        reaction: (k,3) force of the garment on the grippers at the held nodes, N.
         sleeves: states of left and right sleeve.
-        situation: what the plan was asked for.
-        grip: what the grippers hold.
+        situation: situation that the plan is computed for.
+        grip: the nodes that the grippers hold.
     """
 
     index: int
@@ -136,14 +137,14 @@ class PlannedStep:
 
 @dataclass
 class Slope:
-    """Derivatives of the costs of one step; costs add to them.
+    """Gradient of the costs of one step; each cost adds to it.
 
     Attributes:
-        x: (n,3) by the nodes.
-        held: (k,3) by the held nodes, beside those in `x`.
-        grippers: (2,3) by the mean of the nodes that left and right gripper hold.
-        reaction: (k,3) by the forces.
-        p_c, v_c: (2,3) by the centres and directions of the sleeves.
+        x: (n,3) with respect to the nodes.
+        held: (k,3) with respect to the held nodes, in addition to `x`.
+        grippers: (2,3) with respect to the mean of the nodes that left and right gripper hold.
+        reaction: (k,3) with respect to the forces.
+        p_c, v_c: (2,3) with respect to the centres and directions of the sleeves.
     """
 
     x: FloatArray
@@ -155,7 +156,7 @@ class Slope:
 
     @classmethod
     def onto(cls, x: FloatArray, held_count: int) -> Slope:
-        """Returns one that adds to `x` (n,3) in place, and is zero otherwise."""
+        """Returns a gradient that accumulates in `x` (n,3) in place and is zero otherwise."""
         held, pair = (held_count, 3), (2, 3)
         zeros = [np.zeros(shape) for shape in (held, pair, held, pair, pair)]
         return cls(x, *zeros)
@@ -165,25 +166,25 @@ class GarmentCost(Protocol):
     """A cost of the whole garment at one step."""
 
     def value(self, step: PlannedStep) -> float:
-        """Returns the cost, zero or more."""
+        """Returns the cost, which is not negative."""
 
     def add_slope(self, step: PlannedStep, slope: Slope) -> None:
-        """Adds the derivative of `value`."""
+        """Adds the gradient of `value` to `slope`."""
 
 
 class SleeveCost(Protocol):
     """A cost of one sleeve at one step."""
 
     def value(self, step: PlannedStep, side: int) -> float:
-        """Returns the cost of a side, zero or more."""
+        """Returns the cost of a side, which is not negative."""
 
     def add_slope(self, step: PlannedStep, side: int, slope: Slope) -> None:
-        """Adds the derivative of `value`."""
+        """Adds the gradient of `value` to `slope`."""
 
 
 @dataclass(frozen=True)
 class SleevePosition:
-    """w ‖p_c − p̄‖²: the armhole's centre is to be at its target."""
+    """w ‖p_c − p̄‖²: draws the armhole's centre to its target."""
 
     weight: float
 
@@ -202,7 +203,7 @@ class SleevePosition:
 
 @dataclass(frozen=True)
 class SleeveDirection:
-    """w ‖d − d̄‖²: the armhole's direction, or that to the garment's entry, is to be its target."""
+    """w ‖d − d̄‖²: turns the armhole's direction, or that to the garment's entry, to its target."""
 
     weight: float
     entry: Entry
@@ -235,7 +236,7 @@ class SleeveDirection:
 
 @dataclass(frozen=True)
 class _Cylinder:
-    """w times what is in a cylinder, see corridor.py; lengths in m."""
+    """w times the cost of cloth in a cylinder, see corridor.py; lengths in m."""
 
     weight: float
     radius: float
@@ -259,17 +260,17 @@ class _Cylinder:
         return corridor_cost(step.x, *place, self.radius, self.length)
 
     def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
-        """Returns where it begins (3,), m, and the unit vector (3,) along it, if there is one."""
+        """Returns the cylinder's start (3,), m, and axis (3,), a unit vector; None without one."""
         raise NotImplementedError
 
     def _add(self, crossing: FloatArray, side: int, slope: Slope) -> None:
-        """Adds the derivative, of what is in the cylinder by the nodes (n,3)."""
+        """Adds the gradient; `crossing` (n,3) is the derivative of `corridor_cost`."""
         slope.x += self.weight * crossing
 
 
 @dataclass(frozen=True)
 class HandCorridor(_Cylinder):
-    """What hangs ahead of a hand that is to go in."""
+    """Cloth that hangs ahead of a hand about to enter."""
 
     def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
         way = step.target(side).corridor
@@ -278,7 +279,7 @@ class HandCorridor(_Cylinder):
 
 @dataclass(frozen=True)
 class ForearmPassage(_Cylinder):
-    """What would cross the forearm if the hand were in the armhole now."""
+    """Cloth that would cross the forearm if the hand were in the armhole now."""
 
     def _place(self, step: PlannedStep, side: int) -> tuple[FloatArray, FloatArray] | None:
         into = step.target(side).passage
@@ -291,7 +292,7 @@ class ForearmPassage(_Cylinder):
 
 @dataclass(frozen=True)
 class GripperForce:
-    """w max(0, ‖f‖ − free)²: a gripper pulls no harder than `free`, N."""
+    """w max(0, ‖f‖ − free)²: penalizes gripper force above `free`, N."""
 
     weight: float
     free: float
@@ -313,10 +314,10 @@ class GripperForce:
 
 @dataclass(frozen=True)
 class GripperSpread:
-    """w e²: e, m, is by how much the grippers are too far apart, or too close to each other.
+    """w e²: e, m, is by how much the grippers are too far apart or too close to each other.
 
-    `least` and `entering` are shares of their distance at rest; the latter takes the place of
-    `least` while a sleeve is entered.
+    They are too far apart beyond their rest distance, and too close below the share `least` of it.
+    `entering` replaces `least` while a hand enters a sleeve.
     """
 
     weight: float
@@ -339,7 +340,7 @@ class GripperSpread:
             slope.grippers[1] -= pull
 
     def _error(self, step: PlannedStep, distance: float) -> float:
-        """Returns how far, m, grippers are too far apart (positive) or too close (negative)."""
+        """Returns the distance error, m: positive if too far apart, negative if too close."""
         span = step.grip.span
         entering = any(t.entering and t.position_weight > 0.0 for t in step.situation.targets)
         short = distance - (self.entering if entering else self.least) * span
@@ -348,9 +349,9 @@ class GripperSpread:
 
 @dataclass(frozen=True)
 class GripperLevel:
-    """w e²: e, m, is what the left gripper is short of being left of the right one.
+    """w e²: e, m, is the shortfall of the left gripper's lateral lead over the right one.
 
-    `least` is the share of the grippers' distance at rest that it is to be.
+    `least` is the required lead, as a share of the grippers' rest distance.
     """
 
     weight: float
@@ -378,7 +379,7 @@ class GripperLevel:
 
 @dataclass(frozen=True)
 class PersonClearance:
-    """w e², mean over what a gripper holds: e is by how much it is closer to the skin than `free`.
+    """w e², mean over the nodes of a gripper: e is the shortfall of skin distance below `free`.
 
     `free` is in m.
     """
@@ -395,7 +396,7 @@ class PersonClearance:
         slope.held += self._found(step)[1]
 
     def _found(self, step: PlannedStep) -> tuple[float, FloatArray]:
-        """Returns the cost, and its derivative by the held nodes (k,3)."""
+        """Returns the cost, and its gradient with respect to the held nodes (k,3)."""
         grip, obstacles = step.grip, step.situation.obstacles[step.index]
         if not obstacles.count:
             return 0.0, np.zeros((len(grip.nodes), 3))
@@ -413,8 +414,8 @@ class StageCosts:
     """All costs of a step.
 
     Attributes:
-        of_sleeves, of_garment: the costs.
-        armholes: loop nodes of left and right armhole. signs: of their orientation.
+        of_sleeves, of_garment: costs of each sleeve, and of the garment.
+        armholes: loop nodes of left and right armhole. signs: their orientation signs.
     """
 
     of_sleeves: Sequence[SleeveCost]
@@ -423,12 +424,12 @@ class StageCosts:
     signs: tuple[float, float]
 
     def values(self, step: PlannedStep) -> list[float]:
-        """Returns each cost of the step: of the left sleeve, of the right one, of the garment."""
+        """Returns the costs of the step: left sleeve, right sleeve, then garment."""
         of_sleeves = [cost.value(step, side) for side in (0, 1) for cost in self.of_sleeves]
         return of_sleeves + [cost.value(step) for cost in self.of_garment]
 
     def add_slope(self, step: PlannedStep, x_bar: FloatArray) -> FloatArray:
-        """Adds the derivative by the nodes to `x_bar` (n,3); returns that by the forces (k,3)."""
+        """Adds the gradient in the nodes to `x_bar` (n,3); returns that in the forces (k,3)."""
         slope = Slope.onto(x_bar, len(step.grip.nodes))
         for side in (0, 1):
             for of_sleeve in self.of_sleeves:
@@ -447,7 +448,7 @@ class StageCosts:
 def dressing_costs(
     weights: Weights, garment: HeldGarment, more: Sequence[GarmentCost] = ()
 ) -> StageCosts:
-    """Returns the costs of the dressing; `more` are added to those of the garment."""
+    """Returns the stage costs of the dressing; `more` extends the garment costs."""
     w = weights
     return StageCosts(
         (

@@ -1,4 +1,4 @@
-"""The passes of constrained DDP, compiled: see constrained_ddp.py for the method.
+"""Compiled passes of constrained DDP; constrained_ddp.py explains the method.
 
 The dynamics are x_{t+1} = a_t x_t + b_t v_t. `a` is None for integrators: x_{t+1} = x_t + b_t v_t.
 """
@@ -19,11 +19,11 @@ from drake_dress.models.control.small_matrices import (
     split_rows,
 )
 
-# Excess of a bound, m or m/s, below which it counts as held.
+# Excess of a bound, m or m/s, below which the bound counts as satisfied.
 _TOLERANCE = 1e-9
-# Change of states and inputs at which the passes end.
+# Change of states and inputs below which the sweeps have converged.
 _SMALLEST_STEP = 1e-7
-# Of multipliers, relative to the largest.
+# Rounding error of multipliers, relative to the largest.
 _ROUNDING = 1e-9
 
 
@@ -37,13 +37,13 @@ class QuadraticCost(NamedTuple):
 
 
 class MeasuredBounds(NamedTuple):
-    """Norm bounds ‖C z + d‖ ≤ φ on states or inputs, and what a trajectory makes of them.
+    """Norm bounds ‖C z + d‖ ≤ φ on states or inputs, evaluated along a trajectory.
 
     Attributes:
         matrix, offset, radius: C (T,K,3,d), d (T,K,3), φ (T,K).
-        first: time of the first bound that counts: the start is what it is.
+        first: time step of the first bound that counts; the initial state is fixed.
         normal, size, excess: unit vector and length of C z + d, (T,K,3) and (T,K); ‖C z + d‖ − φ.
-        active, multiplier: (T,K).
+        active, multiplier: active set and multipliers, (T,K).
     """
 
     matrix: FloatArray
@@ -58,16 +58,16 @@ class MeasuredBounds(NamedTuple):
 
 
 class FeedbackLaw(NamedTuple):
-    """What the backward pass leaves for the forward pass, for each step.
+    """Result of the backward pass for each step, and input of the forward pass.
 
     Attributes:
         gain, feedforward: δv = gain δx + feedforward, (N,m,n) and (N,m).
-        q_vv, q_vx, q_v: derivatives of the action value, (N,m,m), (N,m,n), (N,m).
-        number: (N,) rows of active bounds, those that the step after handed over among them.
-        source: (N,R,2) of a row: 0, 1, 2 for a bound on inputs, on states, a row of the step
-            after; and which.
-        basis, rank, coefficient, owner: of the rows, see `split_rows`.
-        carried: (N,R) size of what is handed to the step before; 0 where nothing is.
+        q_vv, q_vx, q_v: derivatives of the action-value function, (N,m,m), (N,m,n), (N,m).
+        number: (N,) number of constraint rows, including those that the next step passed back.
+        source: (N,R,2) origin of a row: 0, 1, 2 for a bound on inputs, a bound on states, a row of
+            the next step; and its index there.
+        basis, rank, coefficient, owner: decomposition of the rows, see `split_rows`.
+        carried: (N,R) norm of what is passed to the preceding step; 0 if nothing is.
     """
 
     gain: FloatArray
@@ -86,7 +86,7 @@ class FeedbackLaw(NamedTuple):
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def room(steps, n, m, rows):  # type: ignore[no-untyped-def]
-    """Returns a law to be filled, for N = `steps`, with `rows` active bounds a step at the most."""
+    """Allocates a law for N = `steps`, with at most `rows` constraint rows per step."""
     return FeedbackLaw(
         np.zeros((steps, m, n)),
         np.zeros((steps, m)),
@@ -108,7 +108,7 @@ def measure(bounds, z):  # type: ignore[no-untyped-def]
     """Fills unit vectors, lengths and excesses of the bounds at `z` (T,d).
 
     Returns:
-        The sum of what is beyond a bound.
+        The sum of all positive excesses.
     """
     matrix, normal, size, excess = bounds.matrix, bounds.normal, bounds.size, bounds.excess
     total = 0.0
@@ -136,7 +136,7 @@ def measure(bounds, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _excess(bounds, z):  # type: ignore[no-untyped-def]
-    """Returns the sum of what is beyond a bound at `z` (T,d), and fills nothing."""
+    """Returns the sum of all positive excesses at `z` (T,d), without filling `bounds`."""
     total = 0.0
     for t in range(bounds.first, bounds.matrix.shape[0]):
         for k in range(bounds.matrix.shape[1]):
@@ -154,7 +154,7 @@ def _excess(bounds, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _evaluate(cost, x, v, x_slope, v_slope):  # type: ignore[no-untyped-def]
-    """Fills slopes w x + w_x (N+1,n) and r v + r_v (N,m); returns the cost."""
+    """Fills the gradients w x + w_x (N+1,n) and r v + r_v (N,m); returns the cost."""
     w, w_x, r, r_v = cost
     total = 0.0
     for t in range(1, x.shape[0]):
@@ -174,21 +174,21 @@ def _evaluate(cost, x, v, x_slope, v_slope):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def backward(a, b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-untyped-def]
-    """Fills the law of each step, the last one first.
+    """Fills the law of each step, from the last step to the first.
 
     Args:
         a: (N,n,n) of the dynamics; None for integrators.
         b: (N,n,m) of the dynamics.
-        w: (N+1,n,n) Hessians of the cost of states.
-        r: (N,m) diagonal ones of the cost of inputs.
-        x_slope: (N+1,n) slopes of the cost along the trajectory.
-        v_slope: (N,m) likewise.
-        on_x: bounds on states, measured along it.
+        w: (N+1,n,n) Hessians of the state cost.
+        r: (N,m) diagonal Hessians of the input cost.
+        x_slope: (N+1,n) gradients of the state cost along the trajectory.
+        v_slope: (N,m) gradients of the input cost along it.
+        on_x: bounds on states, evaluated along it.
         on_v: bounds on inputs, likewise.
         law: filled.
 
     Returns:
-        How many rows found no room in the law: if any, fill another one with room for them.
+        The number of rows that did not fit into the law. If positive, repeat with a larger law.
     """
     _, n, m = b.shape
     dropped = 0
@@ -204,7 +204,7 @@ def backward(a, b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-
         _bend(on_x, i + 1, p_xx)
         _act(a, b, p_xx, p_x, r[i], v_slope[i], law, i)
         _bend(on_v, i, law.q_vv[i])
-        # `residual` still is that of the step after
+        # `residual` still holds that of the next step
         number, without_room = _gather(a, b, on_x, on_v, law, i, residual, rows)
         dropped += without_room
         law.rank[i] = split_rows(
@@ -218,7 +218,7 @@ def backward(a, b, w, r, x_slope, v_slope, on_x, on_v, law):  # type: ignore[no-
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _bend(bounds, t, hessian):  # type: ignore[no-untyped-def]
-    """Adds the curvature of active bounds at time `t`, weighted by their multipliers."""
+    """Adds the curvature of active bounds at time step `t`, weighted by their multipliers."""
     for k in range(bounds.active.shape[1]):
         size, multiplier = bounds.size[t, k], bounds.multiplier[t, k]
         if bounds.active[t, k] and multiplier > 0.0 and size > 0.0:
@@ -227,7 +227,7 @@ def _bend(bounds, t, hessian):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _act(a, b, p_xx, p_x, r, v_slope, law, i):  # type: ignore[no-untyped-def]
-    """Fills the derivatives of the action value (Eq. VQ-define)."""
+    """Fills the derivatives of the action-value function (Eq. VQ-define)."""
     _, n, m = b.shape
     q_vv, q_vx, q_v = law.q_vv[i], law.q_vx[i], law.q_v[i]
     for d in range(n):
@@ -255,13 +255,13 @@ def _act(a, b, p_xx, p_x, r, v_slope, law, i):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _gather(a, b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-def]
-    """Fills rows [g_v | g_x | g] of what is to hold after step `i`.
+    """Fills the constraint rows [g_v | g_x | g] of step `i`.
 
-    Returns how many, and for how many more there is no room.
+    Returns their number, and the number of rows that did not fit.
 
-    They are active bounds on its input and on the state that it leads to (Eq.
-    current-constraint), and what the step after could not keep by itself (Eq. future-constraint).
-    A row for the state x_{i+1} is by `a` one for x_i, and by `b` one for v_i.
+    The rows are active bounds on the step's input and on the resulting state (Eq.
+    current-constraint), and constraints that the next step passed back (Eq. future-constraint).
+    A row in x_{i+1} becomes a row in x_i through `a`, and a row in v_i through `b`.
     """
     _, n, m = b.shape
     steps, most_rows = law.owner.shape
@@ -320,7 +320,7 @@ def _gather(a, b, on_x, on_v, law, i, handed, rows):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _hand_over(rows, residual, count, m, owner, carried):  # type: ignore[no-untyped-def]
-    """Fills the size of what rows ask of the state and no input can change; 0 where it is none."""
+    """Fills the norm of the state part of rows that no input can change; 0 if there is none."""
     state = slice(m, rows.shape[1] - 1)
     for k in range(count):
         carried[k] = 0.0
@@ -340,7 +340,7 @@ def _square(row):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _decide(law, i, both):  # type: ignore[no-untyped-def]
-    """Fills gain and feedforward: what the rows ask of the input, and the best across them.
+    """Fills gain and feedforward: the rows fix one part of the input, the other part is optimal.
 
     `both` (m,n+1) is filled with [Q_vx | Q_v] + Q_vv [gain | feedforward].
     """
@@ -399,7 +399,7 @@ def _slopes(law, i, found, both):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _cost_to_go(a, law, i, both, p_xx, p_x):  # type: ignore[no-untyped-def]
-    """Turns the cost-to-go at x_{i+1} into that at x_i under the law."""
+    """Replaces the cost-to-go at x_{i+1} by that at x_i under the law."""
     m, n = law.q_vx[i].shape
     gain, feedforward, q_vx = law.gain[i], law.feedforward[i], law.q_vx[i]
     if a is not None:
@@ -423,14 +423,14 @@ def _cost_to_go(a, law, i, both, p_xx, p_x):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _forward(a, b, law, dx, dv, x_multiplier, v_multiplier):  # type: ignore[no-untyped-def]
-    """Fills the new trajectory's distance to the old one, and the multipliers of active bounds.
+    """Fills the change of the trajectory, and the multipliers of active bounds.
 
     Args:
         a: (N,n,n) of the dynamics; None for integrators.
         b: (N,n,m) of the dynamics.
-        law: of the backward pass.
-        dx: (N+1,n), filled.
-        dv: (N,m), filled.
+        law: result of the backward pass.
+        dx: (N+1,n) change of the states, filled.
+        dv: (N,m) change of the inputs, filled.
         x_multiplier: (N+1,K), filled; zero where not active.
         v_multiplier: (N,L), likewise.
     """
@@ -469,9 +469,10 @@ def _forward(a, b, law, dx, dv, x_multiplier, v_multiplier):  # type: ignore[no-
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _balance(law, i, slope, handed, multiplier):  # type: ignore[no-untyped-def]
-    """Fills the multipliers of the rows of step `i`: they hold the action value's `slope` (m,).
+    """Fills the multipliers of the rows of step `i`, which balance the gradient `slope` (m,).
 
-    Rows that no input changes have the multiplier that the step before has `handed` on.
+    `slope` is that of the action-value function. Rows that no input changes take the multiplier
+    that the preceding step `handed` on.
     """
     basis, coefficient, owner = law.basis[i], law.coefficient[i], law.owner[i]
     for k in range(law.number[i]):
@@ -491,16 +492,16 @@ def _balance(law, i, slope, handed, multiplier):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _judge(bounds, dz, found, linear):  # type: ignore[no-untyped-def]
-    """Fills what the linear bounds say of a step.
+    """Fills the linearized excesses of inactive bounds after a step.
 
     Args:
-        bounds: measured before it.
+        bounds: evaluated before the step.
         dz: (T,d) the step.
         found: (T,K) multipliers of the forward pass.
-        linear: (T,K) excesses, filled.
+        linear: (T,K) excesses, filled; those of active bounds are taken before the step.
 
     Returns:
-        The largest multiplier, the least one, and the largest excess of a bound that is not active.
+        The largest and the least multiplier, and the largest excess of an inactive bound.
     """
     largest, least, beyond = 0.0, 0.0, 0.0
     for t in range(bounds.first, linear.shape[0]):
@@ -524,7 +525,7 @@ def _judge(bounds, dz, found, linear):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _begin(bounds):  # type: ignore[no-untyped-def]
-    """Makes bounds active that had a multiplier, or that the trajectory reaches."""
+    """Activates bounds that have a positive multiplier or that the trajectory reaches."""
     for t in range(bounds.first, bounds.active.shape[0]):
         for k in range(bounds.active.shape[1]):
             reached = bounds.excess[t, k] > -_TOLERANCE
@@ -533,7 +534,7 @@ def _begin(bounds):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _switch(bounds, found, excess):  # type: ignore[no-untyped-def]
-    """Lets bounds go whose multiplier is not positive, and takes in those that are exceeded."""
+    """Deactivates bounds without a positive multiplier, and activates those that are exceeded."""
     for t in range(bounds.first, bounds.active.shape[0]):
         for k in range(bounds.active.shape[1]):
             if bounds.active[t, k]:
@@ -544,7 +545,7 @@ def _switch(bounds, found, excess):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _accept(bounds, found):  # type: ignore[no-untyped-def]
-    """Takes the multipliers of the forward pass."""
+    """Adopts the multipliers of the forward pass, at least zero."""
     for t in range(bounds.first, found.shape[0]):
         for k in range(found.shape[1]):
             bounds.multiplier[t, k] = max(0.0, found[t, k])
@@ -552,7 +553,7 @@ def _accept(bounds, found):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _along(slope, step):  # type: ignore[no-untyped-def]
-    """Returns Σ slope · step, and the largest component of the step."""
+    """Returns Σ slope · step, and the largest absolute component of the step."""
     total, size = 0.0, 0.0
     for t in range(step.shape[0]):
         for a in range(step.shape[1]):
@@ -563,12 +564,12 @@ def _along(slope, step):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def sweep(a, b, cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: ignore[no-untyped-def]
-    """Sweeps from inputs `v` (N,m) and multipliers until they are optimal.
+    """Runs sweeps from inputs `v` (N,m) and multipliers until they are optimal.
 
-    The dynamics start at x_0 = 0; `x` (N+1,n) is filled.
+    The dynamics start at x_0 = 0; `v` is updated in place and `x` (N+1,n) is filled.
 
     Returns:
-        Sweeps, and whether they ended at an optimum.
+        The number of sweeps, and whether they converged.
     """
     (steps, m), n = v.shape, x.shape[1]
     rows = on_x.radius.shape[1] + on_v.radius.shape[1] + n
@@ -595,7 +596,7 @@ def sweep(a, b, cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: igno
         x_largest, x_least, x_beyond = _judge(on_x, dx, x_found, x_linear)
         v_largest, v_least, v_beyond = _judge(on_v, dv, v_found, v_linear)
         largest, beyond = max(x_largest, v_largest), max(x_beyond, v_beyond)
-        # the active set is that of the quadratic programme: then the step leads down
+        # with the active set of the quadratic programme, the step is a descent direction
         rounding = _ROUNDING * max(largest, 1e-6)
         consistent = min(x_least, v_least) > -rounding and beyond < _TOLERANCE
         price = max(price, 1.5 * largest)
@@ -630,7 +631,7 @@ def sweep(a, b, cost, on_x, on_v, v, x, max_sweeps, max_halvings):  # type: igno
         elif consistent:
             return made, False
         else:
-            # the same trajectory again, with other bounds
+            # repeat from the same trajectory with another active set
             _switch(on_x, x_found, x_linear)
             _switch(on_v, v_found, v_linear)
     return max_sweeps, False

@@ -1,10 +1,10 @@
 """The global controller: gradient descent through the garment (Eq. global_mpc).
 
-A plan is a velocity of each gripper for each of N steps. The garment model rolls it out against
-the predicted person; sleeve states, stage costs and gripper forces of every step give the cost;
-the adjoint of the rollout, contact frozen, gives its gradient. The descent is projected on the
-speed limit, each velocity is scaled by the time it has to act, and a step is accepted only if it
-lowers the cost.
+A plan is a velocity of each gripper for each of N steps. A rollout of the garment model against the
+predicted person gives sleeve states, gripper forces and stage costs of every step. The adjoint of
+the rollout, with contact frozen, gives the gradient. The descent is projected onto the speed limit.
+The gradient of each velocity is scaled according to the number of steps that it still affects. A
+step is accepted only if it lowers the cost sufficiently.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class Plan:
 
     Attributes:
         velocity: (N,2,3) of left and right gripper, m/s, world.
-        cost: reached; initial_cost: of the start.
+        cost: final cost; initial_cost: cost of the initial guess.
         iterations: accepted gradient steps; evaluations: rollouts.
         reason: why the descent stopped: "small_step", "no_descent", "iterations" or "budget";
-            "no_plan" if none was asked for.
+            "no_plan" if none was requested.
         armhole: (N,2,3) predicted armhole centres, m.
         force: (N,2) predicted gripper force, N.
-        work: iterations of linear solves that it took.
+        work: iterations of the linear solver.
     """
 
     velocity: FloatArray
@@ -60,7 +60,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class _Rollout:
-    """Where velocities lead, and what that costs; a tape and a step for each of N."""
+    """Rollout of velocities and its cost, with a tape and a planned step for each of N steps."""
 
     cost: float
     tapes: list[Tape]
@@ -78,21 +78,21 @@ class _Rollout:
         return np.array(sizes, dtype=np.float64)
 
     def iterations(self) -> int:
-        """Returns those of the linear solves of its steps so far, those of gradients counted."""
+        """Returns the linear solver iterations of its steps so far, including gradients."""
         return sum(tape.system.iterations for tape in self.tapes)
 
 
 @dataclass
 class _Search:
-    """A descent under way.
+    """State of a running descent.
 
     Attributes:
         velocity: (N,2,3) the best plan so far, m/s.
         now: its rollout.
         fastest: (N,1,1) speed limits, m/s.
-        spending: of the solve.
-        rolling: what the last rollout took.
-        length: of the next trial step, relative to the scaled gradient.
+        spending: budget spent by the solve.
+        rolling: computation cost of the last rollout.
+        length: length of the next trial step, relative to the scaled gradient.
         evaluations: rollouts so far.
     """
 
@@ -110,14 +110,14 @@ class GlobalController:
 
     Args:
         cloth: the controller's garment; its held nodes are those of left, then right gripper.
-        garment: how it is held, and its openings.
-        horizon: N.
-        weights: of the costs.
-        max_speed: of a gripper, m/s.
-        max_iterations: gradient steps per solve.
-        frozen_contact: the gradient takes contact as frozen; the exact one does not descend once
-            cloth lies on a limb (see cloth/explicit/adjoint.py).
-        costs: of a user's own, added to those of the dressing.
+        garment: its grasp and its openings.
+        horizon: number of steps N.
+        weights: weights of the costs.
+        max_speed: speed limit of a gripper, m/s.
+        max_iterations: limit of gradient steps per solve.
+        frozen_contact: whether the gradient treats contact as frozen. The exact gradient does not
+            lower the cost once cloth lies on a limb (see cloth/explicit/adjoint.py).
+        costs: user-defined costs, added to the dressing costs.
     """
 
     def __init__(
@@ -152,16 +152,17 @@ class GlobalController:
     ) -> Plan:
         """Returns the plan that gradient descent reaches from `guess` within a budget.
 
-        The guess is rolled out whatever the budget is. Each further rollout or gradient is computed
-        only if the budget has as much left as the last one took.
+        The guess is always rolled out. Each further rollout or gradient is computed only if the
+        remaining budget covers as much as the last one took.
 
         Args:
             situation: the garment, the targets and the predicted person.
-            guess: (N,2,3) velocities to start from, m/s.
-            committed_steps: the first steps of `guess` that are already under way and stay.
-            budget: of the solve.
-            max_speed: of a gripper in the steps that are not under way, m/s; it applies where it is
-                less than the controller's own limit.
+            guess: (N,2,3) initial velocities, m/s.
+            committed_steps: number of first steps of `guess` that are already being executed and
+                stay fixed.
+            budget: limits of the solve.
+            max_speed: speed limit of a gripper in the other steps, m/s, in addition to the
+                controller's own limit.
         """
         fastest = np.full((self.horizon, 1, 1), self.max_speed)
         fastest[committed_steps:] = min(self.max_speed, max_speed)
@@ -201,14 +202,14 @@ class GlobalController:
     def _begun(
         self, situation: Situation, velocity: FloatArray, fastest: FloatArray, spending: Spending
     ) -> _Search:
-        """Returns the search with its first rollout done and charged."""
+        """Returns the search after its first rollout, which is charged to `spending`."""
         now = self._rollout(situation, velocity)
         return _Search(velocity, now, fastest, spending, spending.charge(now.iterations()))
 
     def _step_scale(self) -> FloatArray:
-        """Returns (N,) the length of a gradient step at each time step, per unit of gradient."""
+        """Returns the gradient step length (N,) at each time step, per unit of gradient."""
         h, n = self.cloth.time_step, self.horizon
-        # A velocity at step j moves every later state: curvature of the position cost.
+        # A velocity at step j moves every later state, which sets the curvature of the cost.
         remaining = np.arange(n, 0, -1.0)
         scale: FloatArray = 1.0 / (
             2.0 * h * h * n * (self.weights.position * remaining + self.weights.speed)
@@ -218,10 +219,10 @@ class GlobalController:
     def _advance(
         self, search: _Search, situation: Situation, gradient: FloatArray, descent: FloatArray
     ) -> str | None:
-        """Moves the search along minus `descent` (N,2,3), as far as that lowers the cost.
+        """Takes a backtracking step of the search along minus `descent` (N,2,3).
 
         Returns:
-            None if a step was accepted, otherwise why none was: a `reason` of `Plan`.
+            None if a step was accepted, otherwise the `reason` of `Plan` why none was.
         """
         for _ in range(_MAX_TRIALS):
             if not search.spending.allows(search.rolling):
@@ -241,7 +242,7 @@ class GlobalController:
         return "no_descent"
 
     def _rollout(self, situation: Situation, velocity: FloatArray) -> _Rollout:
-        """Returns where velocities (N,2,3) lead, m/s, and what that costs."""
+        """Returns the rollout of velocities (N,2,3), m/s, with its cost."""
         h, n = self.cloth.time_step, self.horizon
         x, v = situation.x, situation.v
         cost = float(self.weights.speed * h * h * np.sum(velocity**2))
@@ -280,7 +281,7 @@ class GlobalController:
 
 
 def _limited(velocity: FloatArray, max_speed: FloatArray) -> FloatArray:
-    """Returns velocities (N,2,3) with none faster than `max_speed` (N,1,1), directions kept."""
+    """Returns velocities (N,2,3) scaled down to at most `max_speed` (N,1,1)."""
     speed = np.linalg.norm(velocity, axis=2, keepdims=True)
     limited: FloatArray = velocity * np.minimum(1.0, max_speed / np.maximum(speed, 1e-12))
     return limited

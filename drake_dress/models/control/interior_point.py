@@ -1,11 +1,12 @@
-"""A primal-dual interior point method for the local problem: where the active set is not known.
+"""A primal-dual interior point method for the local problem, used if the active set is unknown.
 
-The bounds are written c + t = s with c = (φ² − ‖y‖²) / 2φ, slack s ≥ 0 and excess t ≥ 0 at a price
-that no bound which can be kept is worth: there always is an optimum, and bounds that nothing keeps
-are exceeded by the least sum. Predictor and corrector follow Mehrotra ("On the implementation of a
-primal-dual interior point method", 1992). Each Newton step is a backward and a forward pass without
-bounds: they are barriers in the cost. The end is close to the optimum and tells active bounds by
-multiplier > slack; constrained DDP goes the rest of the way.
+The bounds are written c + t = s with c = (φ² − ‖y‖²) / 2φ, slack s ≥ 0 and excess t ≥ 0. The price
+of t is above the multiplier of any feasible bound (an exact penalty). An optimum therefore always
+exists, and infeasible bounds are violated by the smallest total amount. Predictor and corrector
+follow Mehrotra ("On the implementation of a primal-dual interior point method", 1992). Each Newton
+step is an unconstrained backward and forward pass, with the bounds as barriers in the cost. The
+result is close to the optimum, and a bound is active if its multiplier exceeds its slack.
+Constrained DDP then refines the result.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ import numpy as np
 
 from drake_dress.models.control.linear_dynamics import advance, pull_back, roll
 
-# Share of the way to the border of the positive numbers that a step may go.
+# Fraction of the distance to the boundary, where a variable becomes zero, that a step may go.
 _BORDER_SHARE = 0.995
-# Excess at first as a share of the bound.
+# Initial excess as a share of the bound.
 _FIRST_EXCESS = 0.3
-# Way from the optimum, m, that a start is taken to have at least.
-# Of products that are small enough, to what they are brought at most.
+# Least centering target, relative to products that are small enough to stop.
 _WAITING = 1e-4
+# Least distance to the optimum that an initial guess is assumed to have, m.
 _FLATTEST = 1e-3
 
 
@@ -52,25 +53,26 @@ def interior_point(  # type: ignore[no-untyped-def]
     Args:
         a: (N,n,n), or None with `b`: then x_{t+1} = x_t + v_t and n = m.
         b: (N,n,m), or None.
-        w: (N+1,n,n) Hessians of the cost of states.
-        w_x: (N+1,n) its slopes at zero.
-        r: (N,m) diagonal Hessians of the cost of inputs.
-        r_v: (N,m) its slopes at zero.
-        matrix: (N,K+L,3,max(n,m)) of the K bounds on the state that a step leads to, then of the
-            L bounds on its input, whose first n and m columns count.
-        offset: (N,K+L,3) of them.
+        w: (N+1,n,n) Hessians of the state cost.
+        w_x: (N+1,n) its gradients at zero.
+        r: (N,m) diagonal Hessians of the input cost.
+        r_v: (N,m) its gradients at zero.
+        matrix: (N,K+L,3,max(n,m)) of the K bounds on the state after a step, then of the L bounds
+            on its input; their first n and first m columns are used.
+        offset: (N,K+L,3) of the bounds.
         radius: (N,K+L); infinite where there is no bound.
-        n_x: K.
-        v: (N,m) inputs to start from, and on return.
-        x: (N+1,n) on return.
+        n_x: number K of bounds on the state.
+        v: (N,m) initial inputs; the result on return.
+        x: (N+1,n) states on return.
         multiplier: (N,K+L) on return, of the norms; zero where not active.
-        excess: (N,K+L) t on return, of bounds that nothing keeps; zero elsewhere.
-        price: of the sum of excesses.
-        max_iterations: after which it gives up.
-        tolerance: of bounds, and of products of slack and multiplier relative to the first.
+        excess: (N,K+L) t on return, of infeasible bounds; zero elsewhere.
+        price: penalty on the sum of excesses.
+        max_iterations: iteration limit.
+        tolerance: of the mean residual of the bounds, and of the mean product of slack and
+            multiplier relative to the initial multiplier.
 
     Returns:
-        The iterations, and whether they sufficed.
+        The number of iterations, and whether the method converged.
     """
     (steps, m), n = v.shape, x.shape[1]
     each = radius.shape[1]
@@ -80,7 +82,7 @@ def interior_point(  # type: ignore[no-untyped-def]
     slack, spare = np.ones((steps, each)), np.ones((steps, each))
     multiplier[:] = 0.0
     excess[:] = 0.0
-    # products that the predictor leaves behind: of slack and multiplier, of excess and its own
+    # second-order products of the predictor: slack and multiplier, excess and its own multiplier
     left, left_spare = np.zeros((steps, each)), np.zeros((steps, each))
     d_slack, d_excess = np.zeros((steps, each)), np.zeros((steps, each))
     d_multiplier = np.zeros((steps, each))
@@ -102,7 +104,7 @@ def interior_point(  # type: ignore[no-untyped-def]
             if bounded[t, k]:
                 excess[t, k] = _FIRST_EXCESS * radius[t, k] + max(0.0, -value[t, k])
                 slack[t, k] = value[t, k] + excess[t, k]
-                # products alike for a bound of the usual size
+                # similar products for bounds of the usual size
                 multiplier[t, k] = min(0.5 * price, steepness / count)
                 spare[t, k] = price - multiplier[t, k]
                 mu += slack[t, k] * multiplier[t, k] + excess[t, k] * spare[t, k]
@@ -137,8 +139,8 @@ def interior_point(  # type: ignore[no-untyped-def]
                             ) + (excess[t, k] + primal * d_excess[t, k]) * (spare[t, k] - change)
                             left[t, k] = d_slack[t, k] * d_multiplier[t, k]
                             left_spare[t, k] = -d_excess[t, k] * d_multiplier[t, k]
-                # without any bound there is nothing to be central to; products that are small
-                # enough wait for bounds that are not kept yet, or slacks vanish before these are
+                # Without bounds there is no centering. Products that are small enough must not
+                # shrink further until all bounds are satisfied, or slacks would vanish first.
                 if mu > 0.0:
                     target = mu * min(1.0, (after / (2.0 * count * mu)) ** 3)
                     target = max(target, _WAITING * enough)
@@ -161,7 +163,7 @@ def interior_point(  # type: ignore[no-untyped-def]
                     mismatch += abs(value[t, k] + excess[t, k] - slack[t, k])
         mu /= 2.0 * count
         done = mu <= enough and mismatch <= tolerance * count
-    # the slope of c is that of the norm where the bound is met
+    # On the boundary, c has the gradient of the norm up to sign, so its multipliers carry over.
     for t in range(steps):
         for k in range(each):
             if multiplier[t, k] <= slack[t, k]:
@@ -248,7 +250,7 @@ def _factor(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _through_dynamics(a, b, t, p, q_vv, q_vx):  # type: ignore[no-untyped-def]
-    """Fills q_vv = bᵀ p b and q_vx = bᵀ p a, and turns the Hessian p (n,n) into aᵀ p a."""
+    """Fills q_vv = bᵀ p b and q_vx = bᵀ p a, and replaces the Hessian p (n,n) by aᵀ p a."""
     m, n = q_vx.shape
     if a is None:
         q_vv[:] = p
@@ -300,7 +302,7 @@ def _newton(  # type: ignore[no-untyped-def]
     dx,
     dv,
 ):
-    """Fills the Newton step of states and inputs: slopes backward, then the law forward."""
+    """Fills the Newton step of states and inputs: gradients backward, then the law forward."""
     steps, each = bounded.shape
     m, n = v.shape[1], x.shape[1]
     p, work, into_v = np.zeros(n), np.empty(m), np.empty(m)
@@ -353,7 +355,7 @@ def _newton(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def _slope_through_dynamics(a, b, t, p, into_v):  # type: ignore[no-untyped-def]
-    """Fills `into_v` with bᵀ p, and turns the slope p (n,) into aᵀ p."""
+    """Fills `into_v` with bᵀ p, and replaces the gradient p (n,) by aᵀ p."""
     if a is None:
         into_v[:] = p
     else:
@@ -385,7 +387,7 @@ def _step_lengths(  # type: ignore[no-untyped-def]
     d_excess,
     d_multiplier,
 ):
-    """Fills the steps of slacks, excesses and multipliers; returns how far they may go."""
+    """Fills the steps of slacks, excesses and multipliers; returns primal and dual step length."""
     steps, each = bounded.shape
     primal, dual = 1.0, 1.0
     for t in range(steps):

@@ -1,7 +1,6 @@
-"""Linear dynamics in compiled loops: x_{t+1} = a_t x_t + b_t v_t.
+"""Compiled loops for linear dynamics: x_{t+1} = a_t x_t + b_t v_t.
 
-`a` is None for integrators, x_{t+1} = x_t + b_t v_t, and `b`, too, where n = m and it is the
-identity.
+`a` is None for integrators, x_{t+1} = x_t + b_t v_t. `b` is None for the identity, with n = m.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import numpy as np
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def roll(a, b, v, x):  # type: ignore[no-untyped-def]
-    """Fills the states (N+1,n) that inputs `v` (N,m) lead to from zero."""
+    """Fills the states `x` (N+1,n) that result from inputs `v` (N,m) and x_0 = 0."""
     x[0] = 0.0
     for t in range(v.shape[0]):
         advance(a, b, t, x[t], v[t], x[t + 1])
@@ -20,7 +19,7 @@ def roll(a, b, v, x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def advance(a, b, t, x, v, after):  # type: ignore[no-untyped-def]
-    """Fills the state `after` step `t` from `x` (n,) with input `v` (m,)."""
+    """Fills the state `after` (n,) step `t`, from state `x` (n,) and input `v` (m,)."""
     for i in range(x.shape[0]):
         s = x[i]
         if a is not None:
@@ -37,7 +36,7 @@ def advance(a, b, t, x, v, after):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, error_model="numpy", forceinline=True)
 def pull_back(a, row):  # type: ignore[no-untyped-def]
-    """Turns a `row` (n,) on the state after a step into one on the state before: row · a."""
+    """Replaces a `row` (n,) in the state after a step by the row in the state before: row · a."""
     n = row.shape[0]
     before = np.empty(n)
     for e in range(n):

@@ -1,9 +1,9 @@
-"""Linear-quadratic optimal control with norm bounds: problems of any linear dynamics and weights.
+"""Linear-quadratic optimal control with norm bounds, for any linear dynamics and weights.
 
     minimise    Σ_{j=0}^{N} (x_j−x̄_j)ᵀ Q_j (x_j−x̄_j) + Σ_{j=0}^{N−1} (v_j−v̄_j)ᵀ R_j (v_j−v̄_j)
     subject to  x_{j+1} = A_j x_j + B_j v_j + c_j,   ‖C x_j + d‖ ≤ φ,   ‖E v_j + e‖ ≤ ψ.
 
-It is a convex second-order cone programme, as the local problem is (Eq. loc_mpc).
+It is a convex second-order cone programme, like the local problem (Eq. loc_mpc).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from drake_dress.models.control.reduced_problem import ReducedProblem
 
 @dataclass(frozen=True)
 class LinearQuadraticProblem:
-    """One problem; n states, m inputs, N steps. `linear_quadratic` makes it from fewer arrays.
+    """A problem with n states, m inputs, N steps. `linear_quadratic` builds it from fewer arrays.
 
     Attributes:
         start: (n,) x_0.
         a: (N,n,n) A. b: (N,n,m) B. c: (N,n).
         state_weight: (N+1,n,n) Q, symmetric, positive semidefinite; state_target: (N+1,n) x̄.
         input_weight: (N,m,m) R, symmetric, positive definite; input_target: (N,m) v̄.
-        state_bounds: on x_0 … x_N; those on x_0 do not count, as no input changes it.
+        state_bounds: on x_0 … x_N; those on x_0 are ignored, because no input changes it.
         input_bounds: on v_0 … v_{N−1}.
-        price: of the sum of all excesses, cost per unit of a bound. Bounds that cannot all be kept
-            are exceeded as little as possible.
+        price: penalty on the sum of all excesses, cost per unit of a bound. Infeasible bounds are
+            violated by the smallest total amount.
     """
 
     start: FloatArray
@@ -52,7 +52,7 @@ class LinearQuadraticProblem:
         return len(self.b)
 
     def states(self, v: FloatArray) -> FloatArray:
-        """Returns (N+1,n) the states that inputs `v` (N,m) lead to."""
+        """Returns the states (N+1,n) that result from inputs `v` (N,m)."""
         x = np.empty((self.horizon + 1, len(self.start)))
         x[0] = self.start
         for j in range(self.horizon):
@@ -68,11 +68,11 @@ class LinearQuadraticProblem:
         )
 
     def violation(self, v: FloatArray) -> float:
-        """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""
+        """Returns the largest bound violation of inputs `v` (N,m); 0 if none."""
         return violation(self.state_bounds, self.states(v), self.input_bounds, v)
 
     def reduced(self) -> ReducedProblem:
-        """Returns it for states as they differ from those without inputs, and diagonal weights.
+        """Returns the problem in deviations from the unforced states, with diagonal input weights.
 
         With R = U D Uᵀ, U unit lower triangular, the inputs Uᵀ v have the diagonal weight D.
         """
@@ -101,7 +101,7 @@ class LinearQuadraticProblem:
         )
 
     def about_start(self) -> ReducedProblem:
-        """Returns it in all n states: `reduced` keeps them all."""
+        """Returns the problem in all n states; `reduced` keeps them all."""
         return self.reduced()
 
 
@@ -116,7 +116,7 @@ def linear_quadratic(
     input_bounds: Sequence[NormBound] = (),
     price: float = 1e3,
 ) -> LinearQuadraticProblem:
-    """Returns a problem; what is the same at all steps is given once.
+    """Returns a problem; an array that is the same at all steps may be given once.
 
     Args:
         start: (n,) x_0.
@@ -124,12 +124,13 @@ def linear_quadratic(
         weights: Q (n,n) or (N+1,n,n) and R (m,m) or (N,m,m).
         steps: N.
         targets: x̄ and v̄, a number, (n,) or (N+1,n), and a number, (m,) or (N,m).
-        state_bounds: on x_1 … x_N; an empty sequence is no bound.
+        state_bounds: on x_1 … x_N; none if the sequence is empty.
         input_bounds: on v_0 … v_{N−1}.
         price: see `LinearQuadraticProblem`.
 
     Raises:
-        ValueError: an array has another shape, is not finite, or is no weight.
+        ValueError: `steps` is less than 1, or an array has the wrong shape, is not finite, or is
+            not a valid weight.
     """
     if steps < 1:
         raise ValueError(f"steps is {steps}, expected 1 or more")
@@ -163,7 +164,7 @@ def _array(name: str, given: npt.ArrayLike, dimensions: int) -> FloatArray:
 
 
 def _over_time(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """Returns what is given at each time: with or without a first dimension of time."""
+    """Returns an array for each time step, broadcast if it has no time dimension."""
     array = np.asarray(given, dtype=np.float64)
     if array.shape not in ((), shape[1:], shape) or (array.ndim == 0 and len(shape) > 2):
         raise ValueError(f"{name} has the shape {array.shape}, expected {shape[1:]} or {shape}")

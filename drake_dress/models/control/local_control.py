@@ -1,9 +1,9 @@
-"""The local controller: compensates the global plan by what is seen now (Eq. loc_mpc).
+"""The local controller: corrects the global plan by the current observation (Eq. loc_mpc).
 
-Before each solve the global plan is cut off at the time that has come, and goes on at its end as it
-ended. Where it leads is what its own rollout foresaw, from where sleeves and grippers are now; the
-paper rolls the garment out anew instead, which at 50 Hz would cost ten times what there is. Tasks
-are those of the plan; where they lead follows the person and the sleeves as they are seen.
+Before each solve the global plan is truncated at the current time and extended with its last
+velocity. The nominal motion is that of the plan's own rollout, moved to the observed sleeves and
+grippers. The paper rolls the garment out again instead, which at 50 Hz would take ten times the
+available time. Tasks are those of the plan; their targets follow the observed person and sleeves.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ Solver = Callable[[LocalProblem, Solution | None], Solution]
 
 @dataclass(frozen=True)
 class GlobalPlan(Immutable):
-    """A global plan in time.
+    """A global plan with its times.
 
     Attributes:
-        start: of its first step, s. time_step: s.
+        start: start of its first step, s. time_step: s.
         velocity: (N,2,3) of left and right gripper, m/s.
-        armhole: (N+1,2,3) armhole centres as foreseen, m; row 0 is at `start`.
-        assignment: what the sleeves are to do; None before anything is planned.
-        joints: (N+1,6,3) where it believed the person's to be, m; None if the plan is to rest, and
-            the local controller to go for the targets by itself.
+        armhole: (N+1,2,3) predicted armhole centres, m; row 0 is at `start`.
+        assignment: tasks of the sleeves; None before the first plan.
+        joints: (N+1,6,3) the person's joints that the plan assumed, m; None if the plan is to rest
+            and the local controller tracks the targets by itself.
     """
 
     start: float
@@ -55,11 +55,11 @@ class GlobalPlan(Immutable):
 
     @classmethod
     def resting(cls) -> GlobalPlan:
-        """Returns the plan before anything is planned: to rest."""
+        """Returns the plan that applies before the first one: to rest."""
         return cls(0.0, 1.0, np.zeros((1, 2, 3)), np.zeros((2, 2, 3)))
 
     def velocity_at(self, time: float) -> FloatArray:
-        """Returns the gripper velocities (2,3) at a time, s; zero before the plan and after it."""
+        """Returns the gripper velocities (2,3), m/s, at a time, s; zero outside the plan."""
         step = int(np.floor((time - self.start + 1e-9) / self.time_step))
         if not 0 <= step < len(self.velocity):
             return np.zeros((2, 3))
@@ -69,14 +69,14 @@ class GlobalPlan(Immutable):
 
 @dataclass(frozen=True)
 class LocalPlan(Immutable):
-    """Gripper velocities for the next steps, and how to correct them meanwhile.
+    """Gripper velocities for the next steps, with feedback gains for use between solves.
 
     Attributes:
-        start: s. time_step: s.
+        start: start of the first step, s. time_step: s.
         velocity: (N,2,3) of left and right gripper, m/s.
-        state: (N+1,12) where sleeve centres and grippers are foreseen to be, left and right, m.
+        state: (N+1,12) predicted sleeve centres and grippers, left and right, m.
         gain: (N,6,12) ∂(velocity)/∂(state), 1/s.
-        max_speed: of a gripper, m/s.
+        max_speed: speed limit of a gripper, m/s.
     """
 
     start: float
@@ -87,11 +87,11 @@ class LocalPlan(Immutable):
     max_speed: float
 
     def velocity_at(self, time: float, state: FloatArray | None = None) -> FloatArray:
-        """Returns the gripper velocities (2,3) at a time, m/s; zero where the plan has run out.
+        """Returns the gripper velocities (2,3) at a time, m/s; zero outside the plan.
 
         Args:
             time: s.
-            state: (12,) where sleeve centres and grippers are, m; as foreseen if None.
+            state: (12,) observed sleeve centres and grippers, m; as predicted if None.
         """
         steps = (time - self.start) / self.time_step + 1e-9
         j = int(np.floor(steps))
@@ -109,7 +109,7 @@ class LocalPlan(Immutable):
 
 @dataclass(frozen=True)
 class LocalState(Immutable):
-    """What is carried from one solve to the next: the solution, and whether sleeves are coupled."""
+    """State carried from one solve to the next: solution, its start, s, and sleeve coupling."""
 
     solution: Solution | None = None
     start: float = 0.0
@@ -118,26 +118,26 @@ class LocalState(Immutable):
 
 @dataclass(frozen=True)
 class LocalOutcome:
-    """What a solve has led to; `problem` is None while there is nothing to do."""
+    """Result of a solve; `problem` is None before the first global plan."""
 
     state: LocalState
     plan: LocalPlan
     problem: LocalProblem | None
 
 
-# Where a sleeve shall be (M+1,3), m, and turned to (M+1,3), and the weight of that.
+# Target position (M+1,3), m, and direction (M+1,3) of a sleeve, and the weight of the position.
 _Place = tuple[FloatArray, FloatArray, float]
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a solve sees of garment and person.
+    """Observation of garment and person for one solve.
 
     Attributes:
-        sleeves: of left and right now.
+        sleeves: states of left and right sleeve now.
         joints: (M+1,6,3) predicted, m; row 0 is now.
-        joints_step: between its rows, s.
-        time: now, s.
+        joints_step: time between its rows, s.
+        time: current time, s.
     """
 
     sleeves: Sequence[SleeveState]
@@ -148,13 +148,13 @@ class _Seen:
 
 @dataclass(frozen=True)
 class LocalController:
-    """Solves local problems one after the other.
+    """Solves a sequence of local problems.
 
     Attributes:
-        planner: of tasks, with the controller's garment.
-        parameters: of the problems.
-        solver: takes a problem and the solution that the one before suggests, if any.
-        reach: of the controller's garment.
+        planner: task planner, with the controller's garment.
+        parameters: settings of the problems.
+        solver: takes a problem and a warm start, if any.
+        reach: reach of the controller's garment.
     """
 
     planner: TaskPlanner
@@ -166,7 +166,7 @@ class LocalController:
         object.__setattr__(self, "reach", reach(self.planner.mesh))
 
     def resting(self, time: float) -> LocalPlan:
-        """Returns a plan that does nothing."""
+        """Returns a plan without motion."""
         return LocalPlan(
             time,
             self.parameters.time_step,
@@ -186,16 +186,16 @@ class LocalController:
         joints_step: float,
         time: float,
     ) -> LocalOutcome:
-        """Returns the local plan from now on.
+        """Returns the local plan from `time` on, with the state for the next solve.
 
         Args:
-            state: of the solve before.
+            state: state after the preceding solve.
             plan: the newest global plan.
-            x: (n,3) the controller's garment now, m.
-            gripper: (2,3) of left and right now, m.
+            x: (n,3) nodes of the controller's garment now, m.
+            gripper: (2,3) positions of left and right gripper now, m.
             joints: (M+1,6,3) predicted, m; row 0 is now.
-            joints_step: between its rows, s.
-            time: now, s.
+            joints_step: time between its rows, s.
+            time: current time, s.
         """
         p = self.parameters
         if plan.assignment is None:
@@ -225,10 +225,10 @@ class LocalController:
 
         Args:
             plan: the newest global plan.
-            assignment: its tasks, as they are now.
-            seen: garment and person.
-            nominal: what the plan leads to.
-            foreseen: (N+1,2,3) where the plan foresaw the sleeves, m.
+            assignment: its tasks, with the current progress.
+            seen: observation of garment and person.
+            nominal: nominal motion of the plan.
+            foreseen: (N+1,2,3) sleeves as the plan predicted them, m.
         """
         p, step = self.parameters, seen.joints_step
         places = self._places(assignment, seen.sleeves, seen.joints, step)
@@ -236,10 +236,10 @@ class LocalController:
         goals = []
         for i, (place, direction, weight) in enumerate(places):
             task = assignment.tasks[i]
-            # between the times of the predicted joints targets go straight
+            # targets are interpolated linearly between the times of the predicted joints
             arm = position = _resampled(place, step, p)
             if believed is not None:
-                # what the plan leads to, moved as the person moves otherwise than it believed
+                # nominal motion, shifted by the person's deviation from the plan's assumption
                 position = nominal.sleeve[:, i] + position
                 position = position - _resampled(believed[i][0], step, p)
                 share = p.dress_correction if task == Task.DRESS else p.prepare_correction
@@ -253,7 +253,7 @@ class LocalController:
     def _believed_places(
         self, plan: GlobalPlan, assignment: Assignment, seen: _Seen
     ) -> list[_Place] | None:
-        """Returns the places that follow from the joints the plan believed in; None if in none."""
+        """Returns the places for the joints that the plan assumed; None if it assumed none."""
         if plan.joints is None:
             return None
         count = len(seen.joints)
@@ -269,9 +269,9 @@ class LocalController:
         joints: FloatArray,
         joints_step: float,
     ) -> list[_Place]:
-        """Returns for each sleeve (M+1,3) where it shall be, m, and turned to; and the weight.
+        """Returns target position (M+1,3), m, direction (M+1,3), and weight of each sleeve.
 
-        A sleeve on its arm begins where it is, one that is not at its first target.
+        Row 0 of a sleeve on its arm is the axis point at its progress, otherwise its first target.
         """
         targets = self.planner.targets(assignment, sleeves, joints, joints_step)
         places = []
@@ -292,17 +292,18 @@ def continued(
     time: float,
     parameters: LocalParameters,
 ) -> tuple[Nominal, FloatArray]:
-    """Returns a global plan from a time on, at the local steps; where it ends it goes on as it was.
+    """Returns a global plan from a time on, at the local steps, extended with its last velocity.
 
     Args:
-        plan: with its own steps.
+        plan: global plan, with its own time steps.
         sleeve: (2,3) armhole centres now, m.
-        gripper: (2,3) now, m.
-        time: now, s.
+        gripper: (2,3) grippers now, m.
+        time: current time, s.
         parameters: horizon and time step.
 
     Returns:
-        Where it leads from here, and where it foresaw the sleeves (N+1,2,3), m.
+        The nominal motion from the current state, and the sleeves that the plan predicted
+        (N+1,2,3), m.
     """
     n, h = parameters.horizon, parameters.time_step
     now = (time - plan.start) / plan.time_step
@@ -310,7 +311,7 @@ def continued(
     step = np.clip(np.floor(middle + 1e-9).astype(int), 0, len(plan.velocity) - 1)
     velocity = plan.velocity[step]
     at = time + h * np.arange(n + 1, dtype=np.float64)
-    # beyond the end sleeves go on with their grippers
+    # beyond the end sleeves move with their grippers
     end = plan.start + len(plan.velocity) * plan.time_step
     beyond = np.maximum(at - end, 0.0)[:, None, None] * plan.velocity[-1]
     foreseen = _of_plan(plan, plan.armhole, at) + beyond
@@ -320,14 +321,14 @@ def continued(
 
 
 def joints_of_plan(plan: GlobalPlan, times: FloatArray) -> FloatArray:
-    """Returns (M,6,3) where a plan believed the joints to be at M times, s, m."""
+    """Returns the joints (M,6,3), m, that a plan assumed at M times, s."""
     if plan.joints is None:
         raise ValueError("this plan is to rest and believes nothing of joints")
     return _of_plan(plan, plan.joints, times)
 
 
 def _of_plan(plan: GlobalPlan, rows: FloatArray, times: FloatArray) -> FloatArray:
-    """Returns rows (N+1,…) of a plan at M times, s; before its start and after its end as there."""
+    """Returns rows (N+1,…) of a plan interpolated at M times, s, and constant outside the plan."""
     at = np.clip((times - plan.start) / plan.time_step, 0.0, len(rows) - 1.0)
     row = np.minimum(np.floor(at + 1e-9).astype(int), len(rows) - 2)
     share = (at - row).reshape(-1, *[1] * (rows.ndim - 1))
@@ -336,14 +337,14 @@ def _of_plan(plan: GlobalPlan, rows: FloatArray, times: FloatArray) -> FloatArra
 
 
 def _is_on_arm(fact: SleeveFacts, task: Task) -> bool:
-    """Returns whether a sleeve is on its arm, and to be moved along it or kept there."""
+    """Returns whether a sleeve is on its arm, and is to be drawn along it or to wait there."""
     return fact.linked and task in (Task.DRESS, Task.WAIT)
 
 
 def _local_plan(
     nominal: Nominal, problem: LocalProblem, found: Solution, time: float, p: LocalParameters
 ) -> LocalPlan:
-    """Returns the plan of a solution, which begins at `time`, s."""
+    """Returns the plan of a solution that begins at `time`, s."""
     base = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12)
     return LocalPlan(
         time,
@@ -358,16 +359,17 @@ def _local_plan(
 def _own_motion(
     planned: FloatArray, joints: FloatArray, assignment: Assignment, dragged: float
 ) -> FloatArray:
-    """Returns joints (M+1,6,3) as a plan believed them, less what is not the person's own motion.
+    """Returns joints (M+1,6,3) as a plan assumed them, plus motion that the garment has caused.
 
-    An arm in a sleeve goes where the sleeve takes it, and a hand is pushed along by the cloth on
-    it. Who follows that follows himself, and the garment creeps away with the arms in it.
+    Only the rest of the difference to `joints` is the person's own motion. An arm in a sleeve moves
+    with the sleeve, and cloth on a hand pushes the hand along. Compensating for motion that the
+    garment itself causes creates a feedback loop: the garment creeps away with the arms in it.
 
     Args:
-        planned: (M+1,6,3) as believed, m.
+        planned: (M+1,6,3) as the plan assumed them, m.
         joints: (M+1,6,3) as predicted now, m.
-        assignment: whose arm is in its sleeve.
-        dragged: how far a hand is taken to be pushed, m.
+        assignment: its facts tell which arm is in its sleeve.
+        dragged: displacement of a hand that is attributed to the cloth, m.
     """
     off = joints - planned
     for i, fact in enumerate(assignment.facts):
@@ -382,12 +384,12 @@ def _own_motion(
 
 
 def _bounded(gain: FloatArray, most: float) -> FloatArray:
-    """Returns gains (N,6,12), those of a step scaled to a spectral norm of at most `most`, 1/s.
+    """Returns gains (N,6,12), each step's scaled to a spectral norm of at most `most`, 1/s.
 
-    To be back in a step is the most that can be asked. Bounds that only just leave room ask for
-    any gain at all, as the smallest change moves what is active far along them.
+    An error cannot be removed faster than within one step. Bounds that barely leave a feasible set
+    can demand arbitrarily large gains, because a small change moves the active set far along them.
     """
-    size = np.linalg.norm(gain, axis=(1, 2))  # no less than the spectral norm, and cheap
+    size = np.linalg.norm(gain, axis=(1, 2))  # Frobenius norm: a cheap bound of the spectral norm
     if (size <= most).all():
         return gain
     known = np.where(np.isfinite(size)[:, None, None], gain, 0.0)
@@ -397,7 +399,7 @@ def _bounded(gain: FloatArray, most: float) -> FloatArray:
 
 
 def _resampled(rows: FloatArray, step: float, p: LocalParameters) -> FloatArray:
-    """Returns rows (M+1,3), a `step`, s, apart, at the N+1 local times; the last one stays."""
+    """Returns rows (M+1,3), a `step`, s, apart, at the N+1 local times; the last row is held."""
     at = np.minimum(np.arange(p.horizon + 1) * p.time_step / step, len(rows) - 1)
     low = np.minimum(at.astype(int), len(rows) - 2)
     share = (at - low)[:, None]
@@ -406,7 +408,7 @@ def _resampled(rows: FloatArray, step: float, p: LocalParameters) -> FloatArray:
 
 
 def _shifted(state: LocalState, time: float, p: LocalParameters) -> Solution | None:
-    """Returns the solution before as it goes on from now; None if it is too old or none at all."""
+    """Returns the preceding solution shifted to `time`; None if missing, unconverged or too old."""
     if state.solution is None or not state.solution.converged:
         return None
     steps = int(np.floor((time - state.start) / p.time_step + 0.5))

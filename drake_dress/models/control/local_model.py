@@ -1,16 +1,16 @@
-"""The local model: how sleeves follow grippers, and what bounds both (Eqs. loc-func1, loc-func2).
+"""The local model: how sleeves follow grippers, and their bounds (Eqs. loc-func1, loc-func2).
 
-State are the compensations of sleeve centres and grippers, x = (Δp_cl, Δp_cr, Δp_rl, Δp_rr), input
-those of the grippers' velocities. While the sleeves are near each other each one follows its own
-gripper. Further apart the garment between them is taut and a sleeve follows both, the far one the
-more the further away it is, up to one half.
+The state is the compensation of sleeve centres and grippers, x = (Δp_cl, Δp_cr, Δp_rl, Δp_rr). The
+input is the compensation of the gripper velocities. While the sleeves are near each other, each
+follows its own gripper. Further apart the garment between them is taut, and each sleeve follows
+both grippers. The share of the far gripper grows with its distance, up to one half.
 
-Three things differ from the print. k grows with the distance to the far gripper from a share of φ_f
-on, not from φ_c: on a coat that is held at its shoulders the sleeves are further from each other
-than from the far gripper (0.59 m against 0.54 m), and the print's quotient has the wrong sign. And
-the distance of the grippers has a bound like the others. And the price of speed is on the
-compensation, not on its sum with the plan: a gripper that the plan moves to turn or stretch the
-garment, of which the local model knows nothing, would be stopped.
+Three things differ from the paper. First, k grows with the distance to the far gripper from a share
+of φ_f on, not from φ_c. The sleeves of a coat that is held at its shoulders are further from each
+other than from the far gripper (0.59 m against 0.54 m), so the paper's quotient has the wrong sign.
+Second, the distance between the grippers is bounded as well. Third, the speed cost applies to the
+compensation, not to its sum with the plan. Otherwise it would stop a gripper that the plan moves to
+turn or stretch the garment, which the local model does not represent.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from drake_dress.models.control.norm_bounds import NormBounds
 from drake_dress.models.garment.geodesics import Reach
 
 _EYE, _NONE = np.eye(3), np.zeros((3, 3))
-# What a bound on distances is of, as blocks of (p_cl, p_cr, p_rl, p_rr).
+# Differences whose length is bounded, as blocks of (p_cl, p_cr, p_rl, p_rr).
 _PAIRS = (
     np.hstack([_EYE, _NONE, _NONE, -_EYE]),
     np.hstack([_NONE, _EYE, -_EYE, _NONE]),
@@ -39,22 +39,22 @@ class LocalParameters:
     """Settings of the local problem.
 
     Attributes:
-        time_step: s. horizon: N.
-        position: W, 1/m².
-        speed: R on the compensation of the grippers' speed, s²/m².
-        max_speed: of a gripper, m/s.
-        beside: how far the armhole of a dressed sleeve may be beside its arm, m (φ_x).
-        beside_speed: how fast it may move beside the arm, m/s (φ_v).
-        return_speed: at which bounds that are exceeded now come back where nothing is planned, m/s.
-        stretch: share of the distances that the garment reaches, φ_c and φ_f, that is used: a
-            garment drawn taut is pulled by both arms.
-        dragged: how far from where the plan believed it a hand may be by the garment's doing, m;
-            only what is beyond is followed.
-        prepare_correction: share of what a sleeve is off from where the plan foresaw it now that
-            is made up for while it is prepared; dress_correction: while it is drawn on.
-        taut_share: of φ_f, from which on a sleeve follows the far gripper, too.
-        coupled_share: of φ_c, beyond which the sleeves are coupled; released_share: below which
-            they are no longer.
+        time_step: s. horizon: number of steps N.
+        position: W, weight of the position error, 1/m².
+        speed: R, weight of the compensation of the gripper velocities, s²/m².
+        max_speed: speed limit of a gripper, m/s.
+        beside: greatest distance of the armhole of a sleeve on its arm from the arm axis, m (φ_x).
+        beside_speed: greatest speed of that armhole across the arm, m/s (φ_v).
+        return_speed: speed at which exceeded bounds are restored if there is no plan, m/s.
+        stretch: share of the garment's reach, φ_c and φ_f, that is used. A taut garment is pulled
+            by both arms.
+        dragged: displacement of a hand from the plan's assumption that is attributed to the
+            garment, m; only the excess is followed.
+        prepare_correction: share of a sleeve's current deviation from the plan that is corrected
+            while it is prepared; dress_correction: while it is drawn on.
+        taut_share: share of φ_f above which a sleeve also follows the far gripper.
+        coupled_share: share of φ_c above which the sleeves are coupled; released_share: share below
+            which they are released.
     """
 
     time_step: float = 0.05
@@ -76,13 +76,13 @@ class LocalParameters:
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the global plan leads to.
+    """Nominal motion: that of the global plan.
 
     Attributes:
         sleeve: (N+1,2,3) armhole centres, m. gripper: (N+1,2,3) m. velocity: (N,2,3) of the
             grippers, m/s. Left, then right.
-        planned: whether a plan with the garment leads there. Where it exceeds a bound by itself it
-            may: it knows of cloth and contact more than that bound does.
+        planned: whether it comes from a plan with the garment model. Such a plan may exceed a
+            bound, because its model of cloth and contact is more accurate than the bound.
     """
 
     sleeve: FloatArray
@@ -93,12 +93,12 @@ class Nominal:
 
 @dataclass(frozen=True)
 class SleeveGoal:
-    """What is asked of one sleeve at the N+1 times.
+    """Goal of one sleeve at the N+1 times.
 
     Attributes:
-        target: (N+1,3) m. weight: factor on W; 0 leaves the sleeve alone.
+        target: (N+1,3) m. weight: factor on W; 0 leaves the sleeve free.
         on_arm: whether contact with the arm bounds it.
-        arm: (N+1,3) point of the arm's axis that the armhole of a dressed sleeve is at, m.
+        arm: (N+1,3) point of the arm axis for the armhole of a sleeve on its arm, m.
         axis: (N+1,3) unit direction of the arm there.
     """
 
@@ -112,19 +112,19 @@ class SleeveGoal:
 def is_coupled(was: bool, distance: float, reach: Reach, parameters: LocalParameters) -> bool:
     """Returns whether armholes at a `distance`, m, are coupled: ‖p_cl − p_cr‖ ≥ φ_c.
 
-    With hysteresis: the distance goes up and down as grippers work, and the dynamics shall not.
+    The threshold has hysteresis, so that the dynamics do not switch with every change of distance.
     """
     share = parameters.released_share if was else parameters.coupled_share
     return distance >= share * reach.between_sleeves
 
 
 def influence(distance: float, reach: float, taut_share: float) -> float:
-    """Returns k, from 0 to ½: how much a sleeve follows the far gripper.
+    """Returns k, from 0 to ½: the share by which a sleeve follows the far gripper.
 
     Args:
-        distance: of sleeve and far gripper, m.
-        reach: the largest one, φ_f, m.
-        taut_share: of it, from which on k is positive.
+        distance: between sleeve and far gripper, m.
+        reach: greatest such distance, φ_f, m.
+        taut_share: share of `reach` above which k is positive.
     """
     slack = taut_share * reach
     return float(np.clip(0.5 * (distance - slack) / (reach - slack), 0.0, 0.5))
@@ -154,10 +154,10 @@ def local_problem(
     """Returns the problem whose optimum compensates the global plan (Eq. loc_mpc).
 
     Args:
-        nominal: what the plan leads to.
+        nominal: nominal motion of the plan.
         goals: of left and right sleeve.
         coupled: see `is_coupled`.
-        reach: of the controller's garment.
+        reach: reach of the controller's garment.
         parameters: settings.
     """
     p, n = parameters, parameters.horizon
@@ -193,7 +193,7 @@ def _tracking(
 
 
 def _distance_bounds(nominal: Nominal, reach: Reach, p: LocalParameters) -> NormBounds:
-    """Returns the bounds on states: four distances, then a free row for each sleeve's arm."""
+    """Returns the bounds on states: four distances, then an unused row for each sleeve's arm."""
     n = p.horizon
     where = np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(n + 1, 12)
     matrix, offset = np.zeros((n + 1, 6, 3, 12)), np.zeros((n + 1, 6, 3))
@@ -206,7 +206,7 @@ def _distance_bounds(nominal: Nominal, reach: Reach, p: LocalParameters) -> Norm
 
 
 def _speed_bounds(nominal: Nominal, p: LocalParameters) -> NormBounds:
-    """Returns the bounds on inputs: a free row for each sleeve's arm, then the grippers' speeds."""
+    """Returns the bounds on inputs: an unused row for each sleeve's arm, then gripper speeds."""
     n = p.horizon
     velocity = nominal.velocity.reshape(n, 6)
     matrix, offset = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
@@ -227,7 +227,7 @@ def _bind_to_arm(
     b: FloatArray,
     p: LocalParameters,
 ) -> None:
-    """Fills the rows that keep sleeve `i` near the axis of its arm, and slow across it."""
+    """Fills the rows that keep sleeve `i` near its arm axis and limit its speed across it."""
     rows = _rows(i)
     across = _EYE - goal.axis[:, :, None] * goal.axis[:, None, :]
     away = nominal.sleeve[:, i] - goal.arm
@@ -244,8 +244,8 @@ def _reachable_radii(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns the radii (N+1,6) and (N,4), widened where the nominal motion exceeds a bound.
 
-    A plan with the garment may exceed a bound. Without one, a bound that is exceeded already is
-    restored gradually: it could not be restored at once.
+    A plan with the garment model may exceed a bound. Without one, a bound that is exceeded already
+    is restored gradually, because it cannot be restored at once.
     """
     along = np.linalg.norm(on_states.offset, axis=2)
     if planned:

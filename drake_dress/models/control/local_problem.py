@@ -22,16 +22,16 @@ from drake_dress.models.control.reduced_problem import ReducedProblem
 
 @dataclass(frozen=True)
 class LocalProblem:
-    """One problem; n states, m inputs, N steps.
+    """A problem with n states, m inputs, N steps.
 
     Attributes:
         start: (n,) x_0.
         input_matrix: (n,m) B.
         state_weight: (N+1,n) diagonal of W, zero or more; state_target: (N+1,n) x̄.
         input_weight: (N,m) diagonal of R, positive; input_target: (N,m) v̄.
-        state_bounds: on x_0 … x_N; those on x_0 are not up to anyone and are passed over.
+        state_bounds: on x_0 … x_N; those on x_0 are ignored, because no input changes it.
         input_bounds: on v_0 … v_{N−1}.
-        price: of the sum of all t, 1/m.
+        price: penalty on the sum of all excesses t, 1/m.
     """
 
     start: FloatArray
@@ -50,7 +50,7 @@ class LocalProblem:
         return len(self.input_weight)
 
     def states(self, v: FloatArray) -> FloatArray:
-        """Returns (N+1,n) the states that inputs `v` (N,m) lead to."""
+        """Returns the states (N+1,n) that result from inputs `v` (N,m)."""
         moved = np.cumsum(v @ self.input_matrix.T, axis=0)
         x: FloatArray = self.start + np.concatenate([np.zeros((1, len(self.start))), moved])
         return x
@@ -64,16 +64,16 @@ class LocalProblem:
         )
 
     def spilled(self, v: FloatArray) -> float:
-        """Returns the sum of t of all bounds at inputs `v` (N,m), m."""
+        """Returns the sum of the excesses t of all bounds at inputs `v` (N,m), m."""
         of_states = self.state_bounds.spilled(self.states(v))[1:].sum()
         return float(of_states + self.input_bounds.spilled(v).sum())
 
     def violation(self, v: FloatArray) -> float:
-        """Returns by how much inputs `v` (N,m) exceed the worst bound; 0 if none."""
+        """Returns the largest bound violation of inputs `v` (N,m); 0 if none."""
         return violation(self.state_bounds, self.states(v), self.input_bounds, v)
 
     def reduced(self) -> ReducedProblem:
-        """Returns it in the sums of inputs, u: x = x_0 + B u has m coordinates in place of n."""
+        """Returns the problem in sums of inputs, u: x = x_0 + B u has m coordinates, not n."""
         b, w, r = self.input_matrix, 2.0 * self.state_weight, 2.0 * self.input_weight
         of_x, of_v = self.state_bounds, self.input_bounds
         return ReducedProblem(
@@ -88,7 +88,7 @@ class LocalProblem:
         )
 
     def about_start(self) -> ReducedProblem:
-        """Returns it in all n states, as they differ from the start."""
+        """Returns the problem in all n states, as deviations from x_0."""
         (steps, _), n = self.input_weight.shape, len(self.start)
         w, r = np.zeros((steps + 1, n, n)), 2.0 * self.input_weight
         w[:, range(n), range(n)] = 2.0 * self.state_weight

@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from drake_dress.models.arrays import FloatArray
 
-# Rows of a norm at most: the solvers' kernels have loops of this length.
+# Maximum number of rows of a norm: the solvers' kernels have loops of this length.
 _ROWS = 3
 
 
 @dataclass(frozen=True)
 class NormBounds:
-    """Bounds on the norms of affine functions, a row of them for each step.
+    """Bounds on the norms of affine functions, one row of bounds for each step.
 
     Attributes:
         matrix: (T,K,3,n). offset: (T,K,3).
@@ -28,17 +28,17 @@ class NormBounds:
     radius: FloatArray
 
     def norms(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) the norms at `z` (T,n)."""
+        """Returns the norms (T,K) at `z` (T,n)."""
         y = np.einsum("tkab,tb->tka", self.matrix, z) + self.offset
         length: FloatArray = np.linalg.norm(y, axis=2)
         return length
 
     def excess(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) by how much the norms at `z` (T,n) exceed their bounds; negative within."""
+        """Returns the excess (T,K) of the norms over their bounds at `z` (T,n); negative inside."""
         return self.norms(z) - self.radius
 
     def spilled(self, z: FloatArray) -> FloatArray:
-        """Returns (T,K) the least t with ‖·‖² ≤ φ² + 2 φ t at `z` (T,n); 0 where there is none."""
+        """Returns the least t ≥ 0 (T,K) with ‖·‖² ≤ φ² + 2 φ t at `z` (T,n); 0 without a bound."""
         bounded = np.isfinite(self.radius)
         phi = np.where(bounded, self.radius, 1.0)
         t = np.maximum(0.0, 0.5 * (self.norms(z) ** 2 / phi - phi))
@@ -46,9 +46,9 @@ class NormBounds:
 
 
 def violation(of_states: NormBounds, x: FloatArray, of_inputs: NormBounds, v: FloatArray) -> float:
-    """Returns by how much states `x` (N+1,n) and inputs `v` (N,m) exceed the worst bound, or 0.
+    """Returns the largest bound violation of states `x` (N+1,n) and inputs `v` (N,m), or 0.
 
-    Bounds on x_0 do not count: no input changes it.
+    Bounds on x_0 are ignored, because no input changes it.
     """
     over = of_states.excess(x)[1:].max(initial=0.0)
     return float(max(0.0, over, of_inputs.excess(v).max(initial=0.0)))
@@ -70,7 +70,7 @@ class NormBound:
 
     @classmethod
     def interval(cls, row: npt.ArrayLike, low: float, high: float) -> NormBound:
-        """Returns low ≤ row · z ≤ high, with a `row` (d,)."""
+        """Returns the bound low ≤ row · z ≤ high, with a `row` (d,)."""
         if not low < high:
             raise ValueError(f"the interval is {low:g} to {high:g}, expected low < high")
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -78,16 +78,16 @@ class NormBound:
 
 
 def stacked_bounds(bounds: Sequence[NormBound], times: int, size: int, first: int) -> NormBounds:
-    """Returns bounds at each of T = `times`.
+    """Returns the bounds at each of T = `times` time steps.
 
     Args:
-        bounds: any number of them.
-        times: T; a `radius` or `offset` of length T − `first` is that from `first` on.
-        size: of z.
-        first: time from which they hold.
+        bounds: any number of bounds.
+        times: T; a `radius` or `offset` of length T − `first` begins at time step `first`.
+        size: dimension of z.
+        first: time step from which on they apply.
 
     Raises:
-        ValueError: a bound has another shape, or a radius is not positive.
+        ValueError: a bound has the wrong shape, or a radius is not positive.
     """
     matrix = np.zeros((times, len(bounds), _ROWS, size))
     offset = np.zeros((times, len(bounds), _ROWS))

@@ -1,4 +1,4 @@
-"""Costs of a plan that users register: each is a group of keys below `controller.costs`."""
+"""User-defined costs of a plan: each is a group of scenario keys below `controller.costs`."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ COSTS: Mapping[str, type] = MappingProxyType(_costs)
 
 
 def register_cost(kind: Kind) -> Kind:
-    """Makes a cost known by its `NAME`; returns it, so it can be a decorator.
+    """Registers a cost under its `NAME`; returns it, so that it can be used as a decorator.
 
-    Its fields are keys of scenarios, `controller.costs.NAME.FIELD`. A class that is defined again,
-    as in a notebook's cell, takes the place of its earlier self.
+    Its fields become scenario keys, `controller.costs.NAME.FIELD`. A class that is defined again,
+    as in a notebook cell, replaces the earlier one.
 
     Args:
         kind: a frozen dataclass whose fields are numbers with defaults, with the methods of
-            `GarmentCost`. It raises ValueError for values that it does not take.
+            `GarmentCost`. It raises ValueError for values that it rejects.
 
     Raises:
-        UserError: it is something else, or its name is taken.
+        UserError: `kind` is not such a class, or its name is taken.
     """
     source = f"cost {getattr(kind, '__name__', repr(kind))}"
     made: Any = vars(kind).get("__dataclass_params__") if isinstance(kind, type) else None
@@ -48,10 +48,10 @@ def register_cost(kind: Kind) -> Kind:
 
 
 def unregister_cost(name: str) -> None:
-    """Forgets a cost that was registered.
+    """Removes a registered cost.
 
     Raises:
-        UserError: there is none of that name.
+        UserError: no cost of that name is registered.
     """
     if name not in _costs:
         raise UserError("cost", name, "is not registered, expected the name of one that is")
@@ -62,7 +62,7 @@ def registered_costs(values: Mapping[str, Mapping[str, float]]) -> tuple[Garment
     """Returns the costs with the values of `controller.costs`, by name.
 
     Raises:
-        UserError: a cost is not known, or does not take its values.
+        UserError: a cost is unknown, or rejects its values.
     """
     found: list[GarmentCost] = []
     for name, given in values.items():

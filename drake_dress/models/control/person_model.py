@@ -1,4 +1,4 @@
-"""The person as the controller knows it, as obstacles that move as predicted."""
+"""The controller's model of the person: obstacles that move with the predicted joints."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from drake_dress.models.human.heading import heading
 
 @dataclass(frozen=True)
 class PersonModel:
-    """What the controller knows of the person's shape.
+    """The person's shape as the controller models it.
 
     Attributes:
-        capsules: in body frames; those of the torso go with the shoulders.
-        shoulders: (2,3) of the shoulder joints in the torso's frame, left and right, m.
-        radius: upper arm, forearm, hand, m.
+        capsules: in body frames; those of the torso move with the shoulders.
+        shoulders: (2,3) shoulder joints in the torso's frame, left and right, m.
+        radius: radii of upper arm, forearm and hand, m.
     """
 
     capsules: tuple[Capsule, ...]
@@ -54,9 +54,9 @@ def person_obstacles(person: PersonModel, joints: FloatArray, time_step: float) 
     """Returns the person at the start of each of N steps.
 
     Args:
-        person: its shape.
+        person: shape of the person.
         joints: (N+1,6,3) predicted shoulder, elbow, hand of left, then right arm, m.
-        time_step: between them, s.
+        time_step: time between rows of `joints`, s.
     """
     h = time_step
     placed = [person_capsules(person, q) for q in joints]
@@ -78,7 +78,7 @@ def person_capsules(
     """Returns ends (K,3), (K,3) and radii (K,), m, of the person's capsules, torso first.
 
     Args:
-        person: its shape.
+        person: shape of the person.
         joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
     """
     ends = np.empty((2, len(person.radii), 3))
@@ -99,5 +99,5 @@ def _find_ends(turned, torso, neck, joints, ends):  # type: ignore[no-untyped-de
                 for b in range(3):
                     ends[e, k, a] += turned[a, b] * torso[e, k, b]
             for k in range(6):
-                # of an arm: upper arm, forearm, and the hand, which is a ball
+                # each arm has an upper arm, a forearm, and a hand, which is a sphere
                 ends[e, count + k, a] = joints[k + e if k % 3 < 2 else k, a]

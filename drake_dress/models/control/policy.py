@@ -1,4 +1,4 @@
-"""From what is seen to a plan: tasks, targets and the global controller in turn."""
+"""From observation to plan: tasks, then targets, then the global controller."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ class PolicyParameters:
     """Settings of the global controller and its targets.
 
     Attributes:
-        time_step: of the prediction, s. horizon: N. max_iterations: gradient steps per solve.
+        time_step: of the prediction, s. horizon: number of steps N. max_iterations: limit of
+            gradient steps per solve.
         inner_iterations: of the garment's linear solve; 1 is the paper's one-step scheme.
-        committed_steps: of a plan, which run before it can be used.
-        max_speed: of a gripper, m/s.
-        weights: of the costs.
-        tasks: where sleeves are asked to go.
-        plans: whether the garment is asked at all; if not, plans are to rest, and the local
-            controller is left to itself.
-        budget: of a solve.
+        committed_steps: steps of a plan that pass before it can be used.
+        max_speed: speed limit of a gripper, m/s.
+        weights: weights of the costs.
+        tasks: settings of the sleeve targets.
+        plans: whether to plan with the garment model. If not, plans are to rest, and the local
+            controller works alone.
+        budget: limits of a solve.
     """
 
     time_step: float = 0.2
@@ -56,7 +57,7 @@ class PolicyParameters:
 
 @dataclass(frozen=True)
 class PolicyState(Immutable):
-    """What is carried from one decision to the next."""
+    """State carried from one decision to the next."""
 
     stages: StageState
     velocity: FloatArray
@@ -64,7 +65,7 @@ class PolicyState(Immutable):
 
 @dataclass(frozen=True)
 class Decision:
-    """A plan and what led to it; `target` (N,2,3) is where the armholes shall be, m."""
+    """A plan with its tasks; `target` (N,2,3) holds the targets of the armhole centres, m."""
 
     plan: Plan
     assignment: Assignment
@@ -72,14 +73,14 @@ class Decision:
 
 
 class DressingPolicy:
-    """Decides how both grippers move, from garment and person as they are believed to be.
+    """Decides how both grippers move, from the estimates of garment and person.
 
     Args:
-        mesh: the controller's garment; it need not be the true one.
-        material: what the controller believes of the fabric.
-        person: what it knows of the person's shape.
+        mesh: the controller's garment; it may differ from the true one.
+        material: the controller's estimate of the fabric.
+        person: the controller's model of the person's shape.
         parameters: settings.
-        costs: of a user's own, added to those of the dressing.
+        costs: user-defined costs, added to the dressing costs.
     """
 
     def __init__(
@@ -104,7 +105,7 @@ class DressingPolicy:
         self.planner = TaskPlanner(mesh, parameters.tasks)
         held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
         left, right = (x.mean(axis=0) for x in held)
-        # of left and right, (k,3) where what is held is from its gripper, m
+        # (k,3) positions of the held nodes relative to left and right gripper, m
         self.held_offsets = (held[0] - left, held[1] - right)
         span = float(np.linalg.norm(left - right))
         self.controller = GlobalController(
@@ -124,7 +125,7 @@ class DressingPolicy:
         )
 
     def initial_state(self) -> PolicyState:
-        """Returns the state before the first decision: nothing is on, nothing moves."""
+        """Returns the state before the first decision: no sleeve is on, and nothing moves."""
         return PolicyState(StageState(), np.zeros((self.parameters.horizon, 2, 3)))
 
     def decide(
@@ -139,14 +140,14 @@ class DressingPolicy:
         """Returns the next state and the decision.
 
         Args:
-            state: of the decision before.
-            x: (n,3) the controller's garment, m.
-            v: (n,3) its velocity, m/s.
+            state: state after the preceding decision.
+            x: (n,3) nodes of the controller's garment, m.
+            v: (n,3) their velocities, m/s.
             joints: (N+1,6,3) predicted shoulder, elbow, hand of left, then right arm, m; row 0
                 is now.
-            time: now, s.
-            elapsed_steps: how many prediction steps passed since the last decision, whole or not:
-                what of its plan is on its way, and the start of the descent.
+            time: current time, s.
+            elapsed_steps: prediction steps since the last decision, possibly fractional. The rest
+                of its plan is being executed, and is the initial guess of the descent.
         """
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
@@ -171,7 +172,7 @@ class DressingPolicy:
         )
 
     def _rest(self, x: FloatArray) -> Plan:
-        """Returns the plan that leaves the grippers where they are, and the garment with them."""
+        """Returns the plan that keeps the grippers, and the garment with them, where they are."""
         n = self.parameters.horizon
         centers = np.stack([sleeve.p_c for sleeve in self.planner.sleeves(x)])
         return Plan(
@@ -187,9 +188,9 @@ class DressingPolicy:
 
 
 def later(velocity: FloatArray, steps: float) -> FloatArray:
-    """Returns the velocities (N,…) of a plan from `steps` of its steps on, the mean in each step.
+    """Returns the velocities (N,…) of a plan shifted by `steps`, averaged within each new step.
 
-    Beyond its end the last one goes on.
+    The last velocity is held beyond the end of the plan.
     """
     whole = int(np.floor(steps + 1e-9))
     part, n = max(0.0, steps - whole), len(velocity)

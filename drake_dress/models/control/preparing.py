@@ -1,4 +1,4 @@
-"""Where a sleeve goes that is to go over a hand (Eq. Jpi)."""
+"""Target of a sleeve that is about to be pulled over a hand (Eq. Jpi)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from drake_dress.models.human.heading import Heading
 def choose_approach(
     p: TaskParameters, forearm: FloatArray, to: Heading, side: int, attempts: int, tethered: bool
 ) -> Approach:
-    """Returns how to go about a hand that was missed so often, with `forearm` (3,) as it is now.
+    """Returns the approach to a hand after `attempts` misses, for the current `forearm` (3,).
 
-    What misses a hand once mostly misses it again: an arm that another approach suits gets it. A
-    flat forearm goes into an armhole that is turned toward it about the vertical, a steep one into
-    one that comes from the side. From the side an armhole that misses also pushes an arm that
-    follows further inward each time, where it is led behind the back in the end: such an arm is
-    gone about along its forearm every other time, once it was missed a few times as the first one.
+    An approach that misses a hand once mostly misses it again, so the next attempt uses another
+    one. A flat forearm enters an armhole that is turned toward it about the vertical, a steep
+    forearm one that comes from the side. An armhole from the side that misses a compliant arm also
+    pushes it further inward each time, in the end behind the back. The first sleeve therefore
+    approaches an adducted arm along the forearm in every second attempt after `led_after` misses.
     """
     if tethered:
         return p.tethered_approaches[attempts % len(p.tethered_approaches)]
@@ -32,17 +32,17 @@ def choose_approach(
     level = float(np.hypot(forearm[0], forearm[1]))
     best = 1 if level >= p.flat else 2 if level <= p.steep else 0
     turn = attempts % len(p.approaches)
-    # the best goes first, the others keep their order
+    # the best approach comes first, the others keep their order
     return p.approaches[best if turn == 0 else turn - 1 if turn <= best else turn]
 
 
 def opening(forearm: FloatArray, to: Heading, side: int) -> float:
-    """Returns the inward part of a forearm's direction (3,) from hand to elbow."""
+    """Returns the inward component of a forearm's direction (3,) from hand to elbow."""
     return float(forearm @ to.inward(side))
 
 
 def distance_aside(offset: FloatArray, direction: FloatArray) -> FloatArray:
-    """Returns the lengths (…) of `offset` (…,3) across unit vectors `direction` (…,3)."""
+    """Returns the lengths (…) of `offset` (…,3) normal to unit vectors `direction` (…,3)."""
     along = np.einsum("...i,...i->...", offset, direction)
     across = offset - direction * along[..., None]
     return np.sqrt(np.einsum("...i,...i->...", across, across))
@@ -50,26 +50,26 @@ def distance_aside(offset: FloatArray, direction: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Preparation:
-    """One sleeve that is to go over its hand.
+    """A sleeve that is about to be pulled over its hand.
 
-    The opening is drawn over the hand mostly from outside inward. Before, it waits a cap of l_h
-    outside the hand, and further back (against v_f) until it is in line: so the hand comes in by
-    the open front. An arm that comes from anywhere else meets the outside of the front panel, with
-    the armhole's centre at the hand and the hand not in it; so an opening that the hand does not
-    see stays outside. One that missed the hand goes where the hand comes to see it. The garment
-    does not reach that far with its other sleeve on an arm: the second one goes around the hand.
-    One that faces the hand is drawn along its own normal, and along the forearm once the hand is
-    in it: further inward it would be pulled past it.
+    The opening is drawn over the hand mostly from outside inward. Before that, it waits outside the
+    hand at the upper bound of l_h, and further back (against v_f) until it is aligned, so that the
+    hand enters through the open front. An arm from anywhere else meets the outside of the front
+    panel: the armhole's centre is at the hand, but the hand is not inside. An opening that the hand
+    does not see therefore stays outside. A sleeve that missed the hand moves to where the hand sees
+    its opening. With the other sleeve on an arm the garment does not reach that far, and the second
+    sleeve goes around the hand. An opening that faces the hand is drawn along its own normal, and
+    along the forearm once the hand is inside. Drawn further inward, it would pass the hand.
 
     Attributes:
         parameters: settings.
-        side: of the sleeve.
-        fact: of the sleeve.
-        way: how it goes about the hand.
-        tethered: the other sleeve is on its arm.
-        attempts: how often it has missed the hand.
-        outlook: place from the hand at which the hand sees the armhole, (3,) m.
-        retreat: it keeps away from the hand.
+        side: side of the sleeve.
+        fact: facts about the sleeve.
+        way: its approach to the hand.
+        tethered: whether the other sleeve is on its arm.
+        attempts: how often the sleeve has missed the hand.
+        outlook: place relative to the hand at which the hand sees the armhole, (3,) m.
+        retreat: whether the sleeve stays away from the hand.
     """
 
     parameters: TaskParameters
@@ -84,13 +84,13 @@ class Preparation:
     def places(
         self, hand: FloatArray, forearm: FloatArray, to: Heading, sleeve: SleeveState
     ) -> FloatArray:
-        """Returns where the armhole's centre is asked to be at N times, (N,3) m.
+        """Returns the targets of the armhole's centre at N times, (N,3) m.
 
         Args:
             hand: (N,3) m.
             forearm: (N,3) unit, from hand to elbow.
             to: heading of the person at these times.
-            sleeve: where it is now.
+            sleeve: its current state.
         """
         p = self.parameters
         direction = self.way.direction(forearm, to, self.side)
@@ -103,12 +103,12 @@ class Preparation:
         if self.retreat:
             return back
         offset = hand - sleeve.p_c
-        # Depth of the hand behind the opening, and how far it is beside the opening's normal.
+        # Depth of the hand behind the opening, and its distance from the opening's normal axis.
         depth = (offset @ -sleeve.v_c)[:, None]
         beside = distance_aside(offset, sleeve.v_c)[:, None]
         facing = self._facing(beside)
         inside = facing * _ramp(depth, -0.02, 0.02)
-        # not over the hand before it is in line: what is beside goes first
+        # the opening is aligned first and drawn over the hand only then
         ahead = np.where(depth < 0.0, _ramp(beside, p.funnel_wide, p.funnel_narrow), 1.0)
         if self._seeks_sight:
             onward = (1.0 - inside) * sleeve.v_c + inside * forearm
@@ -134,14 +134,14 @@ class Preparation:
         return np.where(waits, self._behind(sleeve, outside, to), goal)
 
     def _around(self, offset: FloatArray, back: FloatArray, to: Heading) -> FloatArray:
-        """Returns the way (N,3) of a tethered armhole that its hand does not see, from the hand, m.
+        """Returns places (N,3), m, relative to the hand, of a tethered armhole hidden from it.
 
-        Outward and back first, then forward beside the hand: the panel in front of the armhole has
-        to pass on the hand's outer side.
+        The armhole moves outward and back first, then forward beside the hand, because the panel in
+        front of it has to pass on the hand's outer side.
 
         Args:
-            offset: (N,3) of the hand from the armhole's centre now, m.
-            back: (N,3) of the place outward and back, from the hand, m.
+            offset: (N,3) hand relative to the armhole's current centre, m.
+            back: (N,3) place outward and back, relative to the hand, m.
             to: heading of the person.
         """
         p, inward = self.parameters, to.inward(self.side)
@@ -153,20 +153,20 @@ class Preparation:
 
     @property
     def _seeks_sight(self) -> bool:
-        """Whether it goes to where its hand comes to see it."""
+        """Whether the sleeve moves to where its hand sees the opening."""
         return self.tethered or self.outlook is not None
 
     @property
     def _barred(self) -> float:
-        """How far the garment bars the hand's sight of the opening, 0 to 1."""
+        """How far the garment blocks the hand's sight of the opening, 0 to 1."""
         stages = self.parameters.stages
         return float(_ramp(self.fact.sight, stages.least_sight, stages.lost_sight))
 
     def _facing(self, beside: FloatArray) -> FloatArray:
-        """Returns how far, 0 to 1, the opening is one to be drawn straight at the hand, (N,1).
+        """Returns how far, 0 to 1, the opening may be drawn straight at the hand, (N,1).
 
         Args:
-            beside: (N,1) of the hand, from the opening's normal, m.
+            beside: (N,1) distance of the hand from the opening's normal axis, m.
         """
         p = self.parameters
         facing = (1.0 - self._barred) * _ramp(beside, 1.5 * p.inside_radius, p.inside_radius)
@@ -175,7 +175,7 @@ class Preparation:
         return np.maximum(facing, _ramp(self.fact.sight, p.stages.least_sight, p.clear_sight))
 
     def _behind(self, sleeve: SleeveState, outside: FloatArray, to: Heading) -> FloatArray:
-        """Returns places behind `outside` (N,3), the further behind the less it is in line."""
+        """Returns places behind `outside` (N,3), further behind for a larger lateral error."""
         p = self.parameters
         error = distance_aside(sleeve.p_c - outside, to.front)[:, None]
         wait = p.approach_slope * np.maximum(0.0, error - 2.0 * p.aside_free)
@@ -184,6 +184,6 @@ class Preparation:
 
 
 def _ramp(value: float | FloatArray, zero: float, one: float) -> FloatArray:
-    """Returns 0 beyond `zero`, 1 beyond `one`, linear between, for any number of values."""
+    """Returns a linear ramp from 0 at `zero` to 1 at `one`, clipped to [0, 1]."""
     ramp: FloatArray = np.minimum(1.0, np.maximum(0.0, (value - zero) / (one - zero)))
     return ramp

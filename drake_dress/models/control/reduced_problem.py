@@ -1,4 +1,4 @@
-"""What the solvers of linear-quadratic problems with norm bounds work on."""
+"""Standard form for the solvers of linear-quadratic problems with norm bounds."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from drake_dress.models.control.norm_bounds import NormBounds
 
 @dataclass(frozen=True)
 class ReducedProblem:
-    """A problem in states x and inputs v of its own; n states, m inputs, N steps.
+    """A problem in its own states x and inputs v; n states, m inputs, N steps.
 
     minimise   Σ_{j=0}^{N} ½ x_jᵀ w_j x_j + w_x,jᵀ x_j + Σ_{j=0}^{N−1} ½ v_jᵀ r_j v_j + r_v,jᵀ v_j
     subject to x_{j+1} = a_j x_j + b_j v_j from x_0 = 0, and norm bounds.
 
     Attributes:
         a: (N,n,n); None for integrators, x_{j+1} = x_j + b_j v_j.
-        b: (N,n,m); None for the identity, which only integrators have.
+        b: (N,n,m); None for the identity, with integrators only.
         w, w_x: (N+1,n,n) and (N+1,n). r, r_v: (N,m) diagonals, positive, and (N,m).
         state_bounds: on x_0 … x_N; input_bounds: on v_0 … v_{N−1}.
-        input_map: (N,m,m) T; the inputs of the problem that was reduced are T_j v_j. None if they
-            are v_j.
+        input_map: (N,m,m) T; the original problem has the inputs T_j v_j. None for the identity.
     """
 
     a: FloatArray | None
@@ -37,7 +36,7 @@ class ReducedProblem:
     input_map: FloatArray | None = None
 
     def contiguous(self) -> ReducedProblem:
-        """Returns it with arrays as compiled kernels take them: C-contiguous."""
+        """Returns the problem with C-contiguous arrays, as compiled kernels take them."""
         return ReducedProblem(
             None if self.a is None else np.ascontiguousarray(self.a),
             None if self.b is None else np.ascontiguousarray(self.b),
@@ -51,14 +50,14 @@ class ReducedProblem:
         )
 
     def mapped(self, v: FloatArray) -> FloatArray:
-        """Returns what inputs `v` (N,m), or columns of them (N,m,k), are before the reduction."""
+        """Returns inputs `v` (N,m), or columns of them (N,m,k), mapped to the original problem."""
         if self.input_map is None:
             return v
         columns: FloatArray = self.input_map @ v.reshape(*v.shape[:2], -1)
         return columns.reshape(v.shape)
 
     def unmapped(self, v: FloatArray) -> FloatArray:
-        """Returns what inputs `v` (N,m) from before the reduction are after it."""
+        """Returns inputs `v` (N,m) of the original problem mapped to this one."""
         if self.input_map is None:
             return v
         return np.asarray(np.linalg.solve(self.input_map, v[:, :, None])[:, :, 0], np.float64)

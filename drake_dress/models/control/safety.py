@@ -1,56 +1,57 @@
-"""Governs the velocities of two grippers that hold one garment on a person.
+"""Safety governor for the velocities of two grippers that hold one garment on a person.
 
-Whatever a controller asks for, the position commands that leave `step` obey limits. A controller
-asks by velocities, with the time at which it made them. Velocities have no jumps and do not wind
-up: what was held back is gone, and the controller need not know of it. `step` integrates its own
-position commands from them.
+The position commands that `step` returns obey limits, whatever a controller requests. A request
+holds velocities and the time at which they were made. Velocity requests cannot jump in position or
+wind up: suppressed motion is not made up later, and the controller need not know of it. `step`
+integrates its own position commands.
 
 The new velocity v of a gripper is the point nearest to the request in an intersection of
 
     speed          |v| ≤ max_speed
     acceleration   |v - v_last| ≤ max_acceleration dt, or max_braking dt (below)
     force          n·v ≤ c(force, request), n the direction that pulls against the garment
-    person         not nearer to the skin than a distance: slower toward it, or away from it
-    distance       of both grippers, least and largest: each closes or opens it by half at most
+    person         least distance to the skin: limits the approach, or demands retreat
+    distance       least and largest between the grippers: each may use half of the margin
     workspace      a box
-    lead           of the command before the measured gripper
+    lead           greatest lead of the command over the measured gripper
 
-All are balls and half-spaces, and the nearest point is found exactly (`projection.py`). Limits of
-place are kept by stopping in time. Along a direction that stays (workspace, least distance, a
-person who is still) v obeys v dt + v² / (2 max_acceleration) ≤ d, d being what is left, and
-keeping it never needs more than ordinary braking. Where direction turns (lead, largest distance)
-the whole way to rest is in the ball: |p + τ v| ≤ radius, τ = dt + v̂ / (2 max_acceleration),
-v̂ = |v_last| + max_acceleration dt being the largest speed of this step. Braking straight at
-3 max_acceleration keeps that from one step to the next: the factor of v falls from τ to
+All are balls and half-spaces, and the nearest point is found exactly (`projection.py`). Position
+limits are kept by stopping in time. Along a fixed direction (workspace, least distance, a person
+who is still) v obeys v dt + v² / (2 max_acceleration) ≤ d, with d the remaining margin. Keeping it
+never needs more than ordinary braking. If the direction turns (lead, largest distance), the whole
+stopping path is in the ball: |p + τ v| ≤ radius, τ = dt + v̂ / (2 max_acceleration), with
+v̂ = |v_last| + max_acceleration dt, at most max_speed, the largest speed of this step. Braking
+straight at 3 max_acceleration keeps that from one step to the next: the factor of v falls from τ to
 dt + (1.5 dt + v / 2a) (1 - 3 a dt / v) < τ.
 
-Speed and max_braking are never exceeded, whatever the rest asks: v_last is in both balls, so both
-always meet. Beyond max_acceleration, up to max_braking, a gripper brakes only where the limits
-cannot be kept together otherwise, or where it must stop. If even that is not enough, limits are
-kept as far as it goes in the order above: a person who is pulled counts more than a workspace.
+max_speed and max_braking are never exceeded, whatever the other limits demand: v_last is in both
+balls, so they always intersect. A gripper brakes harder than max_acceleration, up to max_braking,
+only if the limits cannot be kept together otherwise, or if it must stop. If even that is not
+enough, limits are kept as far as possible, with priority in the order above: the force on a person
+takes priority over the workspace.
 
-The pull at which the garment is held back fades between the soft and the hard limit, as the force
-rises (low-passed, for a gripper shall not answer to the garment's flutter); beyond, the gripper
-gives way along the force. A force at the hard limit or beyond is taken as measured, at once: no
-filter hides it, and n·v falls to 0 by max_braking dt a step.
+Between the soft and the hard force limit, the permitted pulling speed fades to zero as the force
+rises. The force is low-pass filtered, so that a gripper does not respond to the garment's flutter.
+Above the hard limit the gripper yields along the force. A force at or above the hard limit bypasses
+the filter, and n·v falls to 0 by max_braking dt a step.
 
-    What fails                                      Then
+    Fault                                           Response
     force over the hard limit for stop_time         both grippers stop: latched
-    force or position that is no number             both stop, until measured again
-    request that is no number, or 10 × max_speed    both come to rest by max_acceleration
+    force or position not finite                    both stop, until measured again
+    request not finite, or over 10 × max_speed      both come to rest by max_acceleration
     request older than stale_time, made later than
       now, or before one that was obeyed            the same
-    no permission of the station                    the same
+    no permission from the station                  the same
 
-A latched stop ends by itself once the force on both grippers is under the soft limit; until then
-the gripper that is pulled gives way, so that it ends and nobody is left held fast. It needs no
-reset by hand: nothing is wrong but the force, which is measured to be gone. Giving way under the
-hard limit comes last in the order above: it leaves no workspace.
+A latched stop ends by itself once the force on both grippers is under the soft limit. Until then
+the gripper that is pulled yields, so that the stop ends and no person remains held fast. No manual
+reset is needed: the only fault was the force, and it is measured to be gone. Yielding under the
+hard limit has the lowest priority in the order above, so it does not leave the workspace.
 
-Both stop where one must: they hold one garment on one person.
+If one gripper must stop, both stop, because they hold one garment on one person.
 
-What presses cloth into a person is a gripper, mostly one that a hand reaches for. How the person
-moves is not known here: who comes nearer is let come, and the gripper gives way.
+Cloth is pressed into a person by a gripper, mostly one that a hand reaches for. The governor does
+not know how the person moves: a person may come nearer, and the gripper yields.
 """
 
 from __future__ import annotations
@@ -67,35 +68,35 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.projection import BALL, HALF_SPACE, excess, find_nearest
 from drake_dress.models.vector3 import dot, length
 
-# A request this many times faster than allowed was not meant: it is in mm/s, or garbage.
+# A request this many times faster than allowed is an error: it is in mm/s, or garbage.
 _ABSURD = 10.0
-# Time in which a limit of distance that is broken is made good again, s, no faster than relaxing,
-# or yielding where it is the person's.
+# Time in which a violated position limit is restored, s. The speed is at most relax_speed, or
+# yield_speed for the person's distance.
 _RETURN_TIME = 0.1
-# Stamps may be off by this, s: rounding of clocks that count periods.
+# Tolerance of time stamps, s: rounding of clocks that count periods.
 _CLOCK_ROUNDING = 1e-6
-# Numbers beyond this are over any limit, and their squares must not overflow.
+# Larger values are over any limit; they are clipped, so that their squares do not overflow.
 _LARGEST = 1e6
-# Of the force, the person, both distances, six walls, the lead.
+# Limits of the force, the person, both distances, six walls, the lead.
 _MOST_SPACES = 11
 
 
 class Verdict(IntFlag):
-    """What was cut from a request, and why."""
+    """The reasons why a request was changed."""
 
     NONE = 0
     SPEED = 1  # request over max_speed
-    ACCELERATION = 2  # velocity has not caught up with what is allowed
+    ACCELERATION = 2  # request differs from the last velocity by more than max_acceleration allows
     FORCE = 4  # pulls against a force over the soft limit
-    LEAD = 8  # command too far before the gripper
+    LEAD = 8  # command too far ahead of the gripper
     WORKSPACE = 16  # at the workspace's border
     DISTANCE = 32  # grippers too near to each other, or too far
     STALE = 64  # request too old, from the future, or before one that was obeyed
-    INVALID = 128  # request is no number, or absurd
-    UNMEASURED = 256  # force or position of a gripper is no number
+    INVALID = 128  # request not finite, or absurd
+    UNMEASURED = 256  # force or position of a gripper not finite
     STOPPED = 512  # force was over the hard limit too long
     BRAKING = 1024  # more than max_acceleration was needed
-    HELD = 2048  # the station does not permit motion: something it needs is not there
+    HELD = 2048  # the station does not permit motion: something it needs is missing
     PERSON = 4096  # too near to the person's skin
 
 
@@ -104,28 +105,29 @@ class SafetyLimits:
     """Limits of each gripper; SI units.
 
     Attributes:
-        max_speed: m/s.
-        max_acceleration: ordinary, m/s².
-        max_braking: never exceeded, m/s²; used where the other limits need it. With three times
-            max_acceleration these can always be kept.
-        soft_force: from here on pulling fades, N.
-        hard_force: from here on there is no pulling, N; beyond, the gripper gives way.
-        filter_time: time constant of the force's low-pass, s.
-        yield_rate: speed of giving way per force over the hard limit, m/s/N.
-        yield_speed: of giving way at most, to a force or a person, m/s.
-        relax_speed: of giving way while stopped, and of going back into a distance, m/s.
-        stop_time: over the hard limit after which both stop, s.
-        max_lead: of the command before the measured position, m, braking included.
-        stale_time: age at which a request is not obeyed any more, s.
-        person_distance: of a gripper's command to the person's skin, m. 0: any.
-        held_distance: of the cloth that it holds to the person's skin, m.
-        least_distance: of the grippers' commands, m: hands must not hit each other. 0: any.
-        largest_distance: of the same, m, for a garment that may not be drawn wider even if the
-            force is measured wrong; inf: any.
+        max_speed: speed limit, m/s.
+        max_acceleration: limit of ordinary acceleration, m/s².
+        max_braking: never exceeded, m/s²; used if the other limits need it. Three times
+            max_acceleration always suffices to keep them.
+        soft_force: force above which pulling fades, N.
+        hard_force: force from which on there is no pulling, N; above it the gripper yields.
+        filter_time: time constant of the force's low-pass filter, s.
+        yield_rate: yielding speed per force over the hard limit, m/s/N.
+        yield_speed: greatest yielding speed, to a force or a person, m/s.
+        relax_speed: yielding speed while stopped, and speed of returning into a distance, m/s.
+        stop_time: time over the hard limit after which both stop, s.
+        max_lead: greatest lead of the command over the measured position, m, braking included.
+        stale_time: age above which a request is not obeyed, s.
+        person_distance: least distance of a gripper's command from the person's skin, m. 0: any.
+        held_distance: least distance of the held cloth from the person's skin, m.
+        least_distance: least distance of the grippers' commands, m: the robot hands must not
+            collide. 0: any.
+        largest_distance: greatest distance of them, m, for a garment that must not be stretched
+            further even if the force measurement is wrong; inf: any.
         workspace: (2,3) low and high corner of the box for p_WG, m; None: everywhere.
 
     Raises:
-        ValueError: limits that contradict each other.
+        ValueError: a limit is out of range, or limits contradict each other.
     """
 
     max_speed: float = 0.25
@@ -170,7 +172,7 @@ class SafetyLimits:
 
     @cached_property
     def compiled(self) -> Limits:
-        """As kernels take them."""
+        """The limits as kernels take them."""
         workspace = self.workspace
         if workspace is None:
             workspace = np.array([[-np.inf] * 3, [np.inf] * 3])
@@ -178,7 +180,7 @@ class SafetyLimits:
         return Limits._make([*scalars, np.ascontiguousarray(workspace, dtype=np.float64)])
 
     def broken_at(self, position: FloatArray) -> str | None:
-        """Returns what is wrong with grippers at `position` (2,3), m; None if nothing is."""
+        """Returns which limit grippers at `position` (2,3), m, violate; None if they do not."""
         apart = float(np.linalg.norm(position[0] - position[1]))
         if not self.least_distance <= apart <= self.largest_distance:
             low, high = self.least_distance, self.largest_distance
@@ -192,7 +194,7 @@ class SafetyLimits:
 
 
 class Limits(NamedTuple):
-    """`SafetyLimits` as kernels take them; a workspace without borders is infinite."""
+    """`SafetyLimits` as kernels take them; an unlimited workspace has infinite corners."""
 
     max_speed: float
     max_acceleration: float
@@ -215,7 +217,7 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class Request:
-    """What a controller asks for: velocity (2,3) of left and right, m/s, made at `stamp`, s."""
+    """Request of a controller: velocity (2,3) of left and right, m/s, made at `stamp`, s."""
 
     velocity: FloatArray
     stamp: float
@@ -223,7 +225,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Of left and right: position (2,3), m, and force (2,3) of the garment on the gripper, N.
+    """Position (2,3), m, of left and right gripper, and force (2,3) of the garment on them, N.
 
     A gripper with any entry that is not finite counts as unmeasured.
     """
@@ -234,10 +236,10 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Skin:
-    """The person next to the commands of left and right gripper.
+    """The person's skin next to the commands of left and right gripper.
 
     Attributes:
-        distance: (2,) m, negative inside.
+        distance: (2,) distance to the skin, m, negative inside.
         away: (2,3) unit vectors from the nearest point of the skin.
     """
 
@@ -247,15 +249,15 @@ class Skin:
 
 @dataclass(frozen=True)
 class GovernorState:
-    """What the governor remembers; always finite but for a stamp of -inf.
+    """State of the governor; always finite except for a stamp of -inf.
 
     Attributes:
         position: (2,3) command p_WG, m.
         velocity: (2,3) of the command, m/s.
-        force: (2,3) low-passed, N.
-        over: (2,) time for which the force was over the hard limit, less that under it, s.
+        force: (2,3) low-pass filtered, N.
+        over: (2,) time with the force over the hard limit, less the time under it, at least 0, s.
         stopped: whether the stop is latched.
-        stamp: of the newest request obeyed, s.
+        stamp: time stamp of the newest request obeyed, s.
     """
 
     position: FloatArray
@@ -298,17 +300,17 @@ def step(
     permitted: bool = True,
     skin: Skin | None = None,
 ) -> tuple[GovernorState, tuple[Verdict, Verdict]]:
-    """Returns the state after `dt`, whose position is the command, and what was cut.
+    """Returns the state after `dt`, whose position is the command, and the reasons for changes.
 
     Args:
-        state: of the step before.
-        request: any numbers, NaN and infinite ones too.
-        measured: any numbers, NaN and infinite ones too.
-        limits: which are kept.
-        now: s; must not go back.
-        dt: since the step before, s.
+        state: state after the preceding step.
+        request: any values, including NaN and infinity.
+        measured: any values, including NaN and infinity.
+        limits: limits to keep.
+        now: current time, s; must not decrease.
+        dt: time since the preceding step, s.
         permitted: whether the station lets grippers move; they yield to force in any case.
-        skin: where the person is seen; finite. None: not seen.
+        skin: the person as observed; finite. None: not observed.
     """
     distance = np.full(2, np.nan) if skin is None else skin.distance
     away = np.zeros((2, 3)) if skin is None else skin.away
@@ -333,11 +335,11 @@ def step(
 
 
 def _plain(values: FloatArray) -> FloatArray:
-    """Returns a copy with the one layout in memory for which kernels are compiled."""
+    """Returns a copy in the memory layout for which kernels are compiled."""
     return np.array(values, dtype=np.float64, order="C")
 
 
-# Compiled code knows flags as numbers.
+# Compiled code takes flags as integers.
 _SPEED, _ACCELERATION, _FORCE, _LEAD, _WORKSPACE, _DISTANCE = (
     int(v)
     for v in (
@@ -379,9 +381,9 @@ def _govern(  # type: ignore[no-untyped-def]
     after,
     verdicts,
 ):
-    """Writes the packed state `after` (22,) and verdicts (2,); the rest as of `step`.
+    """Writes the packed state `after` (22,) and verdicts (2,); other arguments as of `step`.
 
-    A skin_distance (2,) that is NaN tells nothing.
+    A NaN in skin_distance (2,) means that the person is not observed.
     """
     position, last = state[:6].reshape(2, 3), state[6:12].reshape(2, 3)
     force = state[12:18].reshape(2, 3).copy()
@@ -395,7 +397,7 @@ def _govern(  # type: ignore[no-untyped-def]
         size[i] = length(force[i])
         relaxed = relaxed and size[i] < limits.soft_force
         if seen[i]:
-            # counted down as it is counted up: a force that chatters about the limit counts, too
+            # counts down as fast as up, so that a force chattering about the limit counts, too
             over[i] = max(0.0, over[i] + (dt if size[i] > limits.hard_force else -dt))
         stopped = stopped or over[i] >= limits.stop_time
     both_seen = seen[0] and seen[1]
@@ -413,7 +415,7 @@ def _govern(  # type: ignore[no-untyped-def]
         if fault == 0 and not must_stop:
             wanted[:] = asked[i]
         reach = _time_to_rest(last[i], limits, dt)
-        # two balls stand before what follows (`_governed`)
+        # the first two rows are balls, written by `_governed`
         spaces, count = sets[2:], 0
         pulled = seen[i] and size[i] > limits.soft_force
         relaxing = stopped and size[i] < limits.hard_force
@@ -460,7 +462,7 @@ def _request_fault(obeyed, velocity, stamp, limits, now):  # type: ignore[no-unt
     fault = 0
     largest = _ABSURD * limits.max_speed
     for v in velocity.flat:
-        # compared entry by entry: squares of large numbers overflow; NaN is no number
+        # compared entry by entry: squares of large numbers overflow; NaN compares false
         if not abs(v) <= largest:
             fault |= _INVALID
     age = now - stamp
@@ -472,7 +474,7 @@ def _request_fault(obeyed, velocity, stamp, limits, now):  # type: ignore[no-unt
 
 @nb.njit(cache=True, nogil=True)
 def _low_pass(force, measured, limits, dt):  # type: ignore[no-untyped-def]
-    """Updates the force (3,) that is answered to, N: as measured where it is over the limit."""
+    """Updates the filtered force (3,), N; at the hard limit or above, it is the measured one."""
     share = min(1.0, dt / limits.filter_time) if limits.filter_time > 0.0 else 1.0
     bounded = np.minimum(np.maximum(measured, -_LARGEST), _LARGEST)
     if length(bounded) >= limits.hard_force:
@@ -483,7 +485,7 @@ def _low_pass(force, measured, limits, dt):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _limit_force(force, size, wanted, limits, stopped, space):  # type: ignore[no-untyped-def]
-    """Writes the half-space (5,) of a force (3,) over the soft limit."""
+    """Writes the half-space (5,) of velocities that a force (3,) over the soft limit permits."""
     pull = -force / size
     giving_way = min(limits.yield_speed, limits.yield_rate * max(0.0, size - limits.hard_force))
     space[0], space[1:4] = HALF_SPACE, pull
@@ -496,9 +498,9 @@ def _limit_force(force, size, wanted, limits, stopped, space):  # type: ignore[n
 
 @nb.njit(cache=True, nogil=True)
 def _limit_distance(position, other, reach, limits, dt, spaces, count):  # type: ignore[no-untyped-def]
-    """Writes the limits of one gripper against the other: each has half of what is left.
+    """Writes the distance limits of one gripper to the other; each may use half of the margin.
 
-    Returns how many spaces there are then.
+    Returns the new number of spaces.
     """
     away = position - other
     apart = length(away)
@@ -508,7 +510,7 @@ def _limit_distance(position, other, reach, limits, dt, spaces, count):  # type:
         spaces[count, 4] = 0.5 * closing
         count += 1
     if np.isfinite(limits.largest_distance):
-        # both within half of it from their middle
+        # both stay within half of it from their midpoint
         _keep_within(0.5 * limits.largest_distance, 0.5 * away, reach, limits, spaces[count])
         count += 1
     return count
@@ -516,7 +518,7 @@ def _limit_distance(position, other, reach, limits, dt, spaces, count):  # type:
 
 @nb.njit(cache=True, nogil=True)
 def _limit_place(position, limits, dt, spaces, count):  # type: ignore[no-untyped-def]
-    """Writes the half-spaces of the workspace; returns how many spaces there are then."""
+    """Writes the half-spaces of the workspace; returns the new number of spaces."""
     for axis in range(3):
         for sign in (1.0, -1.0):
             border = limits.workspace[1 if sign > 0.0 else 0, axis]
@@ -531,9 +533,9 @@ def _limit_place(position, limits, dt, spaces, count):  # type: ignore[no-untype
 
 @nb.njit(cache=True, nogil=True)
 def _keep_within(radius, offset, reach, limits, space):  # type: ignore[no-untyped-def]
-    """Writes the limit by which an offset (3,), m, stays in a ball until it has come to rest.
+    """Writes the limit that keeps an offset (3,), m, in a ball until it has come to rest.
 
-    Outside, back into it, slowly.
+    An offset outside the ball returns into it slowly.
     """
     distance = length(offset)
     if distance <= radius:
@@ -545,7 +547,7 @@ def _keep_within(radius, offset, reach, limits, space):  # type: ignore[no-untyp
 
 @nb.njit(cache=True, nogil=True)
 def _time_to_rest(velocity, limits, dt):  # type: ignore[no-untyped-def]
-    """Returns τ, s: a command that brakes after this step moves on by τ v at most."""
+    """Returns τ, s: a command that brakes after this step moves by at most τ v until rest."""
     slowed = limits.max_acceleration * dt
     fastest = min(limits.max_speed, length(velocity) + slowed)
     return dt + fastest / (2.0 * limits.max_acceleration)
@@ -553,7 +555,7 @@ def _time_to_rest(velocity, limits, dt):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _stoppable(room, limits, dt):  # type: ignore[no-untyped-def]
-    """Returns the speed from which one stops within `room`, m/s; negative to go back into it."""
+    """Returns the speed that can stop within `room`, m, in m/s; negative to return into it."""
     if room < 0.0:
         return _returning(room, limits.relax_speed)
     slowed = limits.max_acceleration * dt
@@ -567,10 +569,11 @@ def _returning(room, speed):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _governed(wanted, last, sets, kinds, limits, dt, must_stop, out):  # type: ignore[no-untyped-def]
-    """Writes the velocity (3,) nearest to `wanted` within all limits to `out`; returns the cuts.
+    """Writes the velocity (3,) nearest to `wanted` within all limits to `out`; returns flags.
 
-    last (3,) is of the step before; sets (2+S,5) are rows of `projection.find_nearest`, of which
-    the first two are written here; kinds (S,) flags of the others.
+    `last` (3,) is the velocity of the preceding step. `sets` (2+S,5) are rows for
+    `projection.find_nearest`; the first two are written here, and `kinds` (S,) are the flags of the
+    others.
     """
     cut = 0
     slowed, braked = limits.max_acceleration * dt, limits.max_braking * dt
@@ -597,17 +600,17 @@ def _governed(wanted, last, sets, kinds, limits, dt, must_stop, out):  # type: i
 
 @nb.njit(cache=True, nogil=True)
 def _go_as_far_as_it_goes(wanted, last, sets, out):  # type: ignore[no-untyped-def]
-    """Writes the best velocity (3,) where not all limits can be kept; the first counts most.
+    """Writes the best velocity (3,) if not all limits can be kept; earlier ones take priority.
 
-    Each is moved just so far that it meets the sets before it; a ball is replaced by the half-space
-    that faces `last`. `last` is in the first two.
+    Each limit is relaxed just enough to intersect the sets before it. A ball is replaced by the
+    half-space that faces `last`. `last` is in the first two sets.
     """
     kept, witness, lowest = sets.copy(), last.copy(), np.empty(3)
     for k in range(2, len(sets)):
         if sets[k, 0] == BALL:
             _face(sets[k], last, kept[k])
         normal = kept[k, 1:4]
-        # the nearest point to one far down the normal is the lowest along it
+        # the projection of a point far down the normal is the lowest point along it
         far = witness - normal * (100.0 * sets[1, 4])
         if not find_nearest(far, kept[:k], lowest):
             lowest[:] = witness
@@ -620,7 +623,7 @@ def _go_as_far_as_it_goes(wanted, last, sets, out):  # type: ignore[no-untyped-d
 
 @nb.njit(cache=True, nogil=True)
 def _face(ball, point, half_space):  # type: ignore[no-untyped-def]
-    """Writes the half-space that holds the ball and touches it on the side of `point` (3,)."""
+    """Writes the half-space that contains the ball and touches it on the side of `point` (3,)."""
     toward = point - ball[1:4]
     size = length(toward)
     half_space[0] = HALF_SPACE
@@ -633,9 +636,10 @@ def _face(ball, point, half_space):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def _draw_within(velocity, last, speed, change):  # type: ignore[no-untyped-def]
-    """Keeps both hard limits of the velocity (3,) in spite of rounding; `last` keeps them.
+    """Enforces both hard limits of the velocity (3,) despite rounding; `last` satisfies them.
 
-    Drawing back toward the origin does not lead away from `last`: both are in the ball of speed.
+    Scaling toward the origin does not increase the distance from `last`, which is in the speed
+    ball.
     """
     moved = velocity - last
     size = length(moved)

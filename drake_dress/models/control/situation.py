@@ -1,4 +1,4 @@
-"""What the global controller is asked, and what it plans with."""
+"""Inputs of the global controller: targets, garment and predicted person."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from drake_dress.models.dressing.sleeve import Entry
 
 @dataclass(frozen=True)
 class SleeveTarget:
-    """Where one sleeve shall be at each of the N steps.
+    """Target of one sleeve at each of the N steps.
 
     Attributes:
         position: (N,3) m; direction: (N,3) unit vectors.
-        position_weight, direction_weight: factors on W and Q; 0 leaves the sleeve alone.
-        entering: the direction asked for is that from the armhole to the garment's entry, not the
-            armhole's own.
-        corridor: ahead of the hand that is to go in, if it is near.
-        passage: (N,3) unit vectors from elbow to hand of the arm that is to go in.
+        position_weight, direction_weight: factors on W and Q; 0 leaves the sleeve free.
+        entering: whether `direction` applies to the vector from the armhole to the garment's entry,
+            not to the armhole's own direction.
+        corridor: ahead of the hand that is about to enter; None if it is not near.
+        passage: (N,3) unit vectors from elbow to hand of the arm that is about to enter.
     """
 
     position: FloatArray
@@ -38,12 +38,12 @@ class Situation:
     """The garment now, its targets, and the predicted person.
 
     Attributes:
-        x: (n,3) garment now, m.
-        v: (n,3) its velocity, m/s.
+        x: (n,3) nodes of the garment now, m.
+        v: (n,3) their velocities, m/s.
         targets: of left and right sleeve.
         obstacles: the predicted person at the start of each of the N steps.
-        leftward: (N,3) horizontal unit vectors to the person's left; if None, the grippers' level
-            costs nothing.
+        leftward: (N,3) horizontal unit vectors to the person's left. None disables the cost of the
+            grippers' level.
     """
 
     x: FloatArray
@@ -55,14 +55,14 @@ class Situation:
 
 @dataclass(frozen=True)
 class HeldGarment:
-    """How the controller's garment is held, and where its openings are.
+    """Grasp and openings of the controller's garment.
 
     Attributes:
         held_count: number of nodes held by left and by right gripper.
         armholes: loop nodes of left and right armhole.
         signs: orientation signs of the loops (see `loop_orientation`).
-        span: distance of the grippers at rest, m.
-        entry: where arms come into the garment.
+        span: distance between the grippers at rest, m.
+        entry: where arms enter the garment.
     """
 
     held_count: tuple[int, int]

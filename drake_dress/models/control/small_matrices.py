@@ -1,17 +1,17 @@
-"""Small dense matrices in compiled loops: what a step of constrained DDP asks of them."""
+"""Compiled operations on small dense matrices for a step of constrained DDP."""
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
 
-# A row whose part in the inputs is less than this of itself once the others' are taken off is none.
+# A row is dependent if less than this share of its input part is left after orthogonalization.
 _DEPENDENT = 1e-7
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def add_curvature(matrix, normal, factor, out):  # type: ignore[no-untyped-def]
-    """Adds factor · Cᵀ(I − nnᵀ)C to `out` (n,n), for a C (3,n) with n (3,)."""
+    """Adds factor · Cᵀ(I − nnᵀ)C to `out` (n,n), with `matrix` C (3,n) and `normal` n (3,)."""
     n = matrix.shape[1]
     row = np.empty(n)
     for b in range(n):
@@ -28,11 +28,12 @@ def add_curvature(matrix, normal, factor, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def split_rows(rows, count, m, basis, residual, owner, coefficient):  # type: ignore[no-untyped-def]
-    """Splits rows [G_v | G_x | s] into an orthonormal basis in v and what v cannot change.
+    """Splits rows [G_v | G_x | s] into an orthonormal basis in v and a residual v cannot change.
 
-    rows = coefficient · basis + residual, with the basis [Y | Z | t]; where a row has given a
-    basis vector `owner` is that vector's index and its residual is zero, elsewhere it is −1 and the
-    v part of its residual is zero. Pivots are the largest left. Returns the size of the basis.
+    rows = coefficient · basis + residual, with the basis [Y | Z | t]. For a row that supplied a
+    basis vector, `owner` is the index of that vector and the residual is zero. For any other row
+    `owner` is −1 and the v part of the residual is zero. The pivot is the row with the largest
+    remaining share. Returns the size of the basis.
     """
     width = rows.shape[1]
     rank = 0
@@ -81,7 +82,7 @@ def split_rows(rows, count, m, basis, residual, owner, coefficient):  # type: ig
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def complete_basis(basis, rank, m, free):  # type: ignore[no-untyped-def]
-    """Fills `free` (m−rank,m) with unit vectors across the basis and each other."""
+    """Fills `free` (m−rank,m) with unit vectors orthogonal to the basis and to each other."""
     found = 0
     tried = np.zeros(m, dtype=np.bool_)
     work = np.empty(m)

@@ -1,4 +1,4 @@
-"""What the solvers of linear-quadratic problems with norm bounds return."""
+"""Result of the solvers of linear-quadratic problems with norm bounds."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from drake_dress.models.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Solution:
-    """What a solver returns.
+    """Result of a solver.
 
     Attributes:
         v: (N,m) inputs; x: (N+1,n) states.
-        state_multiplier: (N+1,K), input_multiplier: (N,L) of the norm bounds, zero or more.
-        cost: reached.
-        violation: of the worst bound.
-        sweeps: backward and forward passes with an active set.
-        interior_steps: with barriers instead.
-        converged: the conditions of optimality hold; never where a solver gave up.
+        state_multiplier: (N+1,K), input_multiplier: (N,L) of the norm bounds, not negative.
+        cost: final cost.
+        violation: largest bound violation.
+        sweeps: number of backward and forward passes with an active set.
+        interior_steps: number of interior point iterations.
+        converged: whether the optimality conditions hold; False if a solver gave up.
     """
 
     v: FloatArray

@@ -1,4 +1,4 @@
-"""How sleeves are asked to go about hands, and all settings of where they are asked to go."""
+"""Approach strategies, and all settings of the sleeve targets."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.human.heading import Heading
 
-# How many ways there must be: the first hand's best one depends on the forearm.
+# Least number of approaches: the best one for the first hand depends on the forearm.
 LEAST_APPROACHES = {"approaches": 3, "tethered_approaches": 1}
 
 
 @dataclass(frozen=True)
 class Approach:
-    """A way to go about a hand; shares are between inward across the body (0) and forearm (1).
+    """A way to approach a hand; shares run from inward across the body (0) to the forearm (1).
 
     Attributes:
         share: direction in which the armhole is drawn over the hand: 0 is inward across the body, 1
@@ -24,8 +24,8 @@ class Approach:
         orientation: direction from the armhole to the garment's entry, on the same scale.
         emphasis: factor on the weight Q of the direction.
         tilt: share of the forearm's slope that the direction to the entry has. The garment turns
-            about the vertical axis as far as it is asked to; tilted up toward a steep forearm it
-            hangs on edge.
+            about the vertical axis as far as requested; tilted up toward a steep forearm, it hangs
+            on edge.
     """
 
     share: float = 0.25
@@ -44,7 +44,7 @@ class Approach:
         return _between(to.inward(side), forearm, self.share)
 
     def entry(self, forearm: FloatArray, to: Heading, side: int) -> FloatArray:
-        """Returns the unit vector (…,3) from an armhole to the garment's entry, as it is asked for.
+        """Returns the target unit vector (…,3) from an armhole to the garment's entry.
 
         Args:
             forearm: (…,3) unit, from hand to elbow.
@@ -57,11 +57,10 @@ class Approach:
 
 @dataclass(frozen=True)
 class TaskParameters:
-    """Where sleeves are asked to go.
+    """Settings of the sleeve targets.
 
     Attributes:
-        progress_rate: rate of the dressing coordinate s that is asked for, 1/s (k per step of the
-            prediction).
+        progress_rate: target rate of the dressing coordinate s, 1/s (k per step of the prediction).
         approach_distance: upper bound of l_h, m.
         tethered_approach_distance: the same while the other sleeve is on, m.
         approach_slope: l_h per lateral distance from the line of approach; 1 in the paper.
@@ -76,8 +75,8 @@ class TaskParameters:
         led_approach: way to approach a hand that was pulled inward.
         flat: horizontal part of the forearm's direction above which the forearm is flat.
         steep: horizontal part of the forearm's direction below which the forearm is steep.
-        behind_distance: greatest distance behind the hand at which a sleeve waits until it is in
-            line, m.
+        behind_distance: greatest distance behind the hand at which a sleeve waits until it is
+            aligned, m.
         retreat_distance: how much further back a sleeve goes after it missed the hand, m.
         passing_back: the same of a tethered sleeve, m. The front panel needs this distance to pass
             behind the hand; further back, the sleeve pulls the first one off its arm.
@@ -85,25 +84,26 @@ class TaskParameters:
         swing_reach: distance from the first armhole to which the second one swings back, as a share
             of their distance at rest.
         swing_outward: outward part of that motion per backward part.
-        widening: growth of the bound of l_h with each attempt that missed the hand.
+        widening: relative growth of the bound of l_h with each of the first three misses.
         passing_outward: lateral distance outward of an unseen hand at which a tethered armhole
             ends, m. The panel in front of it is as wide.
         passing_behind: distance behind an unseen hand at which a tethered armhole ends, m.
         passing_from: distance outward of the hand at which a tethered armhole begins to come
             forward, m. Any closer and the panel would get in front of the hand.
-        passing_beside: how far forward that armhole then goes, m.
+        passing_beside: distance outward of the hand at which that armhole is all the way forward,
+            beside the hand, m.
         outlook_distance: distance from the hand within which a sleeve that missed it moves to where
             the hand sees the opening, m.
-        longest_reach: greatest distance of the armholes that is assumed, as a share of their
-            distance at rest.
-        clear_sight: share of the opening that the hand must see for a tethered sleeve to be drawn
-            straight at the hand.
+        longest_reach: assumed greatest distance between the armholes, as a share of their distance
+            at rest.
+        clear_sight: share of the opening that the hand must see for a tethered sleeve, or one that
+            missed the hand, to be drawn straight at the hand.
         funnel_wide: lateral distance of the hand from the normal of a clearly seen opening above
             which the opening is aligned first, m.
         funnel_narrow: lateral distance below which the aligned opening is drawn on, m.
         funnel_distance: distance before the hand at which the opening is aligned, m.
         aside_free: lateral distance that is ignored, m.
-        overshoot: how far past the hand an aligned armhole is asked to go, m.
+        overshoot: distance past the hand at which the target of an aligned armhole lies, m.
         inside_radius: distance from the armhole's centre within which a hand beyond the armhole's
             plane counts as inside, m.
         touch_distance: distance of a hand from the surface that spans the armhole below which the
@@ -114,18 +114,18 @@ class TaskParameters:
         near_position: factor on W below `near_distance`.
         near_direction: factor on Q below `near_distance`.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
-        dressing_position: factor on W once both sleeves are drawn up. Without it the last
+        dressing_position: factor on W once both sleeves are on their arms. Without it the last
             centimetres cost less than the tilt of the armhole on the shoulder. Also used for a
             waiting sleeve that may slip off.
         waiting_reach: share of the armholes' rest distance that a waiting sleeve leaves to the
             other one.
         largest_aside: greatest lateral motion of a waiting sleeve, m. Hands that hang 0.58 m apart
             come 0.15 m nearer at forces of 12 N.
-        final_progress: progress s that is asked for at the end. At 2 the armhole would be drawn
-            into the armpit, and both sleeves would pull against each other. A sleeve that waits for
-            the other one there stays where it just counts as done.
+        final_progress: final target of the progress s. At 2 the armhole would be drawn into the
+            armpit, and both sleeves would pull against each other. A sleeve that waits for the
+            other one there stays where it just counts as done.
         held_progress: progress s up to which a slipped sleeve is drawn again while both are held.
-            What is asked for is reached to within 0.03, and forces follow from where the sleeve is.
+            Targets are reached to within 0.03, and forces depend on the place of the sleeve.
         settling_speed: greatest speed of the grippers once both sleeves are at the shoulders, m/s.
             A plan is based on observations up to 0.9 s old; at full speed the grippers oscillated
             by 4 cm once a second.
@@ -133,7 +133,7 @@ class TaskParameters:
         stages: thresholds between the stages.
 
     Raises:
-        ValueError: there are fewer ways to go about a hand than `LEAST_APPROACHES`.
+        ValueError: there are fewer approaches than `LEAST_APPROACHES`.
     """
 
     progress_rate: float = 0.4
@@ -200,7 +200,7 @@ class TaskParameters:
 
 
 def unit(v: FloatArray) -> FloatArray:
-    """Returns vectors (…,3) with length one."""
+    """Returns vectors (…,3) scaled to length one."""
     shortened: FloatArray = v / np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
     return shortened
 

@@ -1,4 +1,4 @@
-"""What each sleeve is asked to do, and where it shall be for it: facts, stages, targets."""
+"""Tasks of the sleeves, and the targets that follow from them: facts, stages, targets."""
 
 from __future__ import annotations
 
@@ -41,19 +41,20 @@ from drake_dress.models.dressing.stages import (
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.heading import Heading, heading, headings
 
-# How much further up its arm the next place of a sleeve that is on it is, as s.
+# Advance of s to the next waypoint of a sleeve on its arm.
 _NEXT = 0.04
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """What both sleeves are asked to do, left, then right, and what that was decided from.
+    """Tasks of both sleeves, left, then right, and the facts from which they follow.
 
     Attributes:
-        tasks: of each. facts: of each. retreat: whether it keeps away from the hand. ease: whether
-            it gives way. attempts: how often it has missed the hand. outlook: place from the hand
-            at which the hand sees the armhole of a tethered sleeve, (3,) m. withdraw: whether both
-            are taken back behind the person. swing: whether it is, with the other one on its arm.
+        tasks: of each. facts: of each. retreat: whether it stays away from the hand. ease: whether
+            it moves back on its arm. attempts: how often it has missed the hand. outlook: place
+            relative to the hand at which the hand sees the armhole, (3,) m; None if not needed.
+            withdraw: whether both withdraw behind the person. swing: whether it swings back behind
+            the person while the other one is on its arm.
     """
 
     tasks: tuple[Task, Task]
@@ -94,7 +95,7 @@ class _Arm:
 
     @cached_property
     def axes(self) -> list[ArmAxis]:
-        """The arm's axis at each time; the same object while the arm is where it was."""
+        """The arm's axis at each time; the same object while the arm does not move."""
         axes: list[ArmAxis] = []
         for k, (hand, elbow, shoulder) in enumerate(
             zip(self.hand, self._elbow, self.shoulder, strict=True)
@@ -105,7 +106,7 @@ class _Arm:
 
 
 class TaskPlanner:
-    """Assigns tasks, and tells where they lead.
+    """Assigns tasks to the sleeves and computes their targets.
 
     Args:
         mesh: the controller's garment.
@@ -133,13 +134,13 @@ class TaskPlanner:
     def assign(
         self, stages: StageState, x: FloatArray, joints: FloatArray, time: float
     ) -> tuple[StageState, Assignment]:
-        """Returns the stages now, and what follows from them.
+        """Returns the new stages, and the assignment that follows from them.
 
         Args:
-            stages: so far.
-            x: (n,3) the garment now, m.
+            stages: stages so far.
+            x: (n,3) nodes of the garment now, m.
             joints: (6,3) shoulder, elbow, hand of left, then right arm now, m.
-            time: now, s.
+            time: current time, s.
         """
         p = self.parameters
         axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
@@ -175,7 +176,7 @@ class TaskPlanner:
         """Returns whether an arm passes through its armhole.
 
         Args:
-            x: (n,3) the garment, m.
+            x: (n,3) nodes of the garment, m.
             joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
             side: of the arm.
         """
@@ -185,10 +186,10 @@ class TaskPlanner:
         return abs(arm_linking_number(loop, shoulder, elbow, hand, interior)) == 1
 
     def are_on(self, x: FloatArray, joints: FloatArray) -> bool:
-        """Returns whether both sleeves are on their arms, as far up as one that is done may slip.
+        """Returns whether both sleeves are on their arms, with a progress of `kept_progress`.
 
         Args:
-            x: (n,3) the garment now, m.
+            x: (n,3) nodes of the garment now, m.
             joints: (6,3) shoulder, elbow, hand of left, then right arm now, m.
         """
         least = self.parameters.stages.kept_progress
@@ -201,9 +202,9 @@ class TaskPlanner:
     def renewed(
         self, given: Assignment, sleeves: Sequence[SleeveState], joints: FloatArray
     ) -> Assignment:
-        """Returns an assignment with the progress that sleeves have made on joints (6,3), m, now.
+        """Returns an assignment with the current progress of the sleeves on joints (6,3), m.
 
-        Who is on which arm, and who sees whom, is as it was.
+        All other facts, such as linking and sight, stay as given.
         """
         s = [
             float(axis.coordinates(sleeve.p_c).s) if fact.linked else 0.0
@@ -219,13 +220,13 @@ class TaskPlanner:
         joints: FloatArray,
         time_step: float,
     ) -> tuple[SleeveTarget, SleeveTarget]:
-        """Returns where both sleeves shall be at each of N steps.
+        """Returns the targets of both sleeves at each of N steps.
 
         Args:
-            assignment: what they are to do.
-            sleeves: where they are now.
+            assignment: tasks of the sleeves.
+            sleeves: their current states.
             joints: (N+1,6,3) predicted, m; row 0 is now.
-            time_step: between rows, s.
+            time_step: time between rows, s.
         """
         arms = (_Arm(joints, 0), _Arm(joints, 1))
         to = headings(joints)
@@ -244,9 +245,10 @@ class TaskPlanner:
         linked: Sequence[bool],
         missed: int,
     ) -> FloatArray | None:
-        """Returns where, from the hand, a sleeve that missed it is seen by it, (3,) m, if near.
+        """Returns the place, relative to the hand, at which the hand sees the armhole, (3,) m.
 
-        None for a tethered one, which goes around.
+        None for a sleeve that is far from the hand or has not missed it. None also while a sleeve
+        is on an arm, because a tethered sleeve goes around the hand.
         """
         near = np.linalg.norm(hand - sleeve.p_c) < self.parameters.outlook_distance
         if linked[0] or linked[1] or not near or missed == 0:
@@ -259,7 +261,7 @@ class TaskPlanner:
     def _waypoint(
         self, axis: ArmAxis, to: Heading, fact: SleeveFacts, side: int, way: Approach
     ) -> FloatArray:
-        """Returns where a sleeve has to be able to go next: outside the hand, or up its arm."""
+        """Returns the next place a sleeve must reach: outside the hand, or further up its arm."""
         p = self.parameters
         if fact.linked:
             return axis.G(min(2.0, fact.s + _NEXT))
@@ -322,7 +324,7 @@ class TaskPlanner:
         sleeves: Sequence[SleeveState],
         time_step: float,
     ) -> SleeveTarget:
-        """Returns the target of a sleeve that is to go over its hand, or is taken back from it."""
+        """Returns the target of a sleeve that approaches its hand or moves back from it."""
         p, fact = self.parameters, given.facts[side]
         preparation = self._preparation(given, side, arm, to, given.retreat[side])
         away = given.retreat[side] or given.swing[side] or given.withdraw
@@ -378,7 +380,7 @@ class TaskPlanner:
             other, soon = self._preparation(given, k, arms[k], to), Heading(to.rotation[1:])
             places = other.places(arms[k].hand[1:], arms[k].forearm[1:], soon, sleeves[k])
             if given.facts[k].hand_distance < p.near_distance:
-                # up or down, it would draw the other armhole away from its hand
+                # moving up or down, it would draw the other armhole away from its hand
                 stays = max(fact.s, p.stages.waiting_progress)
                 reached = self._reaching(mine, places, p.longest_reach)
                 progress = [min(s, stays) for s in reached]
@@ -390,7 +392,7 @@ class TaskPlanner:
         if task == Task.WAIT:
             position = position + self._aside(position, places)
         if task == Task.HOLD:
-            # as far beside the arm as it is
+            # keeps its current offset from the arm
             position = position + sleeves[side].p_c - mine[0].G(fact.s)
         both = given.facts[0].linked and given.facts[1].linked
         slips = task == Task.WAIT and fact.s < p.stages.waiting_progress
@@ -398,9 +400,10 @@ class TaskPlanner:
         return SleeveTarget(position, direction, weight, p.dressing_direction)
 
     def _drawn_progress(self, given: Assignment, side: int, times: Sequence[float]) -> list[float]:
-        """Returns the s that a sleeve on its arm is drawn to at `times` from now, s.
+        """Returns the target s of a sleeve on its arm at `times` from now, s.
 
-        One that is ahead of the other, or just counts as done, leaves the garment to it.
+        It leads the other sleeve by at most `largest_lead`, and goes no further than
+        `done_progress` until the other one reaches `kept_progress`. An easing sleeve moves back.
         """
         p, fact, other = self.parameters, given.facts[side], given.facts[1 - side]
         rate = -p.progress_rate if given.ease[side] else p.progress_rate
@@ -428,9 +431,9 @@ class TaskPlanner:
         )
 
     def _swung(self, to: Heading, side: int, other: SleeveState) -> FloatArray:
-        """Returns where a sleeve is swung back to, (N,3) m, with the other one on its arm.
+        """Returns the places (N,3), m, to which a sleeve swings while the other is on its arm.
 
-        Behind the first one, where the coat hangs free of the hand that was missed.
+        They are behind the first sleeve, where the coat hangs free of the missed hand.
         """
         p = self.parameters
         way = -to.front - p.swing_outward * to.inward(side)
@@ -438,9 +441,10 @@ class TaskPlanner:
         return place
 
     def _aside(self, waiting: FloatArray, other: FloatArray) -> FloatArray:
-        """Returns how far a waiting sleeve is drawn aside, (N,3) m: the arm in it comes along.
+        """Returns the lateral motion (N,3), m, of a waiting sleeve; the arm in it comes along.
 
-        By what the garment, drawn out, lacks from `waiting` (N,3) to where the other goes (N,3), m.
+        It is what the stretched garment lacks from `waiting` (N,3), m, to the target of the other
+        sleeve, `other` (N,3), m.
         """
         p, way = self.parameters, other - waiting
         length = np.linalg.norm(way, axis=1, keepdims=True)
@@ -451,13 +455,13 @@ class TaskPlanner:
     def _reaching(self, axes: Sequence[ArmAxis], others: FloatArray, share: float) -> list[float]:
         """Returns the largest s at N times from which the garment reaches `others` (N,3), m.
 
-        Higher up than that the garment holds the other sleeve back; lower down than
-        `waiting_progress` it could slip off (J_w).
+        Higher up the arm, the garment would hold the other sleeve back. Below `waiting_progress`
+        the sleeve could slip off (J_w).
 
         Args:
-            axes: (N + 1) of the arm, the first one now.
-            others: (N,3) where the other sleeve goes, m.
-            share: of the distance between both armholes at rest, that it reaches.
+            axes: (N + 1) axes of the arm, the first one now.
+            others: (N,3) targets of the other sleeve, m.
+            share: reach of the garment, as a share of the distance between both armholes at rest.
         """
         steps = np.linspace(2.0, self.parameters.stages.waiting_progress, 41)
         progress: list[float] = []

@@ -1,4 +1,4 @@
-"""Dressing coordinates: how far along, how far beside and on which side of an arm a point is."""
+"""Dressing coordinates of a point: progress along an arm, distance to it, and angle about it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from drake_dress.models.arrays import FloatArray
 
 # Share of the shorter limb that the arc at the elbow takes when no radius is given.
 _FILLET_SHARE = 0.3
-# Most of the shorter limb that an arc of a given radius may take: something straight stays.
+# Greatest share of the shorter limb that an arc of a given radius may take; a straight part stays.
 _MOST_SHARE = 0.9
-# Below this bend, rad, the arm is straight: the arc is a line and its plane is not defined. Also
-# how far from fully folded an arm must be.
+# Bend, rad, below which the arm counts as straight: the arc is a line and its plane is undefined.
+# Also the least angle of an arm from fully folded.
 _STRAIGHT = 1e-6
 _SHORTEST_LIMB = 1e-6
 
 
 class DressingCoordinates(NamedTuple):
-    """Cylinder coordinates of a point about an arm.
+    """Cylindrical coordinates of a point about an arm.
 
     Attributes:
-        s: progress of the nearest point of the axis: 0 hand, 1 elbow, 2 shoulder; limited to both.
+        s: progress of the nearest point of the axis: 0 hand, 1 elbow, 2 shoulder; in [0, 2].
         l: distance to the axis, m.
         theta: angle about the axis' direction, rad, in (−π, π].
     """
@@ -34,17 +34,17 @@ class DressingCoordinates(NamedTuple):
 
 
 class ArmAxis:
-    """The curve hand – elbow – shoulder with an arc at the elbow, as a cylinder's axis.
+    """The curve hand – elbow – shoulder with an arc at the elbow, as the axis of the coordinates.
 
     s = 0 at the hand, 1 in the middle of the arc, 2 at the shoulder; on either side of the elbow s
     grows with arc length. `G(s)` and `D(s)` are the paper's symbols: position (Eq. Jdi), and
-    direction of the arm from hand to shoulder. The paper draws the arc tangent to both limbs so
-    that D does not jump at the elbow; its radius is not given there.
+    direction of the arm from hand to shoulder. As in the paper, the arc is tangent to both limbs,
+    so that D does not jump at the elbow; the paper does not give its radius.
 
     Args:
-        hand, elbow, shoulder: (3,), m, world or any frame; results are in the same.
-        fillet_radius: of the arc, m, reduced so that the arc takes at most 0.9 of the shorter
-            limb. None: the arc takes 0.3 of the shorter limb, whatever the bend.
+        hand, elbow, shoulder: (3,), m, world or any frame; results are in the same frame.
+        fillet_radius: radius of the arc, m, reduced so that the arc takes at most 0.9 of the
+            shorter limb. None: the arc takes 0.3 of the shorter limb, whatever the bend.
 
     Raises:
         ValueError: two joints coincide, the forearm lies folded back on the upper arm, a value is
@@ -112,7 +112,7 @@ class ArmAxis:
         return point
 
     def points(self, s: FloatArray) -> FloatArray:
-        """Returns the points (k,3) of the axis at `s` (k,), each as `G` gives it, m."""
+        """Returns the points (k,3) of the axis at `s` (k,), each as from `G`, m."""
         s = np.clip(s, 0.0, 2.0)[:, None]
         lower, upper = self._lower + self._half_arc, self._upper + self._half_arc
         before = np.where(s <= 1.0, s * lower, lower + (s - 1.0) * upper)
@@ -149,12 +149,12 @@ class ArmAxis:
     def coordinates(self, point: FloatArray) -> DressingCoordinates:
         """Returns (s, l, theta) of a point (3,): progress, distance to the axis, m, angle, rad.
 
-        theta turns about D(s) and is zero along (p_e − p_h) × (p_s − p_e). A straight arm has no
-        such direction; then zero is along a normal that is fixed by the arm's own direction, and
-        theta tells points apart but is not comparable between arms.
+        theta is measured about D(s), from (p_e − p_h) × (p_s − p_e). For a straight arm, where that
+        is zero, it is measured from a normal fixed by the arm's own direction. It then tells points
+        apart, but is not comparable between arms.
 
-        s says nothing of whether the arm is covered: the paper's s = 0 for a sleeve that is not on
-        is for the caller, who knows the linking number. See `beyond_hand` for how far off it is.
+        s does not show whether the arm is covered. The paper's s = 0 for a sleeve that is not on is
+        up to the caller, who knows the linking number. `beyond_hand` tells how far off it is.
         """
         s, foot = self._nearest(np.asarray(point, dtype=np.float64))
         offset = point - foot
@@ -193,7 +193,7 @@ class ArmAxis:
         else:
             to_point = point - (self._start + self._radius * self._inward)
             phi = float(np.arctan2(to_point @ self._u, -(to_point @ self._inward)))
-            # beyond an end of the arc that end is nearest, and the limb there is nearer still
+            # beyond the arc its end is nearest, and the limb there is nearer still
             phi = min(max(phi, 0.0), self._angle)
             distance = self._radius * phi
             arc_foot = self._start + self._radius * (
@@ -211,7 +211,7 @@ def _length(v: FloatArray) -> float:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Returns a × b of two (3,); numpy's own takes ten times as long for one pair."""
+    """Returns a × b of two (3,); `np.cross` takes ten times as long for one pair."""
     a0, a1, a2 = a.tolist()
     b0, b1, b2 = b.tolist()
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])

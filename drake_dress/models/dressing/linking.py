@@ -1,20 +1,20 @@
 """Whether an arm is inside a sleeve: the linking number of the armhole with the arm.
 
-Progress s = 2 proves nothing: an armhole whose centre has slid up beside the arm has it too. What
-tells a sleeve that is on from one that lies alongside is topology.
+Progress s = 2 proves nothing: an armhole whose centre has slid up beside the arm has it too. Only
+topology distinguishes a sleeve that is on from one that lies alongside.
 
-The arm's centre line runs from the hand over elbow and shoulder into the torso. It is open at the
-hand, and a linking number is defined for closed curves only, so a way back from the torso to the
-hand has to be chosen. It is chosen to go round the armhole, never through the disc that spans it
-(the fan of triangles from the loop's centre to its edges). The linking number with a closed curve
-is the number of its signed passages through any surface that spans the loop; the way back has
-none, so what is left are the passages of the arm itself. Any fixed way back, such as a ray from the
-hand outward, would give ±1 for an armhole that hangs beyond the hand where the ray meets it.
-Hence ±1 for an armhole round the forearm or the upper arm, 0 for one beside the arm or beyond the
-hand, however near its centre is to the arm's axis.
+The arm's centre line runs from the hand over elbow and shoulder into the torso. A linking number is
+defined for closed curves only, so the line has to be closed by a path from the torso back to the
+hand. That path is chosen to go around the armhole, never through the disc that spans it (the fan of
+triangles from the loop's centre to its edges). The linking number is the number of signed passages
+of the closed curve through any surface that spans the loop. The closing path has none, so only the
+passages of the arm count. A fixed closing path, such as a ray from the hand outward, would give ±1
+for an armhole that hangs beyond the hand where the ray meets it. The result is ±1 for an armhole
+around the forearm or the upper arm, and 0 for one beside the arm or beyond the hand, however near
+its centre is to the arm's axis.
 
-Limitation: a loop so crumpled that its own fan is pierced where the loop is not (a hand poked into
-a fold) counts a passage as long as the hand stays in the fold.
+Limitation: the arm can pierce the fan of a crumpled loop without passing through the loop (a hand
+poked into a fold). This counts as a passage as long as the hand stays in the fold.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 
-# How far the fan's apex may be moved off the loop's centre, as a share of the loop's size.
+# Shift of the fan's apex off the loop's centre, as a share of the loop's size.
 _APEX_SHIFT = 1e-6
 _SHIFTS = np.array([[0.0, 0.0, 0.0], [0.8, 0.5, 0.3], [-0.3, 0.8, -0.5], [0.5, -0.3, -0.8]])
 
@@ -32,8 +32,8 @@ _SHIFTS = np.array([[0.0, 0.0, 0.0], [0.8, 0.5, 0.3], [-0.3, 0.8, -0.5], [0.5, -
 def linking_number(loop: FloatArray, curve: FloatArray) -> float:
     """Returns the Gauss linking number of two closed polylines, an integer up to rounding.
 
-    Each pair of segments subtends a spherical quadrangle, whose area is taken exactly as that of
-    two triangles. The number changes sign with the direction of either curve.
+    Each pair of segments subtends a spherical quadrangle, whose area is computed exactly from two
+    triangles. The number changes sign with the direction of either curve.
 
     Args:
         loop: (k,3) vertices in order, the last joined to the first.
@@ -60,17 +60,18 @@ def arm_linking_number(
     hand: FloatArray,
     interior: FloatArray,
 ) -> int:
-    """Returns how often the arm passes through the loop, with sign; ±1 when it is inside.
+    """Returns the number of signed passages of the arm through the loop; ±1 when it is inside.
 
-    Positive where the arm, followed from hand to torso, passes along the loop's area vector (the
-    loop is seen counter-clockwise by whom the arm comes to). Equals `linking_number` of the loop
-    and any closed curve that continues the arm round the loop's fan (see the module's text).
+    A passage is positive if the arm, followed from hand to torso, goes along the loop's area vector
+    (an observer whom the arm approaches sees the loop counter-clockwise). The number equals the
+    `linking_number` of the loop and any closed curve that continues the arm around the loop's fan
+    (see the module's docstring).
 
     Args:
         loop: (k,3) nodes of the armhole (or cuff) in order, m, world or any frame.
         shoulder: (3,) joint of the arm, m, same frame.
         elbow: (3,) likewise.
-        hand: (3,) likewise; the arm's line ends there.
+        hand: (3,) likewise; the arm's centre line begins there.
         interior: (3,) a point in the torso where the arm's centre line ends, m, same frame.
 
     Raises:
@@ -95,11 +96,11 @@ def torso_interior(left_shoulder: FloatArray, right_shoulder: FloatArray) -> Flo
 def _passages(loop, line):  # type: ignore[no-untyped-def]
     """Returns signed crossings of the line (4,3) with the fan of the loop (k,3).
 
-    Seen along a segment the fan is plane triangles (apex, first, second), and the question is
-    which of them hold the origin. Each spoke's side of the origin is decided once and used by both
-    triangles that share it, so that a line through a spoke counts once. An end of a segment that
-    lies in a triangle's plane belongs to the segment that follows, decided by the same expression
-    there, so that a joint of the arm counts once.
+    Projected along a segment, the fan becomes plane triangles (apex, first, second); the line of
+    the segment crosses those that contain the origin. Each spoke's side of the origin is decided
+    once and used by both triangles that share it, so that a line through a spoke counts once. An
+    end of a segment in a triangle's plane belongs to the following segment, which decides by the
+    same expression, so that a joint of the arm counts once.
     """
     count = loop.shape[0]
     apex = _apex(loop, line)
@@ -117,7 +118,7 @@ def _passages(loop, line):  # type: ignore[no-untyped-def]
             if abs(along[a]) < abs(along[least]):
                 least = a
         a, b, c = least, (least + 1) % 3, (least + 2) % 3
-        # along × the axis that it is least along
+        # along × the coordinate axis of its smallest component
         size = np.sqrt(along[b] ** 2 + along[c] ** 2)
         across[a], across[b], across[c] = 0.0, along[c] / size, -along[b] / size
         up[a] = along[b] * across[c] - along[c] * across[b]
@@ -148,9 +149,9 @@ def _passages(loop, line):  # type: ignore[no-untyped-def]
 def _apex(loop, line):  # type: ignore[no-untyped-def]
     """Returns the apex (3,) of the fan: the loop's centre, but not on the arm's line.
 
-    A line through the apex meets all spokes at once and has no definite side of any. Which point
-    spans the disc is free, so of a few next to the centre the one farthest from the line serves;
-    all segments have to see the same one.
+    A line through the apex meets all spokes at once and has no definite side of any. The apex can
+    be chosen freely. It is the one of a few candidates at the centre that is farthest from the
+    line; all segments have to use the same apex.
     """
     center, candidate, best = np.zeros(3), np.empty(3), np.empty(3)
     for k in range(loop.shape[0]):

@@ -1,4 +1,4 @@
-"""How far both sleeves of a garment are on their arms."""
+"""Progress of both sleeves of a garment on their arms."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from drake_dress.models.sides import SIDES
 
 @dataclass(frozen=True)
 class SleeveProgress:
-    """Where the armholes are on their arms; the first axis is left, right.
+    """Progress of both armholes on their arms; the first axis is left, right.
 
     Attributes:
-        coordinates: (2,3) s, l (m), theta (rad) of the armholes' centres, whether on or not.
+        coordinates: (2,3) s, l (m), theta (rad) of the armholes' centres, even of sleeves not on.
         linking: (2,) linking number of armhole and arm: ±1 where the arm is inside.
         hand_distance: (2,) of the armhole's centre to the hand, m.
     """
@@ -29,12 +29,12 @@ class SleeveProgress:
 
     @property
     def s(self) -> FloatArray:
-        """(2,) progress; 0 where a sleeve does not cover its arm, wherever its centre is."""
+        """(2,) progress; 0 for a sleeve that does not cover its arm, wherever its centre is."""
         s: FloatArray = np.where(self.linking != 0, self.coordinates[:, 0], 0.0)
         return s
 
     def are_on(self, least_s: float) -> bool:
-        """Returns whether both arms are inside and both sleeves have come to `least_s`."""
+        """Returns whether both arms are inside and both sleeves have reached `least_s`."""
         return bool(np.all(np.abs(self.linking) == 1) and np.all(self.s >= least_s))
 
 
@@ -45,7 +45,7 @@ class SleeveGauge:
         garment: its openings, and its shape at rest.
 
     Raises:
-        UserError: an armhole lies edge-on to the way from its cuff.
+        UserError: an armhole lies edge-on to the vector from its cuff.
     """
 
     def __init__(self, garment: AtRest) -> None:

@@ -1,8 +1,8 @@
-"""Whether a hand has a free way to an opening of the garment.
+"""Lines of sight from a hand to an opening of the garment.
 
-An armhole whose centre is near the hand may still be closed to it: the front panel of a coat hangs
-between them like a curtain. Straight lines from the hand into the opening tell: those that meet a
-triangle of the garment on their way are barred.
+An armhole whose centre is near the hand may still be blocked, because the front panel of a coat
+hangs between them like a curtain. A straight line from the hand into the opening is blocked if it
+meets a triangle of the garment on its way.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from trimesh.triangles import closest_point
 
 from drake_dress.models.arrays import FloatArray, IntArray
 
-# Moves of an opening that are tried, m: none, and along the 26 vectors from the centre of a cube to
-# its corners, edges and faces.
+# Candidate moves of an opening, m: none, and along the 26 vectors from the centre of a cube to its
+# corners, edges and faces.
 _CUBE = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _AROUND = _CUBE[_CUBE.any(axis=1)]
 _AROUND = _AROUND / np.linalg.norm(_AROUND, axis=1, keepdims=True)
 _MOVES = np.vstack([np.zeros((1, 3)), *(size * _AROUND for size in (0.05, 0.10, 0.15, 0.20))])
-# Prices of a move, m: of an opening that is not seen, of one that is seen aslant, and of a metre
-# too near.
+# Costs of a move, m: of an opening that is not seen, of one that is seen aslant, and of a metre too
+# near.
 _UNSEEN, _ASLANT, _CLOSE = 0.4, 0.1, 2.0
-# Distance at which an opening is looked at, m: nearer a panel lies on the hand, and follows it.
+# Least distance for viewing an opening, m: nearer, a panel lies on the hand and follows it.
 _NEAREST = 0.13
-# Share of an opening that is enough to see.
+# Visible share of an opening that suffices.
 _ENOUGH = 0.85
-# Points of the opening that are looked at: its centre and this many, half-way to its rim.
+# Sample points of an opening: its centre and this many, half-way to its rim.
 _RIM_POINTS = 8
 
 
@@ -37,10 +37,10 @@ def free_sight(
     """Returns the share, 0 to 1, of an opening that can be seen from a point.
 
     Args:
-        x: (n,3) garment, m.
+        x: (n,3) nodes of the garment, m.
         faces: (F,3) its triangles.
         loop: (k,) nodes around the opening, in order.
-        eye: (3,) where one looks from, m.
+        eye: (3,) viewpoint, m.
     """
     rim = x[loop]
     center = rim.mean(axis=0)
@@ -60,7 +60,7 @@ def free_sight(
 def distance_to_opening(rim: FloatArray, point: FloatArray) -> float:
     """Returns how far a point is from the fan that spans an opening, m.
 
-    A hand that a panel keeps out of an opening stays as far from it as the hand is thick.
+    A hand that a panel keeps out of an opening stays its own thickness away from it.
 
     Args:
         rim: (k,3) nodes around the opening, in order, m.
@@ -80,18 +80,18 @@ def move_into_sight(
     eye: FloatArray,
     frame: FloatArray,
 ) -> FloatArray:
-    """Returns the move (3,), m, by which an opening comes into sight, a short one.
+    """Returns a short move (3,), m, by which an opening comes into sight.
 
-    The garment is taken to move as it is. A panel that bars the way mostly does so by a few
+    The garment is assumed to move rigidly. A panel that blocks the way mostly does so by a few
     centimetres.
 
     Args:
-        x: (n,3) garment, m.
+        x: (n,3) nodes of the garment, m.
         faces: (F,3) its triangles.
         loop: (k,) nodes around the opening, in order.
-        normal: (3,) of the opening, unit, to the side from which it is entered.
-        eye: (3,) where one looks from, m.
-        frame: (3,3) rows are the unit vectors between and along which it is moved.
+        normal: (3,) unit normal of the opening, on the side from which it is entered.
+        eye: (3,) viewpoint, m.
+        frame: (3,3) rows are the unit vectors of the frame of the moves.
     """
     center = x[loop].mean(axis=0)
     best, least = np.zeros(3), np.inf

@@ -1,10 +1,10 @@
 """The state of a sleeve: centre and orientation of its armhole, with derivatives.
 
-The paper takes six keypoints and the smallest component of their PCA. Here the whole loop counts.
-The centre is that of the polygon as a curve, so that it does not depend on how the mesh spaces its
-nodes (six keypoints are an option). The orientation is the loop's area vector ½ Σ x_i × x_{i+1}:
-it is what PCA gives for a flat loop, has a sign of its own, and is smooth with a closed-form
-derivative, while the PCA's axis has none of its own and jumps where two components are equal.
+The paper uses six keypoints and the smallest component of their PCA. This module uses the whole
+loop. The centre is that of the polygon as a curve, so that it does not depend on the spacing of the
+nodes (six keypoints are an option). The orientation is the loop's area vector ½ Σ x_i × x_{i+1}.
+For a flat loop it has the direction of the PCA axis. It has a definite sign, and is smooth with a
+closed-form derivative. The PCA axis has no sign, and jumps where two components are equal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from drake_dress.models.sides import SIDES
 Center = Literal["arc_length", "keypoints"]
 
 _KEYPOINTS = 6  # per armhole, as in the paper's tracking section
-# Least |cosine| between an armhole's area vector and the way from its cuff that tells a direction.
+# Least |cosine| between an armhole's area vector and the vector from its cuff for a definite sign.
 _LEAST_COSINE = 0.05
 
 
@@ -34,7 +34,7 @@ _LEAST_COSINE = 0.05
 class SleeveState:
     """Armhole centre `p_c` (3,), m, and unit orientation `v_c` (3,), from cuff to armhole.
 
-    `v_c` is the way the sleeve is drawn up the arm, like the arm's direction D(s).
+    `v_c` is the direction in which the sleeve is drawn up the arm, like the arm's direction D(s).
     """
 
     p_c: FloatArray
@@ -42,7 +42,7 @@ class SleeveState:
 
 
 class AtRest(Protocol):
-    """What knows a garment's openings at rest: its mesh, or a run's log."""
+    """A source of a garment's openings at rest: its mesh, or a run's log."""
 
     @property
     def rest_position(self) -> FloatArray:
@@ -50,15 +50,15 @@ class AtRest(Protocol):
 
     @property
     def loops(self) -> Mapping[str, npt.NDArray[np.integer]]:
-        """Name of an opening to the nodes around it, in order."""
+        """Nodes around each opening, in order, by the name of the opening."""
 
 
 def loop_orientation(garment: AtRest, side: str) -> float:
     """Returns ±1, such that the signed area vector of the armhole points from cuff to armhole.
 
     Raises:
-        UserError: `side` is neither left nor right, or the armhole at rest lies edge-on to the way
-            from its cuff, so that neither sign can be told.
+        UserError: `side` is neither left nor right, or the armhole at rest lies edge-on to the
+            vector from its cuff, so that the sign is undefined.
     """
     if side not in SIDES:
         raise UserError("garment", "side", f"is {side!r}, expected one of {', '.join(SIDES)}")
@@ -84,13 +84,13 @@ def sleeve_state(
 ) -> SleeveState:
     """Returns the sleeve state of the nodes `x` (n,3), m.
 
-    A loop that is crumpled to no area has no orientation: v_c is then shorter than a unit vector.
+    A loop that is crumpled to zero area has no orientation: v_c is then shorter than a unit vector.
 
     Args:
         x: (n,3) positions.
         loop: (k,) nodes of the armhole in order.
-        sign: of the loop, see `loop_orientation`.
-        center: of the whole loop, weighted by arc length, or the mean of six keypoints at equal
+        sign: orientation sign of the loop, see `loop_orientation`.
+        center: centre of the whole loop, weighted by arc length, or mean of six keypoints at equal
             arc length from the loop's first node on (paper, section on tracking).
     """
     points = x[loop]
@@ -109,7 +109,7 @@ def sleeve_state_vjp(
 ) -> FloatArray:
     """Returns (k,3) the derivative of p̄·p_c + v̄·v_c with respect to the loop's nodes.
 
-    Exact for the function as it is, change of the arc lengths included. Arguments as of
+    The derivative is exact, including the change of the arc lengths. Arguments as of
     `sleeve_state`; p_bar, v_bar: (3,).
     """
     points = x[loop]
@@ -126,7 +126,7 @@ def sleeve_state_vjp(
 
 @dataclass(frozen=True)
 class Entry:
-    """Where an arm comes into the garment, as a weighted mean of nodes.
+    """The place where an arm enters the garment, as a weighted mean of nodes.
 
     Attributes:
         nodes: (k,); weights: (k,), sum 1.
@@ -137,11 +137,11 @@ class Entry:
 
 
 def find_entry(mesh: GarmentMesh, reach: float = 0.15) -> Entry:
-    """Returns the entry of a coat: its outer rim (front edges, neck) near between the armholes.
+    """Returns the entry of a coat: its outer rim (front edges, neck) midway between the armholes.
 
     Args:
-        mesh: its boundary is made of both cuffs and one rim.
-        reach: length, m, over which rim nodes count less and less.
+        mesh: its boundary consists of both cuffs and one rim.
+        reach: length, m, over which the weight of rim nodes decays.
     """
     x = mesh.rest_position
     middle = 0.5 * sum(x[mesh.loops[f"{side}_armhole"]].mean(axis=0) for side in ("left", "right"))
@@ -166,7 +166,7 @@ def entry_direction(x: FloatArray, p_c: FloatArray, entry: Entry) -> FloatArray:
 def entry_direction_vjp(
     x: FloatArray, p_c: FloatArray, entry: Entry, w_bar: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns the derivative of w̄·entry_direction: (k,3) of the entry's nodes, (3,) of p_c."""
+    """Returns the derivative of w̄·entry_direction: (k,3) by the entry's nodes, (3,) by p_c."""
     way = entry.weights @ x[entry.nodes] - p_c
     length = max(float(np.linalg.norm(way)), 1e-12)
     w = way / length
@@ -174,7 +174,7 @@ def entry_direction_vjp(
     return entry.weights[:, None] * back, -back
 
 
-# Both are asked for hundreds of times a second, and rolling arrays took forty times as long.
+# Both run hundreds of times a second; `np.roll` took forty times as long.
 @nb.njit(cache=True)
 def _area_vector(points: FloatArray) -> FloatArray:
     """Returns ½ Σ x_i × x_{i+1} of the loop's nodes (k,3)."""
@@ -223,7 +223,7 @@ def _curve_center_vjp(points: FloatArray, p_bar: FloatArray) -> FloatArray:
 
 
 def _locate_keypoints(length: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
-    """Returns the edge (6,) that holds each keypoint, and which part of it (6,) lies before."""
+    """Returns the edge (6,) of each keypoint, and the share (6,) of the edge before it."""
     ends = np.cumsum(length)
     at = ends[-1] * np.arange(_KEYPOINTS) / _KEYPOINTS
     edge = np.minimum(np.searchsorted(ends, at, side="right"), len(length) - 1)

@@ -1,17 +1,17 @@
-"""Which sleeve is at which stage, and what each sleeve is therefore asked to do.
+"""Stages of both sleeves, and the task of each sleeve that follows from them.
 
 A sleeve is prepared (brought behind the hand), dressed (drawn up the arm), and done. With two
-sleeves of one coat the paper prepares the nearer one alone while the garment cannot reach both
-hands, then lets it wait on its arm while the other is prepared, and draws both up together. When
-both are on, both are held: drawn further they pull against each other, and one slips down again;
-let go they slip as well.
+sleeves of one coat, the paper prepares only the nearer one while the garment cannot reach both
+hands. That sleeve then waits on its arm while the other one is prepared, and both are drawn up
+together. Once both are on, both are held. Drawn further, they pull against each other, and one
+slips down again; released, they slip as well.
 
-Three things differ from the print, all measured. The garment's reach is judged by the distance of
-the two targets, not only of the two armholes (which else rises to the limit first and makes the
-task flicker). The sleeve that goes first is that of the arm that opens less, not the nearer one: of
-eleven dressings just those failed whose second arm was that one. A sleeve counts as on its arm by
-the linking number of its armhole, since the progress s alone rises as well when the armhole slides
-up beside the arm.
+Three things differ from the paper, all based on measurements. The garment's reach is compared with
+the distance of the two targets, not of the two armholes, which rises to the limit first and makes
+the task flicker. The first sleeve is that of the arm that opens less, not the nearer one: of eleven
+dressings exactly those failed in which that arm came second. A sleeve counts as on its arm by the
+linking number of its armhole, because the progress s alone also rises when the armhole slides up
+beside the arm.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ class Stage(IntEnum):
 
 
 class Task(IntEnum):
-    """What the cost of one sleeve is made of."""
+    """Task of one sleeve, which selects its cost."""
 
     REST = 0  # no cost: the gripper serves the other sleeve
     PREPARE = 1  # J_p
     DRESS = 2  # J_d
     WAIT = 3  # J_w
-    HOLD = 4  # both are done: it stays where it is on its arm
+    HOLD = 4  # both are done: the sleeve keeps its place on the arm
 
 
 Place = tuple[float, float, float]
@@ -44,20 +44,20 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class SleeveFacts:
-    """What the stages depend on, for one sleeve.
+    """Facts about one sleeve that determine its stage.
 
     Attributes:
-        linked: the arm passes through the armhole.
+        linked: whether the arm passes through the armhole.
         s: progress of the armhole along its arm; 0 where not linked.
-        hand_distance: armhole centre to hand, m.
-        prepared_error: distance of the armhole centre to where preparing ends, m.
-        passed: how far the armhole centre has gone past the hand toward the shoulder beside
-            the arm, along the arm, m; 0 or less before the hand.
-        sight: share of the opening that the hand sees, nothing of the garment in between.
-        opening: inward part of the forearm's direction from hand to elbow, -1 to 1: how far the arm
-            opens sideways.
-        touches: the hand is at the opening already, about to go in.
-        hand: its place, m; away: unit vector from the armhole's centre to it.
+        hand_distance: distance from the armhole centre to the hand, m.
+        prepared_error: error of the armhole centre relative to its prepared position, m.
+        passed: distance along the arm by which the armhole centre has passed the hand beside the
+            arm, m; 0 before the hand.
+        sight: share of the opening that the hand sees without the garment in between.
+        opening: inward component of the forearm's direction from hand to elbow, -1 to 1: how far
+            the arm opens sideways.
+        touches: whether the hand is at the opening already, about to enter.
+        hand: position of the hand, m; away: unit vector from the armhole's centre to it.
     """
 
     linked: bool
@@ -81,7 +81,7 @@ class StageParameters:
             m (φ_p).
         least_sight: share of the opening that the hand must see before the sleeve is drawn over it.
         lost_sight: share below which the garment blocks the hand. It is lower than `least_sight`,
-            since the visible share fluctuates while cloth moves, and an armhole that turned back
+            because the visible share fluctuates while cloth moves, and an armhole that turned back
             each time would never arrive.
         sight_time: time for which a hand still counts as seeing an armhole that it is about to
             meet, s. At 10 cm the rim and the panel beside it hide most of what was seen from 15 cm.
@@ -107,14 +107,14 @@ class StageParameters:
             earlier stall at the same place; a sleeve that does not come free creeps on.
         stall_progress: advance of s that counts as progress.
         easing_time: time for which a stalled sleeve eases, s.
-        creeping_progress: progress s above which a sleeve does not ease, since all sleeves crept on
-            so near the shoulder.
+        creeping_progress: progress s above which a sleeve does not ease, because all sleeves crept
+            on so near the shoulder.
         retreat_time: time for which a withdrawn sleeve stays away from the hand, s.
-        withdrawal_after: both sleeves withdraw behind the person after every so many misses of the
-            first hand. A coat that hangs over an arm misses it again and again.
+        withdrawal_after: both sleeves withdraw behind the person each time that the first hand has
+            been missed this many times. A coat that hangs over an arm misses it again and again.
         withdrawal_time: duration of that withdrawal, s.
-        swing_after: the second sleeve swings back behind the person after every so many misses of
-            its hand, while the first one stays on its arm.
+        swing_after: the second sleeve swings back behind the person each time that its hand has
+            been missed this many times, while the first one stays on its arm.
         swing_time: duration of that swing, s.
         alike: difference in opening below which two arms are treated as equal.
     """
@@ -149,18 +149,19 @@ class StageParameters:
 
 @dataclass(frozen=True)
 class StageState:
-    """Stages of left and right sleeve, and what has to be remembered to switch them.
+    """Stages of left and right sleeve, and the memory that switching them needs.
 
     Attributes:
-        stage: of each sleeve; since: when it began, s.
+        stage: of each sleeve; since: time at which it began, s.
         first: sleeve that goes first, -1 before it is known.
         attempts: how often each sleeve missed the hand.
-        best: greatest s since the last stall; best_time: when it was reached, s.
-        stalls: how often each sleeve stalled without getting further since; stalled: how far, as s.
-        met: where the hand was when the armhole met it, m, or nearer to it since; None while it
+        best: greatest s since the last stall; best_time: time at which it was reached, s.
+        stalls: number of stalls of each sleeve without progress since; stalled: s of these stalls.
+        met: position of the hand when the armhole met it, m, or at its closest since; None while it
             does not meet it.
-        close_since: since when the armhole is close to the hand, s; None while it is not.
-        seen: when the hand last saw the armhole that meets it, s; None if it did not since a miss.
+        close_since: time since which the armhole is close to the hand, s; None while it is not.
+        seen: time at which the hand last saw the armhole that meets it, s; None if it did not since
+            a miss.
     """
 
     stage: tuple[Stage, Stage] = (Stage.PREPARE, Stage.PREPARE)
@@ -183,14 +184,14 @@ def advance_stages(
     target_distance: float,
     time: float,
 ) -> tuple[StageState, tuple[Task, Task]]:
-    """Returns the stages after what was seen, and the task of left and right sleeve.
+    """Returns the new stages, and the tasks of left and right sleeve.
 
     Args:
         state: stages so far.
         facts: of left and right sleeve.
         parameters: thresholds.
-        target_distance: between where both sleeves would be if they were treated apart, m.
-        time: now, s.
+        target_distance: between the targets of both sleeves if each were treated alone, m.
+        time: current time, s.
     """
     if withdraws(state, facts, parameters, time):
         return state, (Task.PREPARE, Task.PREPARE)
@@ -207,7 +208,7 @@ def advance_stages(
         return state, (Task.HOLD, Task.HOLD)
     tasks = _tasks(state, facts, on_arm, parameters, target_distance)
     if tasks[1 - state.first] == Task.REST and not any(on_arm):
-        # its time to be prepared in, after which it counts as having missed its hand, has not begun
+        # the time limit of its preparation has not started
         state = _with(state, 1 - state.first, since=time)
     return state, tasks
 
@@ -219,14 +220,14 @@ def _tasks(
     parameters: StageParameters,
     target_distance: float,
 ) -> tuple[Task, Task]:
-    """Returns the tasks of left and right sleeve, of which not both are done.
+    """Returns the tasks of left and right sleeve if not both are done.
 
     Args:
         state: stages, with the sleeve that goes first.
         facts: of left and right sleeve.
-        on_arm: of each, whether it is on its arm.
+        on_arm: whether each sleeve is on its arm.
         parameters: thresholds.
-        target_distance: between where both sleeves would be if they were treated apart, m.
+        target_distance: between the targets of both sleeves if each were treated alone, m.
     """
     n = state.first
     f = 1 - n
@@ -251,13 +252,13 @@ def look(
     parameters: StageParameters,
     time: float,
 ) -> tuple[StageState, tuple[SleeveFacts, SleeveFacts]]:
-    """Returns the stages with what hands see now, and facts in which they still see what they saw.
+    """Returns the stages with the hands' current sight, and facts in which recent sight counts.
 
     Args:
         state: stages so far.
         facts: of left and right sleeve.
         parameters: thresholds.
-        time: now, s.
+        time: current time, s.
     """
     kept = list(facts)
     for side, fact in enumerate(facts):
@@ -273,8 +274,9 @@ def look(
 def _choose_first(facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters) -> int:
     """Returns the sleeve that goes first: that of the arm that opens less sideways.
 
-    Such an arm lies in the plane of an armhole that comes from outside, and the garment has to turn
-    for it, which it cannot when it hangs on the other arm. Of arms alike the nearer one is first.
+    Such an arm lies in the plane of an armhole that comes from outside. The garment has to turn for
+    it, which it cannot while it hangs on the other arm. If both arms are alike, the nearer one is
+    first.
     """
     difference = facts[0].opening - facts[1].opening
     if abs(difference) > p.alike:
@@ -313,7 +315,7 @@ def _advance(
 
 
 def _with(state: StageState, side: int, **values: Any) -> StageState:
-    """Returns the state with these of its fields changed for one sleeve."""
+    """Returns the state with the given fields changed for one sleeve."""
     changed: dict[str, Any] = {}
     for name, value in values.items():
         left, right = getattr(state, name)
@@ -329,9 +331,9 @@ def _lingers(state: StageState, side: int, p: StageParameters, time: float) -> b
 def _meet(
     state: StageState, side: int, fact: SleeveFacts, p: StageParameters, time: float
 ) -> StageState:
-    """Returns the state with where and since when a hand is met.
+    """Returns the state with the place and time at which the armhole meets its hand.
 
-    One that comes nearer by itself is met there.
+    If the hand comes nearer by itself, its new place counts.
     """
     met, close = state.met[side], state.close_since[side]
     if fact.linked or fact.hand_distance > p.lingering_distance:
@@ -346,7 +348,7 @@ def _meet(
 
 
 def _pushed(state: StageState, side: int, fact: SleeveFacts) -> float:
-    """Returns how far, m, a hand has gone before the armhole that meets it."""
+    """Returns how far, m, a hand has moved ahead of the armhole that meets it."""
     met = state.met[side]
     if met is None:
         return 0.0
@@ -360,7 +362,7 @@ def _remember(
     p: StageParameters,
     time: float,
 ) -> StageState:
-    """Returns the state with the progress of one sleeve; one that waits does not stall."""
+    """Returns the state with the progress of one sleeve; a waiting sleeve does not stall."""
     fact, other = facts[side], facts[1 - side]
     further = fact.s > state.stalled[side] + p.stall_progress
     if state.stalls[side] > 0 and (further or state.stage[side] != Stage.DRESS):
@@ -376,7 +378,7 @@ def _remember(
 
 
 def _patience(state: StageState, side: int, p: StageParameters) -> float:
-    """Returns the time without progress, s, after which a sleeve gives way."""
+    """Returns the time without progress, s, after which a sleeve eases."""
     return p.stall_timeout * 2.0 ** min(state.stalls[side], 4)
 
 
@@ -387,7 +389,7 @@ def eases(
     parameters: StageParameters,
     time: float,
 ) -> bool:
-    """Returns whether a sleeve that stalled on its arm shall give way before it is drawn again."""
+    """Returns whether a sleeve stalled on its arm and has to ease before it is drawn again."""
     return (
         state.stage[side] == Stage.DRESS
         and facts[side].s < parameters.creeping_progress
@@ -396,7 +398,7 @@ def eases(
 
 
 def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
-    """Returns whether a sleeve has been prepared for too long, near the hand or barred from it."""
+    """Returns whether a sleeve has been prepared for too long, near the hand or blocked from it."""
     barred = fact.sight < p.lost_sight and fact.hand_distance < p.barred_distance
     return (barred and duration > p.barred_timeout) or (
         fact.hand_distance < p.reach and duration > 2.0 * p.insertion_timeout
@@ -404,7 +406,7 @@ def _stuck(fact: SleeveFacts, p: StageParameters, duration: float) -> bool:
 
 
 def _again(state: StageState, side: int, time: float) -> StageState:
-    """Returns the state in which a sleeve that missed the hand begins anew."""
+    """Returns the state in which a sleeve that missed the hand starts again."""
     return _with(
         state,
         side,
@@ -423,7 +425,7 @@ def withdraws(
     parameters: StageParameters,
     time: float,
 ) -> bool:
-    """Returns whether both sleeves shall be taken back behind the person before they are tried."""
+    """Returns whether both sleeves withdraw behind the person before the next attempt."""
     if state.first < 0:
         return False
     return _just_began(state, state.first, _withdrawn(state, facts, parameters), time)
@@ -432,7 +434,7 @@ def withdraws(
 def _withdrawn(
     state: StageState, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
 ) -> float:
-    """Returns for how long, s, sleeves are taken back behind the person after the last miss."""
+    """Returns how long, s, both sleeves withdraw behind the person after the last miss."""
     due = _is_due(state.attempts[state.first], p.withdrawal_after)
     return p.withdrawal_time if due and not (facts[0].linked or facts[1].linked) else 0.0
 
@@ -444,14 +446,14 @@ def swings(
     parameters: StageParameters,
     time: float,
 ) -> bool:
-    """Returns whether a sleeve whose other one is on its arm shall be swung back behind."""
+    """Returns whether a sleeve swings back behind the person while the other is on its arm."""
     return _just_began(state, side, _swung(state, side, facts, parameters), time)
 
 
 def _swung(
     state: StageState, side: int, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
 ) -> float:
-    """Returns for how long, s, a sleeve is swung back after the last miss."""
+    """Returns how long, s, a sleeve swings back after the last miss."""
     due = _is_due(state.attempts[side], p.swing_after)
     return p.swing_time if due and facts[1 - side].linked and not facts[side].linked else 0.0
 
@@ -459,21 +461,21 @@ def _swung(
 def _kept_away(
     state: StageState, side: int, facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters
 ) -> float:
-    """Returns for how long, s, a sleeve is kept far from its hand after the last miss."""
+    """Returns how long, s, a sleeve stays far from its hand after the last miss."""
     return _withdrawn(state, facts, p) + _swung(state, side, facts, p)
 
 
 def retreats(state: StageState, side: int, parameters: StageParameters, time: float) -> bool:
-    """Returns whether a sleeve has missed the hand a moment ago and shall keep away from it."""
+    """Returns whether a sleeve has just missed the hand and has to stay away from it."""
     missed = state.attempts[side] > 0
     return missed and _just_began(state, side, parameters.retreat_time, time)
 
 
 def _is_due(missed: int, every: int) -> bool:
-    """Returns whether what is done after each so many misses is to be done after this one."""
+    """Returns whether the number of misses is a multiple of `every`, and not zero."""
     return missed > 0 and missed % every == 0
 
 
 def _just_began(state: StageState, side: int, lasting: float, time: float) -> bool:
-    """Returns whether it is less than `lasting`, s, since a sleeve began to be prepared."""
+    """Returns whether the preparation of a sleeve began less than `lasting`, s, ago."""
     return state.stage[side] == Stage.PREPARE and time - state.since[side] < lasting

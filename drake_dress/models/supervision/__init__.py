@@ -1,1 +1,1 @@
-"""What a station hears, whether it may be believed, and what follows if not."""
+"""Checks of the messages that a station receives, and reactions to faults."""

@@ -1,4 +1,4 @@
-"""What can be wrong with a source of messages, and a finding about one message."""
+"""Faults of a source of messages, and the finding of a check on one message."""
 
 from __future__ import annotations
 
@@ -7,39 +7,40 @@ from enum import IntFlag
 
 
 class Fault(IntFlag):
-    """What is wrong with a source."""
+    """Faults of a source."""
 
     NONE = 0
     STALE = 1  # nothing new for too long
-    MALFORMED = 2  # bytes that are no message of this kind
-    NOT_FINITE = 4  # a message with a number that is none
-    WRONG_SIZE = 8  # a message of other joints, nodes, or cameras
-    TIME_BACK = 16  # a stamp long before one that was heard
-    CLOCK_JUMP = 32  # a stamp that went on by much more than time did
-    JOINT_LIMIT = 64  # a joint outside what its maker allows
-    SPEED_LIMIT = 128  # a joint faster than that
-    STOPPED = 256  # the source itself reports that it does not follow
-    IDLE = 512  # it reports that it follows no command yet, or no longer
-    IMPOSSIBLE = 1024  # a person, garment or load that cannot be
-    LEAP = 2048  # something that moved faster than it can since the last sound message
-    FROZEN = 4096  # values that cannot stay the same to the last bit, and do
-    UNSTAMPED = 8192  # a utime that nobody fills in
+    MALFORMED = 2  # bytes that are not a message of this kind
+    NOT_FINITE = 4  # a message with a value that is not finite
+    WRONG_SIZE = 8  # a message with other joints, nodes, or cameras
+    TIME_BACK = 16  # a time stamp long before an earlier one
+    CLOCK_JUMP = 32  # a time stamp that advanced much more than time did
+    JOINT_LIMIT = 64  # a joint outside the manufacturer's limits
+    SPEED_LIMIT = 128  # a joint faster than the manufacturer's limit
+    STOPPED = 256  # the source itself reports that it does not follow commands
+    IDLE = 512  # the source reports that it follows no command yet, or no longer
+    IMPOSSIBLE = 1024  # a person, garment or load that is not possible
+    LEAP = 2048  # motion since the last sound message that is faster than possible
+    FROZEN = 4096  # values that stay the same to the last bit although they cannot
+    UNSTAMPED = 8192  # a utime that is never filled in
 
 
-# After these nothing that follows can be put in order: the run ends.
+# These faults cannot be recovered from: the run ends.
 FATAL = Fault.TIME_BACK | Fault.CLOCK_JUMP | Fault.JOINT_LIMIT | Fault.SPEED_LIMIT
 
-# With these a message still tells where its source is.
+# A message with these faults still gives the state of its source.
 TELLING = Fault.STOPPED | Fault.IDLE
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found in one message.
+    """Result of a check on one message.
 
     Attributes:
-        fault: none where the message is sound.
-        reason: what was refused, its value, and the bound; empty where the fault says it all.
+        fault: NONE if the message is sound.
+        reason: what was rejected, its value, and the bound; empty if the fault is explanation
+            enough.
     """
 
     fault: Fault = Fault.NONE

@@ -1,7 +1,7 @@
-"""Whether an estimate of a garment can be believed: its shape, its motion, and that it lives.
+"""Plausibility of a garment estimate: its shape, its motion, and whether it is frozen.
 
-A shape is held against the mesh and the grippers (`garment_shape.py`), nodes and reported
-velocities against messages before. Grippers carry the nodes that they hold along, so nodes that
+The shape is checked against the mesh and the grippers (`garment_shape.py`), nodes and reported
+velocities against earlier messages. Grippers carry along the nodes that they hold, so nodes that
 stay the same to the last bit while a gripper moves are frozen.
 """
 
@@ -17,25 +17,26 @@ from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.garment_shape import ShapeBounds, impossible_shape
 
-# Messages in a row without any change, before they are called frozen.
+# Consecutive messages without any change before an estimate counts as frozen.
 _REPEATS = 3
-# Time constant with which reported velocities are summed up and held against positions, s.
+# Time constant with which reported velocities are integrated and compared with positions, s.
 _SUMMED_FOR = 0.2
-# Of which the fastest of some thousand noisy nodes is further off, in standard deviations.
+# Greatest motion due to noise among some thousand nodes, in standard deviations.
 _FURTHEST = 10.0
 
 
 @dataclass(frozen=True)
 class GarmentBounds:
-    """What an estimate of a garment may say.
+    """Limits of a plausible garment estimate.
 
     Attributes:
-        shape: of each message.
-        speed: of a node between messages, at most, m/s.
-        velocity: of a node as it is reported, at most, m/s.
-        velocity_error: of reported velocities against motion, root mean square, m/s.
-        frozen_travel: of a gripper while the garment stays the same, at most, m; 0 does not
-            judge it.
+        shape: limits of each message's shape.
+        speed: greatest speed of a node between messages, m/s.
+        velocity: greatest reported velocity of a node, m/s.
+        velocity_error: greatest error of reported velocities relative to the motion, root mean
+            square, m/s.
+        frozen_travel: greatest travel of a gripper while the garment stays the same, m; 0 disables
+            the check.
     """
 
     shape: ShapeBounds
@@ -47,15 +48,15 @@ class GarmentBounds:
 
 @dataclass(frozen=True)
 class GarmentTrack:
-    """What is remembered of the sound messages.
+    """Memory of the sound messages.
 
     Attributes:
-        stamp: of the last one, s.
-        nodes: (n,3) of it, m. velocity: (n,3) m/s, where it had some.
-        drift: (n,3) by which nodes moved more than their velocities say, fading with the time
-            constant `_SUMMED_FOR`, m; None where none are reported.
-        same: messages in a row without any change.
-        grippers: (2,3) where they were when something changed last, m.
+        stamp: time stamp of the last one, s.
+        nodes: (n,3) of the last one, m. velocity: (n,3) m/s, if it had velocities.
+        drift: (n,3) motion of the nodes that their velocities do not explain, fading with the time
+            constant `_SUMMED_FOR`, m; None if no velocities are reported.
+        same: consecutive messages without any change.
+        grippers: (2,3) positions at the last change, m.
     """
 
     stamp: float
@@ -74,15 +75,15 @@ def judge_garment(
     track: GarmentTrack | None,
     bounds: GarmentBounds,
 ) -> tuple[Finding, GarmentTrack | None]:
-    """Returns what is wrong with a message, and what is remembered from then on.
+    """Returns the finding about a message, and the new track.
 
     Args:
         nodes: (n,3) finite, m, world.
         velocity: (n,3) finite, m/s, if it is reported.
-        stamp: of the message, s.
-        grippers: (2,3) where left and right gripper are, m; None where that is not known.
+        stamp: time stamp of the message, s.
+        grippers: (2,3) positions of left and right gripper, m; None if not known.
         track: None before the first sound message.
-        bounds: of what is believed.
+        bounds: limits of a plausible estimate.
     """
     told = impossible_shape(nodes, grippers, bounds.shape) or _too_fast(velocity, bounds)
     if told is not None:
@@ -143,7 +144,7 @@ def _drift(
     if velocity is None:
         return None
     if track.velocity is None or track.drift is None or time > _SUMMED_FOR:
-        # what happened in so long a time two velocities do not tell
+        # two velocities do not describe the motion in so long a time
         return np.zeros_like(velocity)
     drift: FloatArray = drifted(
         track.drift, nodes, track.nodes, track.velocity, velocity, time, np.exp(-time / _SUMMED_FOR)
@@ -152,7 +153,7 @@ def _drift(
 
 
 def _contradicted(track: GarmentTrack, b: GarmentBounds) -> str | None:
-    """Returns how velocities that were reported contradict the nodes' motion, if they do."""
+    """Returns how the reported velocities contradict the nodes' motion; None if they do not."""
     if track.drift is None:
         return None
     error = float(np.sqrt(np.vdot(track.drift, track.drift) / len(track.drift)))
@@ -178,12 +179,12 @@ def _frozen(grippers: FloatArray | None, track: GarmentTrack, travel: float) -> 
     )
 
 
-# Compiled: an estimate comes 50 times a second, to a process that has commands to send.
+# Compiled, because estimates come 50 times a second, to a process that has commands to send.
 
 
 @nb.njit(cache=True, nogil=True)
 def largest_length(vectors):  # type: ignore[no-untyped-def]
-    """Returns the greatest length of vectors (n,3), and which has it."""
+    """Returns the greatest length of vectors (n,3), and the index of that vector."""
     most, at = -1.0, 0
     for i in range(len(vectors)):
         square = vectors[i, 0] ** 2 + vectors[i, 1] ** 2 + vectors[i, 2] ** 2
@@ -194,16 +195,16 @@ def largest_length(vectors):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def drifted(drift, nodes, before, velocity_before, velocity, time, kept):  # type: ignore[no-untyped-def]
-    """Returns (n,3) the share `kept` of a drift and the motion that velocities do not tell of, m.
+    """Returns the drift (n,3), m: a share of it so far, and the motion velocities do not explain.
 
     Args:
         drift: (n,3) so far, m.
         nodes: (n,3) now, m.
-        before: (n,3) at the last message, m.
+        before: (n,3) nodes at the last message, m.
         velocity_before: (n,3) at the last message, m/s.
         velocity: (n,3) now, m/s.
-        time: between both, s.
-        kept: share of the drift so far.
+        time: time between both, s.
+        kept: share of the drift so far that is kept.
     """
     out = np.empty_like(drift)
     for i in range(len(drift)):

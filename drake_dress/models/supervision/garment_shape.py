@@ -1,8 +1,8 @@
-"""Whether nodes can be the garment that is meshed and held: its size, edges, and held nodes.
+"""Plausibility of a garment's shape: its size, its edges, and the held nodes.
 
 With noise of standard deviation σ on each axis of each node, an edge of length L has the mean
-square length L² + 6 σ², and hardly an edge is longer than L + 5 √2 σ √2. Cloth folds between
-nodes, so an edge may be much shorter than at rest; it stretches by little.
+square length L² + 6 σ², and hardly any edge is longer than L + 5 √2 σ √2. Cloth folds between
+nodes, so an edge may be much shorter than its rest length, but it stretches only a little.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.remedies import COORDINATES, mistake
 
-# Of which the longest of some thousand noisy edges is longer, in standard deviations.
+# Greatest lengthening due to noise among some thousand edges, in standard deviations.
 _LONGEST = 10.0
-# Share of edges that are too long, from which on nodes are called out of order.
+# Share of too long edges above which the nodes are reported as out of order.
 _OUT_OF_ORDER = 0.2
 
 
 @dataclass(frozen=True)
 class ShapeBounds:
-    """What an estimate of a garment may be.
+    """Limits of a plausible garment shape.
 
     Attributes:
         edges: (E,2) nodes of each edge of the mesh.
@@ -33,9 +33,9 @@ class ShapeBounds:
         grasp: nodes that the left and the right gripper hold.
         extent: diagonal of the box around the garment at rest, m.
         node_noise: standard deviation of a node on each axis, m.
-        strain: of an edge, at most.
-        least_edge: share of their length at rest that edges have at least, root mean square.
-        grasp_distance: of the middle of the held nodes from their gripper, m.
+        strain: greatest strain of an edge.
+        least_edge: least root mean square length of the edges, as a share of that at rest.
+        grasp_distance: greatest distance of the held nodes' centre from their gripper, m.
     """
 
     edges: IntArray
@@ -49,12 +49,12 @@ class ShapeBounds:
 
     @cached_property
     def longest(self) -> FloatArray:
-        """(E,) length that each edge may have, m."""
+        """(E,) greatest plausible length of each edge, m."""
         return (1.0 + self.strain) * self.rest_length + _LONGEST * self.node_noise
 
     @cached_property
     def mean_edge(self) -> tuple[float, float]:
-        """Least and greatest root mean square of the edges, m."""
+        """Least and greatest root mean square length of the edges, m."""
         mean = float(np.sqrt(np.mean(self.rest_length**2)))
         noisy = np.sqrt(((1.0 + self.strain) * mean) ** 2 + 6.0 * self.node_noise**2)
         return self.least_edge * mean, float(noisy)
@@ -63,12 +63,12 @@ class ShapeBounds:
 def impossible_shape(
     nodes: FloatArray, grippers: FloatArray | None, bounds: ShapeBounds
 ) -> str | None:
-    """Returns what cannot be about nodes, with its value and bound; None if nothing.
+    """Returns why the nodes are impossible, with value and bound; None if they are plausible.
 
     Args:
         nodes: (n,3) finite, in the order of the mesh, m, world.
-        grippers: (2,3) where left and right gripper are, m; None where that is not known.
-        bounds: of the garment.
+        grippers: (2,3) positions of left and right gripper, m; None if not known.
+        bounds: limits of the garment's shape.
     """
     count, first = lost_nodes(nodes)
     if count:
@@ -105,7 +105,7 @@ def _broken(nodes: FloatArray, grippers: FloatArray | None, b: ShapeBounds) -> s
 
 
 def _edges_told(nodes: FloatArray, b: ShapeBounds) -> str | None:
-    """Returns which edges of nodes (n,3) cannot be; None if all can."""
+    """Returns which edges of nodes (n,3) are impossible; None if all are plausible."""
     mean_square, too_long, k = measure_edges(nodes, b.edges, b.longest)
     if too_long:
         length = np.linalg.norm(nodes[b.edges[k, 0]] - nodes[b.edges[k, 1]])
@@ -123,12 +123,12 @@ def _edges_told(nodes: FloatArray, b: ShapeBounds) -> str | None:
     return f"edges {mean:.3g} m in the root mean square, expected {low:.3g} to {high:.3g} m"
 
 
-# Compiled: an estimate comes 50 times a second, to a process that has commands to send.
+# Compiled, because estimates come 50 times a second, to a process that has commands to send.
 
 
 @nb.njit(cache=True, nogil=True)
 def lost_nodes(nodes):  # type: ignore[no-untyped-def]
-    """Returns how many of the nodes (n,3) are (0, 0, 0), and the first, −1 if none is."""
+    """Returns how many of the nodes (n,3) are (0, 0, 0), and the first of them, −1 if none is."""
     count, first = 0, -1
     for i in range(len(nodes)):
         if nodes[i, 0] == 0.0 and nodes[i, 1] == 0.0 and nodes[i, 2] == 0.0:
@@ -140,7 +140,7 @@ def lost_nodes(nodes):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def spread(nodes):  # type: ignore[no-untyped-def]
-    """Returns how far the nodes (n,3) are from their middle on any axis, at most, m."""
+    """Returns the greatest distance of nodes (n,3) from their centre along any axis, m."""
     far = 0.0
     for a in range(3):
         total, low, high = 0.0, np.inf, -np.inf
@@ -155,12 +155,12 @@ def spread(nodes):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, nogil=True)
 def measure_edges(nodes, edges, longest):  # type: ignore[no-untyped-def]
-    """Returns the mean square of edges (E,2), how many are too long, and which is most so.
+    """Returns the mean square length of edges, the number of too long ones, and the worst one.
 
     Args:
         nodes: (n,3) m.
-        edges: (E,2) nodes of each.
-        longest: (E,) length that each may have, m.
+        edges: (E,2) nodes of each edge.
+        longest: (E,) greatest plausible length of each edge, m.
     """
     total, worst, at, count = 0.0, 0.0, -1, 0
     for k in range(len(edges)):

@@ -1,28 +1,28 @@
-"""The order of stamps: which message is new, which is late, and which shows a clock set back.
+"""Order of time stamps: which message is new, which is late, and which shows a clock set back.
 
     stamp after the newest one                       new
     the same, or before it by at most `late`         dropped: a repeated or overtaken packet
-    0 after stamps that were not                     unstamped: the sender does not fill it in
+    0 after stamps that were not 0                   unstamped: the sender does not fill it in
     before it by more                                time back
 
-A clock that is set back by at most `late` costs as many messages as that takes.
+A clock that is set back by at most `late` costs the messages of that time.
 """
 
 from __future__ import annotations
 
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 
-# After which a count of µs in 32 bits begins anew, s, and how near to it a step back must be.
+# Period of a 32-bit count of µs, s, and the tolerance for recognizing its rollover, s.
 _ROLLOVER, _NEAR = 2.0**32 * 1e-6, 2.0
 
 
 def order(stamp: float, newest: float | None, late: float) -> Finding | None:
-    """Returns what a message's stamp says about it; None if the message is to be dropped.
+    """Returns the finding about a message's time stamp; None if the message is to be dropped.
 
     Args:
-        stamp: of the message, s of its source's clock.
-        newest: greatest stamp of a sound message so far, s; None before the first.
-        late: by which an overtaken message may be older than the newest one, s.
+        stamp: time stamp of the message, s of its source's clock.
+        newest: greatest time stamp of a sound message so far, s; None before the first.
+        late: time by which an overtaken message may be older than the newest one, s.
     """
     if newest is None or stamp > newest:
         return SOUND

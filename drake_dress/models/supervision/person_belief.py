@@ -1,12 +1,12 @@
-"""Whether an estimate of a person can be believed: its pose, its motion, and that it lives.
+"""Plausibility of a person estimate: its pose, its motion, and whether it is frozen.
 
-A pose is held against the person that is described (`person_pose.py`), a motion against the last
-sound message and against one of a fifth of a second before, so that steps within the error of a
-point cannot add up.
+The pose is checked against the described person (`person_pose.py`). The motion is checked against
+the last sound message and against one from a fifth of a second earlier, so that steps within the
+error of a point cannot add up.
 
 A real tracker has noise: no value stays the same to the last bit. A simulated one may have none,
-and a dummy stands still. So a point is judged frozen only against its own past: once it differed
-from message to message `_LIVELY` times in a row, it cannot stay the same for `frozen_time`.
+and a dummy stands still. A point therefore counts as frozen only relative to its own past: once it
+changed in `_LIVELY` consecutive messages, it cannot stay the same for `frozen_time`.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.supervision.fault import SOUND, Fault, Finding
 from drake_dress.models.supervision.person_pose import POINT_NAMES, PoseBounds, impossible_pose
 
-# Messages in a row in which a point changes, before it may be called frozen; and repeats then.
+# Consecutive messages in which a point must change before it can count as frozen; and repeats then.
 _LIVELY, _REPEATS = 25, 3
-# To the anchor, against which accumulated motion is held, s.
+# Age of the anchor, against which accumulated motion is checked, s.
 _ANCHOR_AGE = 0.2
 
 
 @dataclass(frozen=True)
 class PersonBounds:
-    """What an estimate of a person may say.
+    """Limits of a plausible person estimate.
 
     Attributes:
-        pose: of each message.
-        speed: of a point, at most, m/s.
-        frozen_time: for which a lively point may stay the same, s; 0 does not judge it.
+        pose: limits of each message's pose.
+        speed: greatest speed of a point, m/s.
+        frozen_time: time for which a lively point may stay the same, s; 0 disables the check.
     """
 
     pose: PoseBounds
@@ -42,15 +42,15 @@ class PersonBounds:
 
 @dataclass(frozen=True)
 class PersonTrack:
-    """What is remembered of the sound messages.
+    """Memory of the sound messages.
 
     Attributes:
-        stamp: of the last one, s.
-        points: (6,3) of it, m.
-        anchor_stamp, anchor: the same of one from about `_ANCHOR_AGE` before.
-        changes: (6,) messages in a row in which a point changed, until it was lively.
-        same: (6,) messages in a row in which it did not.
-        changed: (6,) stamp at which it changed last, s.
+        stamp: time stamp of the last one, s.
+        points: (6,3) of the last one, m.
+        anchor_stamp, anchor: the same of a message from about `_ANCHOR_AGE` earlier.
+        changes: (6,) consecutive messages in which a point changed, counted until it is lively.
+        same: (6,) consecutive messages in which it did not change.
+        changed: (6,) time stamp of its last change, s.
     """
 
     stamp: float
@@ -65,13 +65,13 @@ class PersonTrack:
 def judge_person(
     points: FloatArray, stamp: float, track: PersonTrack | None, bounds: PersonBounds
 ) -> tuple[Finding, PersonTrack | None]:
-    """Returns what is wrong with a message, and what is remembered from then on.
+    """Returns the finding about a message, and the new track.
 
     Args:
         points: (6,3) finite, m, world.
-        stamp: of the message, s.
+        stamp: time stamp of the message, s.
         track: None before the first sound message.
-        bounds: of what is believed.
+        bounds: limits of a plausible estimate.
     """
     told = impossible_pose(points, bounds.pose)
     if told is not None:

@@ -1,7 +1,7 @@
-"""Whether six points can be the shoulders, elbows and hands of the person that is described.
+"""Plausibility of six points as the shoulders, elbows and hands of the described person.
 
-Each point may be off by `point_error`, so a length may be by twice that, and the direction of a
-limb of length L by asin(2 point_error / L).
+Each point may be off by `point_error`. A length may then be off by twice that, and the direction of
+a limb of length L by asin(2 point_error / L).
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ _REMEDIES = {_SWAPPED: lambda points: points[_OTHER_SIDE]} | COORDINATES
 
 @dataclass(frozen=True)
 class PoseBounds:
-    """What the described person's points may be.
+    """Limits of the described person's points.
 
     Attributes:
-        shoulders: (2,3) where the shoulders are, left then right, m, world.
+        shoulders: (2,3) described shoulders, left then right, m, world.
         limbs: lengths of upper arm and forearm, m.
         limits: (2,2,4) least and greatest angles of each arm's hinges, as of `Arms`, rad.
-        point_error: of a point, at most, m.
-        length_share: by which real lengths may differ from those described.
-        shoulder_distance: of the middle between the shoulders from where it is described, m.
-        turn: of the shoulders about the vertical from where they are described, rad.
-        joint_room: by which a real person's joints may go beyond the limits, rad.
+        point_error: greatest error of a point, m.
+        length_share: share by which real lengths may differ from those described.
+        shoulder_distance: greatest distance of the shoulders' midpoint from the described one, m.
+        turn: greatest turn of the shoulders about the vertical from those described, rad.
+        joint_room: angle by which a real person's joints may exceed the limits, rad.
     """
 
     shoulders: FloatArray
@@ -50,11 +50,11 @@ class PoseBounds:
 
 
 def impossible_pose(points: FloatArray, bounds: PoseBounds) -> str | None:
-    """Returns what cannot be about six points, with its value and bound; None if nothing.
+    """Returns why six points are impossible, with value and bound; None if they are plausible.
 
     Args:
         points: (6,3) finite: shoulder, elbow, hand of the left, then of the right arm, m, world.
-        bounds: of the person.
+        bounds: limits of the person's points.
     """
     lost = np.flatnonzero(~points.any(axis=1))
     if len(lost):
@@ -110,14 +110,14 @@ def _length_told(name: str, length: float, wanted: float, b: PoseBounds) -> str 
 
 
 def _heading(to_the_left: FloatArray) -> float:
-    """Returns the yaw of who faces +x at 0, from right to left shoulder (3,), rad."""
+    """Returns the yaw, rad, of a vector (3,) from right to left shoulder; 0 faces +x."""
     return atan2(-to_the_left[0], to_the_left[1])
 
 
 def _joints_told(  # type: ignore[no-untyped-def]
     side, arm: FloatArray, heading: float, width: float, limits: FloatArray, b: PoseBounds
 ) -> str | None:
-    """Returns which of an arm's angles cannot be; None if its points allow a set that can."""
+    """Returns which of an arm's angles is impossible; None if its points allow a possible set."""
     c, s = cos(heading), sin(heading)
     into_torso = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     chords = np.diff(arm, axis=0)
@@ -143,15 +143,15 @@ def _joints_told(  # type: ignore[no-untyped-def]
 
 
 def _cone(error: float, length: float) -> float:
-    """Returns by how much an error across a length turns it, rad."""
+    """Returns the angle by which a lateral error turns a segment of a length, rad."""
     return asin(min(1.0, error / length))
 
 
 def _uncertainty(angles: FloatArray, of_upper: float, of_elbow: float) -> FloatArray:
-    """Returns (4,) how far the true angles may be from these, rad.
+    """Returns the uncertainty (4,) of the angles, rad.
 
-    An azimuth about a pole at angle φ from a direction that is known to δ is known to
-    asin(sin δ / sin φ), and not at all if the pole may be within δ.
+    Consider a direction that is known to within δ, at an angle φ from a pole. Its azimuth about the
+    pole is known to within asin(sin δ / sin φ), and unknown if the pole may be within δ.
 
     Args:
         angles: abduction, extension, rotation, elbow flexion, rad.
@@ -160,7 +160,7 @@ def _uncertainty(angles: FloatArray, of_upper: float, of_elbow: float) -> FloatA
     """
     _, extension, _, flexion = angles
     abduction = _azimuth(of_upper, abs(cos(extension)))
-    # abduction carries the frame, in which rotation is measured, about the upper arm
+    # an abduction error also turns the frame of the rotation about the upper arm
     twist = min(1.0, abs(sin(extension)) + of_upper) * abduction
     rotation = _azimuth(of_elbow, sin(flexion)) + twist
     return np.array([abduction, of_upper, rotation, of_elbow])

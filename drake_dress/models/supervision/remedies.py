@@ -1,6 +1,6 @@
-"""Names the usual mistake in coordinates that cannot be: units, axes, sides.
+"""Names the usual mistake behind impossible coordinates: units, axes, or sides.
 
-A remedy undoes one mistake. If points are possible once it is undone, that was the mistake.
+A remedy undoes one mistake. If it makes the points possible, that was the mistake.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from drake_dress.models.arrays import FloatArray
 Remedy = Callable[[FloatArray], FloatArray]
 
 _UNITS = {"in metres": 1.0, "in mm": 1e-3, "in cm": 1e-2, "in inches": 0.0254, "in feet": 0.3048}
-# What x, y, z of the world are in a message's columns, by what is wrong with it.
+# Columns of a message, with sign, that are x, y, z of the world, by what is wrong with the message.
 _AXES = {
     "": (1, 2, 3),
     "y up": (1, -3, 2),
@@ -55,8 +55,8 @@ def mistake(
     """Returns the name of the first remedy that makes points possible; None if none does.
 
     Args:
-        points: (m,3) as they came, finite.
-        possible: whether points could be.
+        points: (m,3) as received, finite.
+        possible: tells whether points are possible.
         remedies: by the name of the mistake that they undo.
     """
     return next((name for name, undo in remedies.items() if possible(undo(points))), None)

@@ -1,11 +1,11 @@
-"""What follows from faults: arms hold at once; the run goes on, or ends.
+"""Reactions to faults: the arms hold at once, and the run goes on or ends.
 
-    any source has a fault                     arms come to rest and hold
-    all have been sound for settle_time        they go on
+    any source has a fault                     the arms come to rest and hold
+    all have been sound for settle_time        the arms resume
     a fault has lasted for its patience        the run ends
-    a fault is fatal                           the run ends once arms have come to rest
+    a fault is fatal                           the run ends once the arms have come to rest
 
-When a run ends, commands end, and the arms' own drivers hold.
+When a run ends, no more commands are sent, and the arms' own drivers hold.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from drake_dress.models.supervision.fault import FATAL, Fault
 
 @dataclass(frozen=True)
 class Patience:
-    """How long is waited.
+    """Waiting times.
 
     Attributes:
-        settle_time: for which all must have been sound before arms go on, s.
-        fault: that a fault may last, s. fatal: until arms have come to rest, s.
+        settle_time: time for which all sources must be sound before the arms resume, s.
+        fault: time that a fault may last, s. fatal: time for the arms to come to rest, s.
     """
 
     settle_time: float = 0.2
@@ -32,13 +32,13 @@ class Patience:
 
 @dataclass(frozen=True)
 class SupervisionState:
-    """What is remembered.
+    """State of the supervision.
 
     Attributes:
-        faults: of each source, gathered since arms were permitted to move last.
-        since: when its first fault since then was, s; None where it had none.
-        sound: since when all are sound, s; None while one is not.
-        permitted: whether arms may move.
+        faults: of each source, accumulated since the arms were last permitted to move.
+        since: time of its first fault since then, s; None if it had none.
+        sound: time since which all sources are sound, s; None while one is not.
+        permitted: whether the arms may move.
         ended_by: the source whose fault ends the run; None while it goes on.
     """
 
@@ -50,16 +50,16 @@ class SupervisionState:
 
     @staticmethod
     def of(count: int) -> SupervisionState:
-        """Returns the state before anything has been heard of so many sources."""
+        """Returns the state of `count` sources before the first message."""
         return SupervisionState((Fault.NONE,) * count, (None,) * count)
 
 
 def supervise(
     state: SupervisionState, faults: Sequence[Fault], now: float, patience: Patience
 ) -> SupervisionState:
-    """Returns what follows from the sources' faults at `now`, s.
+    """Returns the state after the sources' faults at `now`, s.
 
-    Before all have been sound once, nothing is permitted, and patience runs from time 0.
+    Until all sources have been sound once, no motion is permitted, and patience runs from time 0.
     """
     sound = None
     if not any(faults):
@@ -69,7 +69,7 @@ def supervise(
     gathered: list[Fault] = []
     ended_by = state.ended_by
     for i, fault in enumerate(faults):
-        # of a source that comes and goes, patience runs on while it holds arms
+        # patience with an intermittent source runs on while that source holds the arms
         began = None if settled else state.since[i]
         all_of_it = Fault.NONE if settled else state.faults[i] | fault
         if fault and began is None:
@@ -84,7 +84,7 @@ def supervise(
 
 
 def told(source: str, fault: Fault, reason: str = "") -> str:
-    """Returns a line about what is wrong with a source: what was refused and why, if known."""
+    """Returns a line about the fault of a source, with what was rejected and why, if known."""
     return f"{source}: {reason} ({words(fault)})" if reason else f"{source}: {words(fault)}"
 
 

@@ -1,8 +1,8 @@
-"""Watches one source of messages: is what it says fresh, sound, and of this time?
+"""Watches one source of messages: whether they are fresh, sound, and in order of time.
 
-A source sends messages with a stamp of its own clock. A watch keeps two clocks apart: it never
-compares a stamp to its own time, only how far both went from one message to the next. So clocks
-need not be set to each other, and the lab's may run slower.
+A source stamps its messages by its own clock. A watch never compares a time stamp with its own
+time, only the advance of both clocks from one message to the next. The clocks therefore need not be
+synchronized, and the lab's clock may run slower.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ __all__ = ["FATAL", "TELLING", "Arrival", "Fault", "WatchSettings", "WatchState"
 
 @dataclass(frozen=True)
 class WatchSettings:
-    """What is asked of a source.
+    """Requirements on a source.
 
     Attributes:
-        max_age: since the last sound message, s.
-        jump: by which a stamp may go on more than time did, s.
-        late: by which a stamp may be before the newest one, s; such a message is dropped.
+        max_age: greatest time since the last sound message, s.
+        jump: time by which a stamp may advance more than time did, s.
+        late: time by which a stamp may be before the newest one, s; such a message is dropped.
     """
 
     max_age: float
@@ -32,14 +32,14 @@ class WatchSettings:
 
 @dataclass(frozen=True)
 class Arrival:
-    """What has come from a source until now.
+    """Messages received from a source until now.
 
     Attributes:
-        count: of all messages but those that were dropped, sound or not.
-        stamp: of the last message that was of the right kind, s of its source's clock.
-        fault: of the last message: none where it was sound.
-        reason: of that fault, as of `Finding`.
-        dropped: count of messages that were repeated, or late.
+        count: number of messages, sound or not, without those that were dropped.
+        stamp: time stamp of the last message of the right kind, s of its source's clock.
+        fault: fault of the last message; NONE if it was sound.
+        reason: reason of that fault, as of `Finding`.
+        dropped: number of repeated or late messages.
     """
 
     count: int = 0
@@ -51,17 +51,17 @@ class Arrival:
 
 @dataclass(frozen=True)
 class WatchState:
-    """What a watch remembers.
+    """State of a watch.
 
     Attributes:
-        count: of messages looked at.
-        stamp: of the last sound one, s; None before the first.
-        heard: when it came, s of the watch's own clock, or before: the first one that is looked at
-            may have waited.
-        fault: what is wrong now.
-        came: whether a message came since the first look, so that `heard` is when it did.
-        reason: of the fault; of what is fatal, the first.
-        total: count of all messages, dropped ones too, when the last sound one had come.
+        count: number of messages looked at.
+        stamp: time stamp of the last sound one, s; None before the first.
+        heard: time at which it was looked at, s of the watch's own clock. The first one may have
+            arrived earlier.
+        fault: current fault.
+        came: whether a sound message followed the first one, so that `heard` is its arrival time.
+        reason: reason of the fault; of a fatal fault, the first reason.
+        total: number of all messages, including dropped ones, when the last sound one had come.
     """
 
     count: int = 0
@@ -74,9 +74,9 @@ class WatchState:
 
 
 def watch(state: WatchState, arrival: Arrival, now: float, settings: WatchSettings) -> WatchState:
-    """Returns what a watch knows at `now`, s.
+    """Returns the state of a watch at `now`, s.
 
-    What is fatal stays; all else goes when a sound message has come.
+    A fatal fault stays; any other fault is cleared by a sound message.
     """
     fault, stamp, heard, came = state.fault, state.stamp, state.heard, state.came
     reason, total, seen = state.reason, state.total, arrival.count + arrival.dropped
@@ -101,7 +101,7 @@ def watch(state: WatchState, arrival: Arrival, now: float, settings: WatchSettin
 def _found(
     state: WatchState, arrival: Arrival, now: float, settings: WatchSettings
 ) -> Finding | None:
-    """Returns what is wrong with what came; None if it is to be dropped."""
+    """Returns the finding about the last message; None if it is to be dropped."""
     found = Finding(arrival.fault, arrival.reason)
     if found.fault & (Fault.MALFORMED | Fault.WRONG_SIZE) or state.stamp is None:
         return found
@@ -121,10 +121,10 @@ def _found(
 
 
 def _silent(stamp: float | None, messages_came: bool) -> Finding:
-    """Returns what is wrong with a source of which nothing new is heard.
+    """Returns the finding about a source that sends nothing new.
 
     Args:
-        stamp: of its last sound message, s; None if there was none.
+        stamp: time stamp of its last sound message, s; None if there was none.
         messages_came: whether messages came since, none of them new.
     """
     if stamp is None or not messages_came:

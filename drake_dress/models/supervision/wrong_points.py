@@ -1,4 +1,4 @@
-"""Estimates that cannot be, made of sound ones: what trackers say when something is wrong."""
+"""Impossible estimates made from sound ones, as trackers send them when something is wrong."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from drake_dress.models.arrays import FloatArray
 # Rows of a person's points.
 _LEFT_ELBOW, _LEFT_HAND = 1, 2
 _OTHER_SIDE = [3, 4, 5, 0, 1, 2]
-# By which an estimate leaps to and fro, where each place alone could be, and by which it is beside
-# what it is of, m.
+# Jump of an estimate back and forth between two places that are each possible, and offsets of the
+# person's and the garment's estimate, m.
 _LEAP, _OFFSET, _FAR = 0.2, 1.0, 0.4
 _HUGE = 1e30
 
 
 @dataclass(frozen=True)
 class Moment:
-    """One message while a fault is on.
+    """One message while a fault is active.
 
     Attributes:
         values: (m,3) points, m, or (m,6) with their velocities, m/s.
         first: the same of the first message of the fault.
-        number: of the message, from 0.
+        number: index of the message, from 0.
     """
 
     values: FloatArray
@@ -37,12 +37,12 @@ WrongPoints = Callable[[Moment], FloatArray]
 
 
 def _positions(change: Callable[[FloatArray], FloatArray]) -> WrongPoints:
-    """Returns what changes positions and leaves velocities."""
+    """Returns a fault that changes positions and keeps velocities."""
     return lambda m: np.hstack([change(m.values[:, :3]), m.values[:, 3:]])
 
 
 def _without(rows: slice | int) -> WrongPoints:
-    """Returns what writes rows as zero."""
+    """Returns a fault that writes rows as zero."""
 
     def wrong(m: Moment) -> FloatArray:
         values = m.values.copy()
@@ -59,7 +59,7 @@ def _long_forearm(m: Moment) -> FloatArray:
 
 
 def _leaping(m: Moment) -> FloatArray:
-    """Moves all forward in every second message."""
+    """Moves all points forward in every second message."""
     values = m.values.copy()
     values[:, 0] += _LEAP * ((m.number + 1) % 2)
     return values
