@@ -1,4 +1,4 @@
-"""Adds keys to scenarios, for `drake-dress run … --plugin add_scenario_key.py`, too."""
+"""Adds keys to scenarios, also for `drake-dress run … --plugin add_scenario_key.py`."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class LightTouch:
         return self.weight * sum(max(0.0, square - self.free**2) for square in squares)
 
     def add_slope(self, step: dressing.PlannedStep, slope: dressing.Slope) -> None:
-        """Adds its derivative by the forces of the held nodes."""
+        """Adds the derivative with respect to the forces of the held nodes."""
         for side, mine in enumerate(step.grip.of_side):
             force = step.force(side)
             slope.reaction[mine] += 2.0 * self.weight * force * (force @ force > self.free**2)

@@ -1,4 +1,4 @@
-"""Registers an effect, hides it in simulated data, and finds it: explain_own_effect.py."""
+"""Registers an effect, hides it in simulated data, and finds it."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class HemChain(explain.MassEffect):
         return self.mass * self.derivative("mass", sheet)
 
     def derivative(self, name: str, sheet: explain.Sheet) -> np.ndarray:
-        """Returns the derivative of that by the parameter."""
+        """Returns the derivative of the added mass with respect to the parameter."""
         height = sheet.rest_position[:, 2]
         area = np.where(height < height.min() + 0.06, sheet.elements.node_area, 0.0)
         return area / area.sum()
@@ -33,7 +33,7 @@ if __name__ == "__main__":
     explain.check_effect(HemChain)
     session = explain.Session(motions=["sway"], duration=1.6)
     lab = explain.simulate("measured", HemChain(mass=0.1), QUICK, session=session)
-    tried = ["air_drag", "surface_density", "hem_chain"]  # all effects without this line
+    tried = ["air_drag", "surface_density", "hem_chain"]  # without this: all effects
     found = explain.explain(lab.recordings, "measured", QUICK, effects=tried)
     for score in found.candidates:
         print(f"{score.name}: explains {score.screened:.0%} of the residual at first sight")

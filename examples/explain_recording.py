@@ -1,4 +1,4 @@
-"""Explains a recording that is given as arrays: explain_recording.py."""
+"""Explains a recording that is given as arrays."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ QUICK = ["plant.spacing=0.06", "plant.time_step=0.008", "plant.tolerance=2e-3"]
 
 
 def recorded() -> dict[str, Any]:
-    """Returns arrays as a lab has them; here a simulated one whose cameras are displaced."""
+    """Returns arrays of a lab; here the lab is simulated, with displaced cameras."""
     session = explain.Session(motions=["sway"], duration=1.6)
     lab = explain.simulate("measured", "camera_translation", QUICK, size=3.0, session=session)
     return {
@@ -24,7 +24,7 @@ if __name__ == "__main__":
     sway = explain.Measurement(**recorded(), name="sway")
     (checked,) = explain.check_recordings(sway, "measured", QUICK)
     print(f"{checked.duration:.1f} s, markers good to {1e3 * checked.marker_noise:.1f} mm")
-    tried = ["camera_translation", "rest_size", "surface_density"]  # all effects without this line
+    tried = ["camera_translation", "rest_size", "surface_density"]  # without this: all effects
     found = explain.explain(sway, "measured", QUICK, effects=tried)
     print(found)
     for cause in found.causes:

@@ -31,7 +31,7 @@ print(f"largest force {np.linalg.norm(solution.v, axis=1).max():.3f} N")
 print(f"largest speed {np.linalg.norm(solution.x[:, 2:], axis=1).max():.3f} m/s")
 print(f"nearest to the wall {solution.x[1:, 1].min():.3f} m")
 
-# one step later: from the solution before, and by its feedback gains in between
+# between two solves, the feedback gains respond to a measured error
 gains = control.feedback_gains(problem, solution)
 error = np.array([0.0, 0.01, 0.0, 0.0])
 print(f"an error of 1 cm changes the first force by {gains[0] @ error} N")

@@ -1,4 +1,4 @@
-"""Puts a predictor of one's own in place of the controllers' belief about the person's arms."""
+"""Replaces the controllers' prediction of the person's arms by your own predictor."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ class LastStep:
         self.asked = 0
 
     def predict(self, history: np.ndarray, time_step: float, steps: int) -> np.ndarray:
-        """Returns (steps+1,6,3) joints, m, of history (T,6,3), the newest last."""
+        """Returns joints (steps+1,6,3), m, from a history (T,6,3) with the newest sample last."""
         self.asked += 1
         velocity = np.nan_to_num(np.diff(history, axis=0)[-1]) / self.sample_period
         ahead = np.minimum(time_step * np.arange(steps + 1), 0.5)

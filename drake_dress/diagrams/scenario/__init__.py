@@ -1,4 +1,4 @@
-"""Scenarios: what a YAML file may say, and how it is read."""
+"""Scenarios: the keys of a YAML file, and how it is read."""
 
 from drake_dress.diagrams.scenario.loading import checked_scenario, load_scenario
 from drake_dress.diagrams.scenario.schema import Scenario

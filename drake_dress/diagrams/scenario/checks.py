@@ -1,4 +1,4 @@
-"""Holds the values of a scenario against each other."""
+"""Checks the values of a scenario against each other."""
 
 import dataclasses
 import math
@@ -21,7 +21,7 @@ from drake_dress.models.supervision.injection import sources_of
 
 
 def check_controller(source: str, controller: Controller) -> None:
-    """Holds periods, delays and steps of the controllers against each other."""
+    """Checks periods, delays and steps of the controllers against each other."""
     mpc = controller.global_mpc
     for name, part in (("global_mpc", mpc), ("local", controller.local)):
         if part.delay >= part.period:
@@ -47,7 +47,7 @@ def check_controller(source: str, controller: Controller) -> None:
 
 
 def check_safety(source: str, safety: Safety, command_period: float) -> None:
-    """Holds limits against each other."""
+    """Checks the safety limits against each other."""
     soft, least = safety.soft_force_limit, safety.least_distance
     if soft is not None and soft >= safety.force_limit:
         raise UserError(
@@ -91,7 +91,7 @@ def check_safety(source: str, safety: Safety, command_period: float) -> None:
 
 
 def check_hardware(source: str, station: Station) -> None:
-    """Holds what hardware asks for: arms, and a bus."""
+    """Checks the requirements of hardware: arms and a bus."""
     if station.kind == "hardware" and station.arms.model != "panda":
         raise UserError(
             source,
@@ -108,7 +108,7 @@ def check_hardware(source: str, station: Station) -> None:
 
 
 def check_cameras(source: str, scenario: Scenario) -> None:
-    """Holds cameras, and what faults name, against each other."""
+    """Checks the cameras, and the sources that faults name."""
     names: set[str] = set()
     for i, camera in enumerate(scenario.station.cameras):
         key = f"station.cameras[{i}]"
@@ -146,7 +146,7 @@ def check_cameras(source: str, scenario: Scenario) -> None:
 
 
 def check_behaviour(source: str, behaviour: Behaviour) -> None:
-    """Holds the motions against each other and against the kind of person."""
+    """Checks the motions against each other and against the kind of person."""
     key = "person.behaviour.motions"
     if behaviour.motions and behaviour.kind != "active":
         raise UserError(
@@ -199,7 +199,7 @@ def _check_speed(source: str, key: str, motion: Motion, max_hand_speed: float) -
 
 
 def check_costs(source: str, values: dict[str, dict[str, float]]) -> None:
-    """Holds a user's costs against what they take."""
+    """Checks that a user's costs accept their values."""
     try:
         registered_costs(values)
     except UserError as error:

@@ -1,16 +1,16 @@
-"""The coat that a scenario describes, in measures."""
+"""The measures of a scenario's coat."""
 
 from dataclasses import fields, replace
 
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.garment.coat import COATS, CoatParameters
 
-# Entries of the schema that are lengths.
+# Fields of `Coat` that are lengths.
 COAT_MEASURES = tuple(entry.name for entry in fields(Coat) if entry.default is None)
 
 
 def coat_parameters(coat: Coat) -> CoatParameters:
-    """Returns the preset with the measures that are given, all of them scaled."""
+    """Returns the preset's measures, replaced by given ones, all scaled."""
     parameters = COATS[coat.preset]
     measures = {}
     for name in COAT_MEASURES:

@@ -1,14 +1,14 @@
-"""How finely a scenario's garment is simulated, as one word.
+"""Presets of the resolution at which a scenario's garment is simulated.
 
-What each word costs, and how far it is off, is measured by `drake-dress bench plant`; the table
-stands in docs/cloth.md.
+`drake-dress bench plant` measures the cost and the error of each preset; docs/cloth.md has the
+table.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-# Values of `plant` by `plant.fidelity`, where the scenario gives none: m, s, and numbers.
+# Values of `plant` by `plant.fidelity`, for keys that the scenario does not give; m, s, numbers.
 FIDELITIES: dict[str, dict[str, float]] = {
     "fine": {
         "spacing": 0.02,
@@ -38,9 +38,9 @@ FIDELITIES: dict[str, dict[str, float]] = {
 
 
 def fill_in_fidelity(content: dict[str, Any]) -> None:
-    """Writes into a scenario's content what its fidelity says and the content does not.
+    """Adds the values of a scenario's fidelity for keys that its content does not give.
 
-    What is no group, or no fidelity, is left alone: it is told when types and words are looked at.
+    Values of a wrong type, and unknown words, are not changed. Later checks report them.
     """
     plant = content.setdefault("plant", {})
     if not isinstance(plant, dict):

@@ -1,8 +1,8 @@
 """Every key of a scenario, as a table: type, default, unit, allowed values and meaning.
 
 The schema is the only source. The meaning of a key is its entry in the `Attributes` of its group's
-docstring (`Args` for effects), the unit stands at the end of that entry's first sentence, and what
-is allowed is in `ranges.py`.
+docstring (`Args` for effects). The unit is at the end of that entry's first sentence. `ranges.py`
+has the allowed values.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _UNIT = re.compile(
     + r")(?=[.;:]|$| \()"
 )
 _TYPES = {float: "number", int: "whole number", str: "text", bool: "true or false"}
-# Names that the keys of a group of lists may have, by the group.
+# Allowed keys of a group of lists, by the group's name.
 _NAMES = {"loops": LOOP_NAMES, "grasp": SIDES}
 
 
@@ -43,11 +43,11 @@ class Key:
     """A key that holds a value.
 
     Attributes:
-        name: dotted, with `[]` after a list of groups.
-        type: in words.
-        default: as YAML writes it; empty where the key has none.
-        unit: SI, or empty.
-        allowed: range or choices, both ends allowed; empty where any value is.
+        name: dotted name, with `[]` after a list of groups.
+        type: type in words.
+        default: default as written in YAML; empty if there is none.
+        unit: SI unit, or empty.
+        allowed: choices, or a range that includes both ends; empty if any value is allowed.
         meaning: one or more sentences.
     """
 
@@ -64,10 +64,10 @@ class Group:
     """Keys that belong together.
 
     Attributes:
-        name: dotted, as of its keys; empty for the scenario itself.
-        meaning: what the group describes.
-        note: whether it may be left out, or given more than once; empty where it is always there.
-        keys: that hold values, in the schema's order.
+        name: dotted name; empty for the scenario itself.
+        meaning: subject of the group.
+        note: whether it is optional or a list; empty if it is always present once.
+        keys: keys that hold values, in the schema's order.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Group:
 
 
 def scenario_groups() -> tuple[Group, ...]:
-    """Returns all groups that hold values, in the schema's order, and then the effects."""
+    """Returns all groups that hold values, in the schema's order, followed by the effects."""
     plain_groups = (group for group in _groups("", Scenario, Scenario(), "") if group.keys)
     return (*plain_groups, *map(_effect_group, EFFECTS.values()))
 
@@ -88,7 +88,7 @@ def scenario_keys() -> tuple[Key, ...]:
 
 
 def markdown_table() -> str:
-    """Returns all keys as Markdown, a section and a table for each group."""
+    """Returns all keys as Markdown, with a section and a table for each group."""
     lines: list[str] = []
     for group in scenario_groups():
         lines += [f"## {f'`{group.name}`' if group.name else 'The scenario itself'}", ""]
@@ -112,7 +112,7 @@ def markdown_table() -> str:
 
 
 def _groups(name: str, schema: type, values: Any, note: str) -> Iterator[Group]:
-    """Yields a group and all groups below it; effects have no fields of their own in the schema."""
+    """Yields a group and all groups below it, except the effects, which are no schema fields."""
     hints = typing.get_type_hints(schema)
     doc = inspect.getdoc(schema.MODEL if issubclass(schema, Mirror) else schema) or ""
     texts = _entries(doc)
@@ -175,7 +175,7 @@ def _key(name: str, hint: Any, default: Any, text: str) -> Key:
 
 
 def _unwrapped(hint: Any) -> tuple[Any, bool, bool]:
-    """Returns what is in an optional or in a list, and whether it was in either."""
+    """Returns the type inside an optional or a list, and whether it was optional and a list."""
     optional = typing.get_origin(hint) in (typing.Union, types.UnionType)
     if optional:
         hint = next(t for t in typing.get_args(hint) if t is not type(None))
@@ -232,6 +232,6 @@ def _entries(doc: str) -> dict[str, str]:
 
 
 def _sentence(text: str) -> str:
-    """Returns a text that begins with a capital, but where it begins with a symbol or a name."""
+    """Returns the text with a capital first letter, unless it begins with a symbol or a name."""
     head = re.match(r"[a-z]+(?=[ ,])", text)
     return text if head is None else text[0].upper() + text[1:]

@@ -1,7 +1,7 @@
 """Reads scenarios.
 
-The file is held against the schema's types, filled in by Drake, and then held against ranges and
-against itself.
+The content of a file is checked against the schema's types and loaded by Drake. Then the values are
+checked against their ranges and against each other.
 """
 
 import dataclasses
@@ -39,7 +39,7 @@ def load_scenario(
     """Returns the scenario in `path`, with `KEY=VALUE` overrides and seed applied.
 
     Raises:
-        UserError: file, key or value cannot be used.
+        UserError: the file, a key or a value is unusable.
     """
     load_installed_plugins()
     source = str(path)
@@ -55,14 +55,14 @@ def load_scenario(
 
 
 def checked_scenario(scenario: Scenario, source: str = "scenario") -> Scenario:
-    """Returns a copy of a scenario that was made or changed in Python, held against all rules.
+    """Returns a copy of a scenario that was made or changed in Python, after all checks.
 
     Args:
-        scenario: as it is to be run.
-        source: named in messages.
+        scenario: scenario to check.
+        source: name of the scenario in messages.
 
     Raises:
-        UserError: a value cannot be used.
+        UserError: a value is unusable.
     """
     return _checked(source, read_yaml(source, resolved_yaml(scenario)))
 
@@ -123,9 +123,9 @@ def _override(content: dict[str, Any], key: str, text: str) -> None:
 
 
 def _resolve_delay(source: str, content: dict[str, Any]) -> None:
-    """Writes the delay that plans have on this machine in place of the word that asks for it.
+    """Replaces the word `measured` by the delay of plans on this machine.
 
-    The scenario that is logged has the number, so that its run can be repeated anywhere.
+    The logged scenario contains the number, so its run can be repeated on any machine.
     """
     place: Any = content
     for name in _DELAY.split(".")[:-1]:
@@ -142,12 +142,12 @@ def _resolve_delay(source: str, content: dict[str, Any]) -> None:
         )
     step = place.get("time_step", GlobalMpc.time_step)
     if not isinstance(step, int | float) or isinstance(step, bool) or not 0.0 < step < math.inf:
-        return  # told when types and ranges are looked at
+        return  # checks of types and ranges report it
     place["delay"] = round(step * max(1, math.ceil(seconds / step - 1e-9)), 9)
 
 
 def _fill_in_by_name(content: dict[str, Any]) -> None:
-    """Writes out every parameter of effects and costs that are given, in the order of the list."""
+    """Adds all parameters of the given effects and costs, in the order of their registration."""
     for key, schema_of in SCHEMAS.items():
         *parents, last = key.split(".")
         place: Any = content
@@ -164,7 +164,7 @@ def _fill_in_by_name(content: dict[str, Any]) -> None:
 
 
 def _move_force_limit(source: str, content: dict[str, Any], scenario: Scenario) -> None:
-    """Takes the limit from where it stood before there was a group `safety`."""
+    """Moves the limit from its old key to the group `safety`."""
     mpc = scenario.controller.global_mpc
     if mpc.force_limit is None:
         return

@@ -1,8 +1,8 @@
-"""Groups of a scenario that are the settings of a model, without a second list of them.
+"""Groups of a scenario that equal the settings of a model, without a second definition.
 
-A model's settings are a frozen dataclass; Drake's YAML loader fills plain ones, whose lists are
-lists. A mirror is such a dataclass with the fields and the defaults of the model's, so that each
-default has one home, the model.
+A model's settings are a frozen dataclass with tuples. Drake's YAML loader needs a plain dataclass
+with lists. A mirror is such a plain dataclass with the fields and defaults of the model's settings,
+so each default is defined only in the model.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Mirror:
 def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirror]], type[Any]]:
     """Returns a decorator that gives a class the fields of a model's settings.
 
-    Fields of the model that are settings themselves, or tuples of them, need a mirror with the
-    model as its `MODEL` beforehand.
+    If a field of the model is itself a settings class, or a tuple of them, the mirror of that class
+    must be defined first.
 
     Args:
         model: frozen dataclass or named tuple, all of whose fields have defaults.
@@ -57,11 +57,11 @@ def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirr
 
 
 def model_of(values: Mirror, **elsewhere: Any) -> Any:
-    """Returns the model's settings that a group of a scenario says.
+    """Returns the model's settings with the values of a scenario's group.
 
     Args:
-        values: of the group.
-        elsewhere: fields of the model that the group leaves out.
+        values: the group.
+        elsewhere: fields of the model that the group omits.
     """
     given = {e.name: _frozen(getattr(values, e.name)) for e in dataclasses.fields(values)}
     return values.MODEL(**given, **elsewhere)
@@ -88,7 +88,7 @@ def _plain_type(hint: Any) -> Any:
 
 
 def _field(default: Any) -> Any:
-    """Returns a dataclass's field that begins with a plain copy of a model's value."""
+    """Returns a dataclass field whose default is a plain copy of a model's value."""
     if isinstance(default, tuple) or type(default) in _MIRRORS:
         return dataclasses.field(default_factory=lambda: _plain(default))
     return dataclasses.field(default=default)

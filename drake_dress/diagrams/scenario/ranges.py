@@ -1,4 +1,4 @@
-"""Which words and numbers a scenario's values may be."""
+"""Allowed words and ranges of a scenario's values."""
 
 import re
 from dataclasses import fields
@@ -13,9 +13,9 @@ from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
 
-# What the lab reports of, beside its cameras.
+# Sources of the lab's messages, in addition to its cameras.
 SOURCES = ("left_arm", "right_arm", "garment", "person")
-# Words that a text may be (Drake's loader has no literal types).
+# Allowed words of text values (Drake's loader has no literal types).
 CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
@@ -37,8 +37,8 @@ CHOICES = {
     "station.arms.mode": ("position_velocity", "position", "velocity"),
 }
 
-# Ranges by the end of the dotted key, the longest counts, both ends allowed. Every number of the
-# schema has one.
+# Ranges, including both ends, by the end of the dotted key. The longest matching end counts. Every
+# number of the schema has a range.
 _RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63 - 1),
     "duration": (0.1, 86400.0),
@@ -105,7 +105,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "lab.faults.duration": (0.0, 1e4),
     "coat.scale": (0.7, 1.4),
     **{
-        f"coat.{name}": (0.0, 3.0)  # m; together they are checked as the coat is made
+        f"coat.{name}": (0.0, 3.0)  # m; checked together when the coat is made
         for name in (entry.name for entry in fields(Coat) if entry.default is None)
     },
     **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
@@ -124,7 +124,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "plant.body_time_step": (1e-4, 0.02),
     "plant.implicitness": (0.5, 1.0),
     "plant.buckling_wavelength": (0.0, 100.0),
-    # above, an arm that pushes is thrown back within a step
+    # beyond this, a pushing arm is thrown back within a step
     "plant.grasp_stiffness": (1.0, 1e4),
     "plant.iterations": (1, 1000),
     "plant.tolerance": (1e-10, 0.5),
@@ -202,7 +202,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "weights.passage": (0.0, 1e6),
     "weights.passage_radius": (0.0, 1.0),
     "weights.passage_length": (0.0, 2.0),
-    # shares, m and s, each wide of what was found useful
+    # shares, m and s, each much wider than the useful range
     **{
         f"stages.{name}": bounds
         for bounds, names in {
@@ -325,7 +325,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "variation.start_offset": (0.0, 0.3),
     "log.rate": (1.0, 250.0),
 }
-# Body sizes, m, and masses, kg: from a child of two to the largest adults measured, with room.
+# Body sizes, m, and masses, kg, with a margin: from a two-year-old child to the largest adults.
 _OF_MEASURES: dict[str, tuple[float, float]] = {
     "shoulder_height": (0.5, 2.2),
     "shoulder_width": (0.12, 0.65),
@@ -349,7 +349,7 @@ _RANGES |= {f"measures.{name}": bounds for name, bounds in _OF_MEASURES.items()}
 
 
 def choices_of(key: str) -> tuple[str, ...] | None:
-    """Returns what the text at a dotted key may be, if not anything."""
+    """Returns the allowed words at a dotted key; None if any text is allowed."""
     if key == "controller.predictor":
         return tuple(PREDICTORS)
     return CHOICES.get(plain(key))
@@ -361,7 +361,7 @@ def plain(key: str) -> str:
 
 
 def range_of(key: str) -> tuple[float, float] | None:
-    """Returns the range of the number at a dotted key, both ends allowed, if it has one."""
+    """Returns the range of the number at a dotted key, including both ends, if there is one."""
     group, *rest = key.split(".")
     if group == "effects":
         return _range_of_effect(*rest) if len(rest) == 2 else None
@@ -371,12 +371,12 @@ def range_of(key: str) -> tuple[float, float] | None:
 
 
 def _range_of_effect(name: str, parameter: str) -> tuple[float, float] | None:
-    """Returns the range of an effect's parameter or, by the name with `_std`, of its deviation."""
+    """Returns the range of an effect's parameter or, with `_std`, of its standard deviation."""
     kind = EFFECTS.get(name)
     for p in kind.parameters() if kind else ():
         if parameter == p.name:
             return p.low, p.high
         if parameter == f"{p.name}_std":
-            # a parameter that data hardly tell may have a deviation far beyond its own range
+            # a poorly observable parameter may have a deviation far beyond its own range
             return 0.0, 100.0 * (p.high - p.low)
     return None

@@ -1,9 +1,9 @@
-"""What a scenario's YAML may say: plain dataclasses, which Drake's `yaml_load_typed` fills.
+"""The keys of a scenario's YAML: plain dataclasses that Drake's `yaml_load_typed` fills.
 
-Where a model has a setting, too, the default is the model's: groups that are a model's settings
-mirror them, others refer to them. `tests/diagrams/test_defaults.py` checks both against each other.
+If a model also has a setting, its default is the model's. Groups that equal a model's settings
+mirror them, and others refer to them. `tests/diagrams/test_defaults.py` compares both.
 
-The docstring of each group says what its keys mean. `key_table.py` makes the table of all keys from
+The docstring of each group describes its keys. `key_table.py` makes the table of all keys from
 it. The first sentence of an entry ends with the unit: "greatest speed of a gripper, m/s."
 """
 
@@ -33,7 +33,7 @@ from drake_dress.models.supervision.person_belief import PersonBounds
 from drake_dress.models.supervision.person_pose import PoseBounds
 from drake_dress.models.supervision.supervision import Patience
 
-# By name, then by parameter: of a section that users add to, see `SCHEMAS`.
+# Values by name, then by parameter, of a section that users can extend; see `SCHEMAS`.
 ValuesByName = dict[str, dict[str, float]]
 
 _STANDARD = FIDELITIES["standard"]
@@ -44,24 +44,24 @@ _SAFETY = safety.SafetyLimits
 
 @dataclass
 class Coat:
-    """A parametric coat: a preset, of which single measures may be replaced.
+    """A parametric coat: a preset whose single measures may be replaced.
 
     Attributes:
-        preset: pattern whose measures are used where none is given.
-        scale: factor on all lengths, given ones included.
-        body_length: from the shoulder tips to the hem, m. The preset's if empty, as all measures
-            below.
+        preset: pattern that supplies the measures that are not given.
+        scale: factor on all lengths, including given ones.
+        body_length: length from the shoulder tips to the hem, m. If empty, the preset's value; the
+            same holds for all measures below.
         chest: chest girth, m.
-        shoulder_width: from shoulder tip to shoulder tip, m.
-        sleeve_length: from shoulder tip to cuff, m.
+        shoulder_width: distance between the shoulder tips, m.
+        sleeve_length: length from shoulder tip to cuff, m.
         armhole_girth: girth of each armhole, m.
         cuff_girth: girth of each cuff, m.
         collar_height: height of the collar, m.
-        neck_width: between the inner ends of the shoulder seams, m.
+        neck_width: distance between the inner ends of the shoulder seams, m.
         shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
-        front_opening: gap between the front edges, which is part of the chest girth, m.
-        grasp: what each gripper holds. `patch` is a patch of 7 cm across, at least four nodes;
-            `seam` is the whole shoulder seam, as on a hanger.
+        front_opening: gap between the front edges, part of the chest girth, m.
+        grasp: part of the coat that each gripper holds. `patch` is a patch 7 cm across with at
+            least four nodes; `seam` is the whole shoulder seam, as on a hanger.
     """
 
     preset: str = "overcoat"
@@ -81,20 +81,20 @@ class Coat:
 
 @dataclass
 class Mesh:
-    """A garment of the user's own, which takes the place of the coat.
+    """A user's own garment, which replaces the coat.
 
     Attributes:
         file: OBJ, PLY or STL file, relative to the scenario.
         unit: unit of the file's coordinates.
         scale: factor on all coordinates, in addition to the unit.
         up: axis of the file that points up. With `z` the garment faces +x, with `y` +z, with `x`
-            +y; a minus sign turns it upside down.
-        weld: distance across which edges of seams are sewn, m. With 0 only nodes at the same place
-            are joined.
-        leave_out: names of objects or groups to leave out, or sizes such as `<0.05 m`, below which
-            connected parts are left out.
+            +y; a minus sign is for files that are upside down.
+        weld: distance across which edges of seams are joined, m. With 0 only nodes at the same
+            position are merged.
+        leave_out: names of objects or groups to omit, or sizes such as `<0.05 m`, below which
+            connected parts are omitted.
         loops: node indices in order around each opening, by the opening's name. Openings that are
-            not given are searched for.
+            not given are detected.
         grasp: node indices that each gripper holds, by side. By default ten nodes near each
             shoulder tip.
     """
@@ -115,7 +115,7 @@ class Garment:
 
     Attributes:
         coat: parametric coat.
-        mesh: garment from a file; it takes the place of the coat.
+        mesh: garment from a file; it replaces the coat.
     """
 
     coat: Coat = field(default_factory=Coat)
@@ -153,9 +153,9 @@ class Arm:
     """Rest pose of an arm. With all angles zero it hangs straight down.
 
     Attributes:
-        abduction_deg: raised sideways, degrees.
-        extension_deg: drawn backward, degrees.
-        rotation_deg: turned about its own axis, degrees.
+        abduction_deg: sideways elevation, degrees.
+        extension_deg: backward extension, degrees.
+        rotation_deg: rotation about the arm's own axis, degrees.
         elbow_deg: elbow flexion, degrees.
     """
 
@@ -184,18 +184,18 @@ class Joints:
 
 @mirror_of(following.FollowingParameters)
 class Following(Mirror):
-    """How a person gives way who lets the garment lead; see models/human/following.py."""
+    """How a person's arms follow the garment; see models/human/following.py."""
 
 
 @dataclass
 class Reach:
-    """The hand goes into the sleeve once its armhole is near.
+    """The hand reaches into the sleeve once the armhole is near.
 
     Attributes:
         side: hand that reaches.
         start: earliest time, s.
         within: distance from hand to armhole at which the reach begins, m.
-        push: how far the hand goes beyond the armhole before it follows the garment, m.
+        push: distance that the hand goes beyond the armhole before it follows the garment, m.
     """
 
     side: str = "both"
@@ -221,13 +221,13 @@ class Turn:
 
 @dataclass
 class Withdraw:
-    """The hand is drawn to the side of the body for a while, then goes back.
+    """The hand withdraws to the side of the body for a while, then returns.
 
     Attributes:
         side: hand that withdraws.
         start: time at which the hand begins to withdraw, s.
         duration: time from the start until the hand begins to return, s.
-        distance: horizontal distance that the hand is drawn back, m.
+        distance: horizontal distance of the withdrawal, m.
     """
 
     side: str = "both"
@@ -238,13 +238,13 @@ class Withdraw:
 
 @dataclass
 class Wave:
-    """The hand moves to and fro sideways.
+    """The hand swings sideways.
 
     Attributes:
         side: hand that waves.
         start: time at which the wave begins, s.
         duration: duration of the wave, s.
-        amplitude: half of the distance to and fro, m.
+        amplitude: half of the swing's width, m.
         frequency: frequency of the wave, Hz.
     """
 
@@ -257,13 +257,13 @@ class Wave:
 
 @dataclass
 class Motion:
-    """One motion of an active person. Exactly one of these is given.
+    """One motion of an active person. Give exactly one of these.
 
     Attributes:
-        reach: the hand goes into the sleeve.
+        reach: the hand reaches into the sleeve.
         turn: the body turns.
-        withdraw: the hand is drawn back for a while.
-        wave: the hand moves to and fro.
+        withdraw: the hand withdraws for a while.
+        wave: the hand swings sideways.
     """
 
     reach: Reach | None = None
@@ -274,19 +274,19 @@ class Motion:
 
 @mirror_of(tremor.TremorParameters)
 class Tremor(Mirror):
-    """Shaking of both hands; 4 to 12 Hz and up to 2 cm, see models/human/tremor.py."""
+    """Tremor of both hands, 4 to 12 Hz and up to 2 cm; see models/human/tremor.py."""
 
 
 @dataclass
 class Behaviour:
-    """What the person does on their own. The controller is not told.
+    """The person's own motions. The controller does not know them.
 
     Attributes:
         kind: `dummy` has springs about the rest pose, `passive` follows the garment, `active`
-            performs the listed motions and follows between them.
-        following: how a passive or active person follows.
+            performs the listed motions and follows the garment between them.
+        following: how a passive or active person follows the garment.
         motions: motions of an active person.
-        max_hand_speed: greatest speed of a hand's own motions, m/s.
+        max_hand_speed: greatest hand speed of the person's own motions, m/s.
         max_joint_speed: greatest joint speed of the person's own motions, rad/s.
         tremor: tremor of both hands; none if empty.
     """
@@ -309,7 +309,7 @@ class Person:
         left_arm: rest pose of the left arm.
         right_arm: rest pose of the right arm.
         joints: springs and dampers of the arm joints.
-        behaviour: what the person does.
+        behaviour: the person's own motions.
     """
 
     posture: str = "standing"
@@ -322,25 +322,25 @@ class Person:
 
 @dataclass
 class Plant:
-    """The simulated garment and person: the truth of a run.
+    """The simulated garment and person: the true state of a run.
 
     Attributes:
         fidelity: preset for spacing, time_step, body_time_step, implicitness, buckling_wavelength
-            and tolerance where these are not given; see fidelity.py.
+            and tolerance if these are not given; see fidelity.py.
         spacing: edge length of the garment's mesh, m.
         time_step: time step of the garment, s.
         body_time_step: time step of robot arms, grippers and the person's joints, s.
         integrator: `implicit` is linearly implicit; `projective_dynamics` is solved to convergence
-            and takes some thirty times as long.
-        implicitness: blend of the implicit integrator: 1 is implicit Euler, which damps more the
-            longer the step; values near 0.5 are second order and may jitter.
+            and takes about thirty times as long.
+        implicitness: blend of the implicit integrator. 1 is implicit Euler, whose damping grows
+            with the time step; values near 0.5 are second order and may jitter.
         buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression
             that would buckle at shorter wavelengths is relaxed; 0 turns this off.
         iterations: iteration limit of the implicit integrator's linear solver.
         tolerance: relative residual at which the linear solver stops.
         self_collision: whether layers of the garment collide with each other.
-        grasp_stiffness: stiffness of arm and grasp where the person pushes against the held cloth,
-            N/m. The default is the translational stiffness of libfranka's impedance examples.
+        grasp_stiffness: stiffness of arm and grasp against a person who pushes the held cloth, N/m.
+            The default is the translational stiffness of libfranka's impedance examples.
         material: fabric of the simulated garment.
     """
 
@@ -360,7 +360,7 @@ class Plant:
 
 @mirror_of(costs.Weights)
 class Weights(Mirror):
-    """Of the global controller's costs; see models/control/costs.py."""
+    """Weights of the global controller's costs; see models/control/costs.py."""
 
 
 @mirror_of(task_parameters.Approach)
@@ -375,7 +375,7 @@ class Stages(Mirror):
 
 @mirror_of(task_parameters.TaskParameters, without=("progress_rate", "approach_distance", "stages"))
 class Tasks(Mirror):
-    """Where the sleeves are sent; see models/control/task_parameters.py."""
+    """Targets of the sleeves; see models/control/task_parameters.py."""
 
 
 @dataclass
@@ -385,21 +385,21 @@ class GlobalMpc:
     Attributes:
         period: time between solves, s.
         delay: time from the observation to the use of the plan, s. A multiple of `time_step`, or
-            `measured`: the shortest such delay that 95 % of the solves keep on this machine, found
-            by `drake-dress bench delay`.
+            `measured`: the shortest such delay that 95 % of the solves keep on this machine, as
+            measured by `drake-dress bench delay`.
         time_step: time step of the prediction, s.
         horizon: number of prediction steps.
         max_iterations: gradient steps per solve, at most.
-        budget: iterations of linear solves that one solve may spend, of 0.1 to 0.2 ms each. The
-            best plan so far is used when they are spent. Unlimited if empty. On hardware a solve
-            has `delay_share` of its delay instead.
+        budget: iterations of linear solves that one solve may use, of 0.1 to 0.2 ms each. When
+            they are used up, the best plan so far is taken. Unlimited if empty. On hardware
+            `delay_share` limits the time instead.
         delay_share: share of the delay that a solve may take on hardware.
         inner_iterations: iterations of the garment's linear solve per prediction step; 1 is the
             paper's scheme.
         max_speed: greatest planned speed of a gripper, m/s.
         weights: weights of the stage costs.
-        progress_step: advance of the dressing coordinate s that is asked for in each prediction
-            step (k in the paper).
+        progress_step: requested advance of the dressing coordinate s in each prediction step (k in
+            the paper).
         approach_distance: upper bound of l_h, the distance before the hand at which a sleeve is
             prepared, m.
         waiting_progress: lowest s at which a sleeve waits for the other one.
@@ -437,12 +437,13 @@ class Local:
         stretch: usable share of the distances that the garment can span.
         beside: greatest lateral distance of a dressed sleeve from its arm, m.
         beside_speed: greatest lateral speed of a dressed sleeve, m/s.
-        return_speed: speed at which violated bounds are restored where nothing is planned, m/s.
-        dragged: distance by which the garment alone may push a hand from where the plan expected
-            it, m. Only what goes beyond is followed.
+        return_speed: speed at which violated bounds are restored without a plan, m/s.
+        dragged: deviation of a hand from its predicted position that is attributed to the garment,
+            m. Only a deviation beyond it is followed.
         prepare_correction: share of a sleeve's deviation from the plan that is corrected while the
             sleeve is prepared.
-        dress_correction: the same while the sleeve is drawn up the arm.
+        dress_correction: share of the deviation that is corrected while the sleeve is drawn up the
+            arm.
         taut_share: share of the garment's span from one gripper above which a sleeve also follows
             the other gripper.
         coupled_share: share of the span between the armholes above which the sleeves are coupled.
@@ -481,7 +482,7 @@ class ConstantVelocity(Mirror):
 
 @dataclass
 class Controller:
-    """What the controllers assume and how they act.
+    """The controllers and their assumptions.
 
     Attributes:
         spacing: edge length of the controller's garment mesh, m.
@@ -513,7 +514,7 @@ class Controller:
 
 @dataclass
 class Workspace:
-    """A box in the world frame that the grippers' commands stay in.
+    """A box in the world frame that limits the grippers' commands.
 
     Attributes:
         low: lower corner x, y, z, m.
@@ -532,8 +533,9 @@ class Safety:
         max_speed: greatest speed of a gripper's command, m/s.
         max_acceleration: greatest ordinary acceleration of a command, m/s².
         max_braking: greatest acceleration where other limits need it; never exceeded, m/s².
-        force_limit: force above which a gripper does not pull and gives way, N.
-        soft_force_limit: force above which pulling fades, N. Half of `force_limit` if empty.
+        force_limit: force above which a gripper stops pulling and gives way, N.
+        soft_force_limit: force above which the pulling speed is reduced, N. Half of `force_limit`
+            if empty.
         force_filter_time: time constant of the force's low-pass filter, s.
         yield_rate: speed of giving way per newton beyond the limit, m/s/N.
         yield_speed: greatest speed of giving way, m/s.
@@ -545,7 +547,7 @@ class Safety:
         held_distance: smallest distance of the held cloth from the skin, m. A fold fits in between.
         least_distance: smallest distance between the grippers, m.
         largest_distance: greatest distance between the grippers, m. Unlimited if empty.
-        workspace: box that commands stay in; unlimited if empty.
+        workspace: box that limits the commands; unlimited if empty.
     """
 
     max_speed: float = _SAFETY.max_speed
@@ -582,7 +584,7 @@ class Gripper:
 
 @dataclass
 class Start:
-    """Where the coat hangs at the start, relative to the midpoint of the shoulders.
+    """Initial position of the coat, relative to the midpoint of the shoulders.
 
     Attributes:
         distance_behind: distance behind the person, m.
@@ -602,7 +604,7 @@ class ResolvedRate(Mirror):
 
 @dataclass
 class Arms:
-    """What carries the grippers.
+    """The arms that carry the grippers.
 
     Attributes:
         model: `floating` grippers, or two `panda` arms behind the person.
@@ -611,7 +613,7 @@ class Arms:
         height_offset: height of both bases above the person's shoulders, m.
         tilt_deg: downward tilt of the hands, which point forward, degrees.
         rate: rate of the joint commands, Hz.
-        mode: what a joint command contains: position and velocity, or one of them.
+        mode: content of a joint command: position and velocity, or one of them.
         resolved_rate: control of the joints.
     """
 
@@ -627,18 +629,17 @@ class Arms:
 
 @dataclass
 class Beliefs:
-    """Plausibility bounds on hardware messages. The arms hold where a message exceeds one.
+    """Plausibility bounds on hardware messages. The arms hold if a message exceeds one.
 
     Attributes:
-        joint_leap: joint motion between two arm messages beyond what the speed limit allows, rad.
+        joint_leap: joint motion between two arm messages beyond that at the speed limit, rad.
         torque_share: external torque on a joint, as a multiple of its torque limit.
         point_error: error of a reported point of the person, m. Body trackers reach 1 to 3 cm.
         limb_share: relative difference between real limbs and the scenario's measures.
-        shoulder_distance: distance of the midpoint between the shoulders from where the scenario
-            has it, m.
-        turn_deg: turn of the shoulders about the vertical axis, degrees.
+        shoulder_distance: distance of the shoulders' midpoint from its position in the scenario, m.
+        turn_deg: rotation of the shoulders about the vertical axis, degrees.
         joint_room_deg: angle by which a supple person's joints may exceed the limits, degrees.
-        person_speed: speed of a point of the person, m/s. Covers a hand that is pulled back in
+        person_speed: speed of a point of the person, m/s. It allows a hand that is pulled back in
             alarm.
         frozen_time: time for which a noisy point may stay exactly the same, s. Real trackers have
             noise; 0 turns the check off.
@@ -675,7 +676,7 @@ class Beliefs:
 
 @dataclass
 class Hardware:
-    """The message bus of a hardware station, and of the lab that `drake-dress sim-station` plays.
+    """The message bus of a hardware station, and of the lab of `drake-dress sim-station`.
 
     Attributes:
         lcm_url: address of the LCM bus. `ttl=0` keeps messages on this machine.
@@ -744,14 +745,14 @@ class Camera:
 
 @dataclass
 class Station:
-    """Robots, or their simulation.
+    """The robots, or their simulation.
 
     Attributes:
-        kind: `simulated`, or `hardware`: the same ports behind LCM messages.
-        arms: what carries the grippers.
+        kind: `simulated`, or `hardware`, which has the same ports behind LCM messages.
+        arms: the arms that carry the grippers.
         hardware: message bus.
         gripper: limits of floating grippers.
-        start: where the coat hangs at the start.
+        start: initial position of the coat.
         cameras: cameras of the station.
     """
 
@@ -765,12 +766,12 @@ class Station:
 
 @dataclass
 class LabFault:
-    """A fault in the lab that `drake-dress sim-station` plays.
+    """A fault in the lab of `drake-dress sim-station`.
 
     Attributes:
         kind: kind of the fault; see models/supervision/injection.py.
-        source: source that is faulty: `left_arm`, `right_arm`, `garment`, `person` or
-            `camera_NAME`. A lost bus affects all.
+        source: faulty source: `left_arm`, `right_arm`, `garment`, `person` or `camera_NAME`. A lost
+            bus affects all.
         start: time after the first command, s.
         duration: duration of the fault, s.
     """
@@ -783,13 +784,13 @@ class LabFault:
 
 @dataclass
 class Lab:
-    """The lab that `drake-dress sim-station` plays. A run does not know of it.
+    """The lab of `drake-dress sim-station`. A run does not use these keys.
 
     Attributes:
         faults: faults to inject.
         stale_command: age of commands at which the arms stop by themselves, s.
         wait: time to wait for the first command, s.
-        rest: time after the last command until the lab closes, s.
+        rest: time from the last command until the lab closes, s.
         push: force of a fault of kind `push`, N.
         person_noise: standard deviation of the person's reported points on each axis, m. No real
             tracker repeats itself exactly.
@@ -805,14 +806,14 @@ class Lab:
 
 @dataclass
 class Variation:
-    """What the seed draws, uniformly within plus or minus these widths.
+    """Quantities that the seed draws, uniformly within plus or minus these widths.
 
     Attributes:
         arm_angle_deg: width on abduction, extension and elbow of each arm, degrees.
         coat_scale: relative width on all lengths of the garment at once.
-        coat_measures: relative width on each measure of the coat by itself.
+        coat_measures: relative width on each measure of the coat independently.
         person_scale: relative width on all body lengths at once; masses scale with the cube.
-        person_measures: relative width on each body measure by itself.
+        person_measures: relative width on each body measure independently.
         plant_stiffness: relative width on stretch and bending stiffness.
         plant_friction: relative width on friction.
         start_offset: width on each of the three start offsets, m.
@@ -833,19 +834,19 @@ def _effect_schema(effect: type[Effect]) -> type:
     entries: list[tuple[str, Any, Any]] = []
     for p in effect.parameters():
         entries.append((p.name, float, field(default=p.off)))
-        # as `drake-dress explain` found it; not used by the simulation
+        # As `drake-dress explain` found it; the simulation does not use it.
         entries.append((f"{p.name}_std", float, field(default=0.0)))
     return dataclasses.make_dataclass(effect.__name__, entries)
 
 
 def effects_schema() -> type:
-    """Returns a dataclass with every effect that is known now, those that users registered too."""
+    """Returns a dataclass with all effects registered so far, including those of users."""
     entries = [(n, _effect_schema(e) | None, field(default=None)) for n, e in EFFECTS.items()]
     return dataclasses.make_dataclass("Effects", entries)
 
 
 def costs_schema() -> type:
-    """Returns a dataclass with every cost that users registered until now."""
+    """Returns a dataclass with all costs that users have registered so far."""
     entries: list[tuple[str, Any, Any]] = []
     for name, kind in COSTS.items():
         below = [(f.name, float, field(default=f.default)) for f in dataclasses.fields(kind)]
@@ -853,7 +854,7 @@ def costs_schema() -> type:
     return dataclasses.make_dataclass("Costs", entries)
 
 
-# Sections whose names are those that are known when a scenario is read.
+# Sections whose keys are the names that are registered when a scenario is read.
 SCHEMAS: dict[str, Callable[[], type]] = {
     "effects": effects_schema,
     "controller.costs": costs_schema,
@@ -862,7 +863,7 @@ SCHEMAS: dict[str, Callable[[], type]] = {
 
 @dataclass
 class Log:
-    """What is logged during a run.
+    """The log of a run.
 
     Attributes:
         rate: samples per second of simulated time, Hz.
@@ -876,7 +877,7 @@ class Scenario:
     """One run.
 
     Attributes:
-        seed: seed of everything that is drawn.
+        seed: seed of all random draws.
         duration: longest simulated time, s.
         garment: pattern of the garment.
         person: the person who is dressed.
@@ -884,9 +885,9 @@ class Scenario:
         controller: controllers.
         safety: limits of the safety governor.
         station: robots.
-        lab: lab that `drake-dress sim-station` plays.
-        variation: what the seed varies.
-        log: what is logged.
+        lab: the lab of `drake-dress sim-station`.
+        variation: quantities that the seed varies.
+        log: the log of the run.
         effects: physical effects beyond the plain simulation, each with its parameters. An effect
             that is not given is off.
     """

@@ -1,4 +1,4 @@
-"""A whole scenario as text."""
+"""A complete scenario as text."""
 
 import yaml
 from pydrake.common.yaml import yaml_dump_typed
@@ -8,5 +8,5 @@ from drake_dress.yaml_text import write_yaml
 
 
 def resolved_yaml(scenario: Scenario) -> str:
-    """Returns the whole scenario as YAML that loads to the same."""
+    """Returns the complete scenario as YAML that loads to an equal scenario."""
     return write_yaml(yaml.safe_load(yaml_dump_typed(scenario)))

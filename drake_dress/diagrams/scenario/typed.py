@@ -1,4 +1,4 @@
-"""Holds what a YAML file says against the schema, so that a mistake is told with its dotted key."""
+"""Checks the content of a YAML file against the schema; errors name the dotted key."""
 
 import dataclasses
 import difflib
@@ -14,7 +14,7 @@ from drake_dress.models.effects.registry import HOW_TO_LOAD
 
 
 def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
-    """Returns the type of a dataclass's field, or says which names there are."""
+    """Returns the type of a dataclass's field; an error lists the valid names."""
     schema = _without_none(schema)
     dotted = f"{key}.{name}" if key else str(name)
     if not dataclasses.is_dataclass(schema):
@@ -32,7 +32,7 @@ def field_type(source: str, key: str, name: Any, schema: Any) -> Any:
 
 
 def typed(source: str, key: str, value: Any, schema: Any) -> Any:
-    """Holds a value read from YAML against a type; returns it, numbers as numbers."""
+    """Checks a value read from YAML against a type, and returns it."""
     if value is None and _takes_none(schema):
         return None
     schema = _without_none(schema)
@@ -60,7 +60,7 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
 
 
 def _check_plain(source: str, key: str, value: Any, schema: Any) -> None:
-    """Holds a number or a text against its type."""
+    """Checks a number or a text against its type."""
     if schema is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise UserError(source, key, f"is {kind_of(value)}, expected a number")
@@ -76,7 +76,7 @@ def _check_plain(source: str, key: str, value: Any, schema: Any) -> None:
 
 
 def check_ranges(source: str, key: str, value: Any) -> None:
-    """Holds all numbers from a dotted key on against their ranges; all others must be finite."""
+    """Checks all numbers below a dotted key: they must be finite and within their ranges."""
     if dataclasses.is_dataclass(value):
         for entry in dataclasses.fields(value):
             inner = f"{key}.{entry.name}" if key else entry.name
@@ -106,7 +106,7 @@ def _without_none(schema: Any) -> Any:
 
 
 def kind_of(value: Any) -> str:
-    """Returns what was given, in words."""
+    """Returns a description of a given value."""
     if value is None:
         return "empty"
     if isinstance(value, dict):

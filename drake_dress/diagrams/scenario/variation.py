@@ -1,6 +1,6 @@
-"""Draws what a scenario's seed varies: pose, coat, person, fabric and start.
+"""Draws the quantities that a scenario's seed varies: pose, coat, person, fabric and start.
 
-Each group of keys has draws of its own, so that a width of one does not change what another draws.
+Each group of keys has its own generator, so the widths of one group do not change another's draws.
 """
 
 import copy
@@ -12,14 +12,14 @@ import numpy as np
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
 from drake_dress.diagrams.scenario.schema import Coat, Measures, Scenario, Variation
 
-# Of the groups that came after the first, beside the seed.
+# Added to the seed for the generators of the later groups.
 _COAT, _PERSON = 1, 2
 
 Draw = Callable[[float], float]
 
 
 def apply_variation(scenario: Scenario) -> Scenario:
-    """Returns the scenario with what its seed draws written in and no variation left."""
+    """Returns the scenario with the values that its seed draws, and without variation."""
     drawn = copy.deepcopy(scenario)
     v, draw = scenario.variation, _uniform(scenario.seed)
     for arm in (drawn.person.left_arm, drawn.person.right_arm):
@@ -55,7 +55,7 @@ def _vary_coat(coat: Coat, width: float, draw: Draw) -> None:
 def _vary_person(measures: Measures, v: Variation, draw: Draw) -> None:
     scale = 1.0 + draw(v.person_scale)
     for entry in fields(measures):
-        # a body that is larger by a tenth in all lengths weighs a third more
+        # a body that is a tenth larger in all lengths weighs a third more
         whole = scale**3 if entry.name.endswith("mass") else scale
         own = 1.0 + draw(v.person_measures)
         setattr(measures, entry.name, getattr(measures, entry.name) * whole * own)
