@@ -17,7 +17,7 @@ from drake_dress.report import report_html
 from drake_dress.discrepancy import report
 assert "matplotlib" not in sys.modules
 from drake_dress.drawing import plain_settings
-from drake_dress.systems.garment_visualizer import _text_mesh
+from drake_dress.report.scene import _text_mesh
 with plain_settings():
     figure, (ax,) = chart(4.0, 2.0)
     ax.plot([0, 1], [1, 0], label="line")

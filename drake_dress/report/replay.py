@@ -16,8 +16,8 @@ from drake_dress.models.arm.description import link_meshes
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
+from drake_dress.report.scene import DressingScene
 from drake_dress.report.web_page import open_page
-from drake_dress.systems.garment_visualizer import DressingScene
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
 _ARM = Rgba(0.90, 0.91, 0.92, 1.0)

@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
-from pydrake.geometry import Box, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
+from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from drake_dress.drawing import new_figure, pixels, plain_settings
-from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.sides import SIDES
-
-STAGE_NAMES = ("prepare", "dress", "done")
-UNLISTED = Rgba(0.22, 0.44, 0.70, 1.0)
-LINING = Rgba(0.87, 0.62, 0.28, 1.0)
-_GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)
-_TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1.0)}
-_TEXT = Rgba(0.1, 0.12, 0.15, 1.0)
-_TEXT_HEIGHT = 0.07  # m
-_TEXT_ABOVE = 0.5  # m above the garment, clear of a head
+from drake_dress.models.arrays import IntArray
+from drake_dress.report.scene import DressingScene
 
 
 class GarmentVisualizer(LeafSystem):
@@ -75,97 +63,3 @@ class GarmentVisualizer(LeafSystem):
         if self._stage.HasValue(context):
             self._scene.show_stage(self._stage.Eval(context))
         return EventStatus.Succeeded()
-
-
-class DressingScene:
-    """Draws everything except the person in Meshcat, both live and in the replay.
-
-    Args:
-        meshcat: Meshcat instance to draw in.
-        faces: (3,F) triangles, as Meshcat expects them.
-        path: Path in Meshcat's tree under which everything is drawn.
-
-    Attributes:
-        label: Text that shows the stages.
-    """
-
-    def __init__(self, meshcat: Meshcat, faces: IntArray, path: str) -> None:
-        self._meshcat = meshcat
-        self._faces = faces
-        self._path = path
-        self._drawn: set[str] = set()
-        self._label_at: FloatArray | None = None
-        self.label = ""
-        # import the text renderer and find its fonts now, not while arms move
-        _text_mesh("left", _TEXT_HEIGHT)
-
-    def show_garment(self, position: FloatArray) -> None:
-        """Draws the garment from its nodes (n,3), m; outside and lining differ in colour."""
-        vertices = np.asfortranarray(position.T)
-        if self._label_at is None and np.isfinite(position).all():
-            self._label_at = position.mean(axis=0)
-            self._label_at[2] = position[:, 2].max() + _TEXT_ABOVE
-        # Two one-sided meshes, not one double-sided mesh, so that inside and outside differ.
-        for name, color, side in (
-            ("outside", UNLISTED, Meshcat.SideOfFaceToRender.kFrontSide),
-            ("lining", LINING, Meshcat.SideOfFaceToRender.kBackSide),
-        ):
-            self._meshcat.SetTriangleMesh(
-                f"{self._path}/garment/{name}", vertices, self._faces, color, side=side
-            )
-
-    def show_grippers(self, position: FloatArray) -> None:
-        """Draws the grippers (2,3), m."""
-        for side, p in zip(SIDES, position, strict=True):
-            self._place(f"{self._path}/gripper/{side}", Box(0.05, 0.05, 0.05), _GRIPPER, p)
-
-    def show_targets(self, position: FloatArray) -> None:
-        """Draws the target positions (2,3) of the armholes, m; NaN hides one."""
-        for side, p in zip(SIDES, position, strict=True):
-            self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
-
-    def show_stage(self, stage: npt.ArrayLike) -> None:
-        """Writes the stages (2,) of left and right above the garment's first position."""
-        names = [STAGE_NAMES[int(np.clip(s, 0, 2))] for s in np.ravel(np.asarray(stage))]
-        label = f"left: {names[0]}   right: {names[1]}"
-        if label == self.label or self._label_at is None:
-            return
-        self.label = label
-        # Meshcat has no text, so its pixels are drawn: once readable from the front, once from
-        # behind, each with the person's left on the side where the viewer sees it.
-        written = f"right: {names[1]}   left: {names[0]}"
-        for name, text, toward in (("front", written, 1.0), ("back", label, -1.0)):
-            flat, triangles = _text_mesh(text, _TEXT_HEIGHT)
-            vertices = np.zeros((3, flat.shape[1]), order="F")
-            vertices[1], vertices[2] = toward * flat[0], flat[1]
-            vertices += self._label_at[:, None]
-            side = Meshcat.SideOfFaceToRender.kFrontSide
-            path = f"{self._path}/stage/{name}"
-            self._meshcat.SetTriangleMesh(path, vertices, triangles, _TEXT, side=side)
-
-    def _place(self, path: str, shape: Box | Sphere, color: Rgba, p: FloatArray) -> None:
-        visible = bool(np.isfinite(p).all())
-        if path not in self._drawn:
-            self._meshcat.SetObject(path, shape, color)
-            self._drawn.add(path)
-        self._meshcat.SetProperty(path, "visible", visible)
-        if visible:
-            self._meshcat.SetTransform(path, RigidTransform(p))
-
-
-@plain_settings()
-def _text_mesh(text: str, height: float) -> tuple[FloatArray, IntArray]:
-    """Returns centred points (2,k), m, and triangles (3,t) that cover the pixels of a text."""
-    figure = new_figure(0.18 * len(text) + 0.4, 0.6, dpi=72)
-    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=22, family="sans-serif")
-    ink = pixels(figure)[:, :, 0] < 128
-    edge = np.diff(ink.astype(np.int8), axis=1, prepend=0, append=0)
-    row, start = np.nonzero(edge == 1)
-    _, end = np.nonzero(edge == -1)
-    top = ink.shape[0] - row
-    x = np.stack([start, end, end, start], axis=1) - 0.5 * ink.shape[1]
-    y = np.stack([top - 1, top - 1, top, top], axis=1) - 0.5 * ink.shape[0]
-    points = np.stack([x.ravel(), y.ravel()]) * (height / 22.0)
-    corner = 4 * np.arange(len(row), dtype=np.int32)
-    triangles = np.concatenate([corner + np.array([[0], [1], [2]]), corner + [[0], [2], [3]]], 1)
-    return points, np.asfortranarray(triangles, dtype=np.int32)
