@@ -79,24 +79,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     triangle = np.ascontiguousarray(faces, dtype=np.int32)
     n = len(x)
     _check(x, triangle)
-    e1 = x[triangle[:, 1]] - x[triangle[:, 0]]
-    e2 = x[triangle[:, 2]] - x[triangle[:, 0]]
-    normal = np.cross(e1, e2)
-    double_area = np.linalg.norm(normal, axis=1)
-    if np.any(double_area <= 1e-14):
-        raise ValueError(f"triangle {int(np.argmin(double_area))} has no area")
-    u = e1 / np.linalg.norm(e1, axis=1)[:, None]
-    w = np.cross(normal / double_area[:, None], u)
-    edge_matrix = np.empty((len(triangle), 2, 2))
-    edge_matrix[:, 0, 0] = np.einsum("ij,ij->i", e1, u)
-    edge_matrix[:, 1, 0] = 0.0
-    edge_matrix[:, 0, 1] = np.einsum("ij,ij->i", e2, u)
-    edge_matrix[:, 1, 1] = np.einsum("ij,ij->i", e2, w)
-    inverse = np.linalg.inv(edge_matrix)
-    gradient = np.empty((len(triangle), 3, 2))
-    gradient[:, 1] = inverse[:, 0]
-    gradient[:, 2] = inverse[:, 1]
-    gradient[:, 0] = -inverse[:, 0] - inverse[:, 1]
+    gradient, double_area = _shape_gradients(x, triangle)
     area = 0.5 * double_area
     node_area = np.zeros(n)
     for corner in range(3):
@@ -127,6 +110,35 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
         hinge_lanes=in_lanes(hinge.astype(np.uint32)),
         bend_lanes=in_lanes(np.column_stack([coefficient, weight, rest])),
     )
+
+
+def _shape_gradients(x: FloatArray, triangle: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Returns gradients of the linear shape functions (F,3,2), 1/m, and double areas (F,), m².
+
+    Each triangle has axes of its own: the first along its first edge.
+
+    Raises:
+        ValueError: a triangle has no area.
+    """
+    e1 = x[triangle[:, 1]] - x[triangle[:, 0]]
+    e2 = x[triangle[:, 2]] - x[triangle[:, 0]]
+    normal = np.cross(e1, e2)
+    double_area = np.linalg.norm(normal, axis=1)
+    if np.any(double_area <= 1e-14):
+        raise ValueError(f"triangle {int(np.argmin(double_area))} has no area")
+    u = e1 / np.linalg.norm(e1, axis=1)[:, None]
+    w = np.cross(normal / double_area[:, None], u)
+    edge_matrix = np.empty((len(triangle), 2, 2))
+    edge_matrix[:, 0, 0] = np.einsum("ij,ij->i", e1, u)
+    edge_matrix[:, 1, 0] = 0.0
+    edge_matrix[:, 0, 1] = np.einsum("ij,ij->i", e2, u)
+    edge_matrix[:, 1, 1] = np.einsum("ij,ij->i", e2, w)
+    inverse = np.linalg.inv(edge_matrix)
+    gradient = np.empty((len(triangle), 3, 2))
+    gradient[:, 1] = inverse[:, 0]
+    gradient[:, 2] = inverse[:, 1]
+    gradient[:, 0] = -inverse[:, 0] - inverse[:, 1]
+    return gradient, double_area
 
 
 def in_lanes(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
