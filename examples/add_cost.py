@@ -1,4 +1,4 @@
-"""Adds a cost to the global controller's plan: grippers stay below a ceiling."""
+"""Adds a cost to the global controller's plan that keeps the grippers below a ceiling."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ CEILING, WEIGHT = 1.1, 50.0  # m, 1/m²
 
 @dataclass(frozen=True)
 class Ceiling:
-    """w Σ max(0, z − ceiling)² over both grippers; z is the mean height of what each holds, m."""
+    """w Σ max(0, z − ceiling)² over both grippers; z is the mean height of held nodes, m."""
 
     height: float = CEILING
     weight: float = WEIGHT
 
     def above(self, step: dressing.PlannedStep) -> np.ndarray:
-        """Returns (2,) by how much left and right gripper are too high, m."""
+        """Returns the excess height (2,) of left and right gripper, m."""
         z = [step.x[step.grip.nodes[of], 2].mean() for of in step.grip.of_side]
         return np.maximum(0.0, np.array(z) - self.height)
 
@@ -26,7 +26,7 @@ class Ceiling:
         return self.weight * float(np.sum(self.above(step) ** 2))
 
     def add_slope(self, step: dressing.PlannedStep, slope: dressing.Slope) -> None:
-        """Adds its derivative by the mean position of what each gripper holds."""
+        """Adds its derivative by the mean position of each gripper's held nodes."""
         slope.grippers[:, 2] += 2.0 * self.weight * self.above(step)
 
 

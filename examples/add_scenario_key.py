@@ -1,4 +1,4 @@
-"""Adds keys to scenarios, for `drake-dress run … --plugin add_scenario_key.py`, too."""
+"""Adds keys to scenarios; also usable as `drake-dress run … --plugin add_scenario_key.py`."""
 
 from dataclasses import dataclass
 

@@ -23,7 +23,7 @@ class HemChain(explain.MassEffect):
         return self.mass * self.derivative("mass", sheet)
 
     def derivative(self, name: str, sheet: explain.Sheet) -> np.ndarray:
-        """Returns the derivative of that by the parameter."""
+        """Returns the derivative of the added mass by the parameter."""
         height = sheet.rest_position[:, 2]
         area = np.where(height < height.min() + 0.06, sheet.elements.node_area, 0.0)
         return area / area.sum()

@@ -1,4 +1,4 @@
-"""Explains a recording that is given as arrays: explain_recording.py."""
+"""Explains a recording given as arrays: explain_recording.py."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ QUICK = ["plant.spacing=0.06", "plant.time_step=0.008", "plant.tolerance=2e-3"]
 
 
 def recorded() -> dict[str, Any]:
-    """Returns arrays as a lab has them; here a simulated one whose cameras are displaced."""
+    """Returns arrays as recorded by a lab; here a simulated lab with displaced cameras."""
     session = explain.Session(motions=["sway"], duration=1.6)
     lab = explain.simulate("measured", "camera_translation", QUICK, size=3.0, session=session)
     return {

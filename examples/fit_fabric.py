@@ -1,4 +1,4 @@
-"""Fits a fabric's stretch stiffness to how far a strip hangs down, by gradients: fit_fabric.py."""
+"""Fits a fabric's stretch stiffness to the height of a hanging strip by gradients: fit_fabric.py."""
 
 import numpy as np
 import torch
@@ -32,7 +32,7 @@ fabric = cloth.material_tensor(strip.material)
 fabric[STRETCH] = TRUE
 measured = hang(strip, rest, fabric).item()
 stiffness = GUESS
-for _ in range(6):  # Newton's method in the compliance, of which the height is all but linear
+for _ in range(6):  # Newton's method in the compliance, in which the height is almost linear
     fabric = fabric.detach().index_fill(0, torch.tensor(STRETCH), stiffness).requires_grad_()
     height = hang(strip, rest, fabric)
     (slope,) = torch.autograd.grad(height, fabric)

@@ -1,4 +1,4 @@
-"""Brings the left armhole to its hand, by a proportional policy: gym_episode.py [VIDEO_FOLDER]."""
+"""Brings the left armhole to its hand by a proportional policy: gym_episode.py [VIDEO_FOLDER]."""
 
 import sys
 from typing import Any
@@ -13,7 +13,7 @@ GAIN, FASTEST, LEFT_HAND = 1.0, 0.1, 2  # 1/s, m/s, row of joint_position
 
 
 def main(video: list[str]) -> None:
-    """Runs an episode of 3 s and prints how far the armhole was from the hand at its end."""
+    """Runs an episode of 3 s and prints the final distance of the armhole from the hand."""
     env: gymnasium.Env = gymnasium.make(
         drake_dress.gym.ENV_ID,
         scenario="dummy_varied",
@@ -29,7 +29,7 @@ def main(video: list[str]) -> None:
     total, ended = 0.0, False
     while not ended:
         way = seen["joint_position"][LEFT_HAND] - seen["garment_position"][armhole].mean(axis=0)
-        velocity = np.clip(GAIN * way, -FASTEST, FASTEST)  # of both: the coat moves as it hangs
+        velocity = np.clip(GAIN * way, -FASTEST, FASTEST)  # same for both grippers
         seen, reward, terminated, truncated, _ = env.step(np.tile(velocity, (2, 1)))
         total, ended = total + float(reward), terminated or truncated
     print(f"armhole {100.0 * np.linalg.norm(way):.0f} cm from the hand, reward {total:+.3f}")

@@ -11,7 +11,7 @@ from drake_dress import cloth
 
 
 def write_jacket(path: Path) -> None:
-    """Writes a jacket as a tailor's program would: in cm, y up, front at +z."""
+    """Writes a jacket as tailoring software would: in cm, y up, front at +z."""
     jacket = cloth.make_coat(cloth.COATS["jacket"], spacing=0.03)
     x, y, z = 100.0 * jacket.rest_position.T
     mesh = trimesh.Trimesh(np.stack([y, z, x], axis=1), jacket.faces, process=False)

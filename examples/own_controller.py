@@ -1,4 +1,4 @@
-"""Puts a controller of one's own into the diagram: both grippers rise, and slow down under load."""
+"""Adds your own controller to the diagram: both grippers rise and slow down under load."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ SPEED, ENOUGH = 0.05, 6.0  # m/s, N
 
 
 class Rise(LeafSystem):
-    """Requests velocities from forces; all its ports are connected by name."""
+    """Computes velocity requests from forces; its ports are connected by name."""
 
     def __init__(self) -> None:
         super().__init__()

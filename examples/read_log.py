@@ -1,4 +1,4 @@
-"""Reads the log of a run into a pandas table: read_log.py [run.h5]; makes a short run if none."""
+"""Reads a run's log into a pandas table: read_log.py [run.h5]; without a log, makes a short run."""
 
 import sys
 from pathlib import Path
@@ -12,7 +12,7 @@ from drake_dress.__main__ import main
 
 
 def read_log(path: str | Path) -> pd.DataFrame:
-    """Returns progress s, gripper force, N, and stage of both sides by time, s."""
+    """Returns progress s, gripper force, N, and stage of both sides over time, s."""
     columns = {}
     with h5py.File(path) as log:
         for column, side in enumerate(("left", "right")):

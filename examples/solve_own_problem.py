@@ -7,7 +7,7 @@ from drake_dress import control
 STEP, STEPS = 0.1, 40  # s
 FORCE, SPEED, WALL = 2.0, 0.6, 0.2  # N, m/s, m
 
-# x = (position, velocity) in the plane, v = force on 1 kg
+# x = (position, velocity) in the plane, v = force on a mass of 1 kg
 A, B = np.eye(4), np.zeros((4, 2))
 A[:2, 2:] = STEP * np.eye(2)
 B[:2], B[2:] = 0.5 * STEP**2 * np.eye(2), STEP * np.eye(2)
@@ -31,7 +31,7 @@ print(f"largest force {np.linalg.norm(solution.v, axis=1).max():.3f} N")
 print(f"largest speed {np.linalg.norm(solution.x[:, 2:], axis=1).max():.3f} m/s")
 print(f"nearest to the wall {solution.x[1:, 1].min():.3f} m")
 
-# one step later: from the solution before, and by its feedback gains in between
+# feedback gains correct the forces between two solves
 gains = control.feedback_gains(problem, solution)
 error = np.array([0.0, 0.01, 0.0, 0.0])
 print(f"an error of 1 cm changes the first force by {gains[0] @ error} N")

@@ -1,4 +1,4 @@
-"""Puts a predictor of one's own in place of the controllers' belief about the person's arms."""
+"""Replaces the controllers' predictor of the person's arms by your own."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from drake_dress import dressing
 
 
 class LastStep:
-    """Both arms repeat their last step for half a second, and stop."""
+    """Predicts that both arms repeat their last step for half a second, then stop."""
 
     history_length = 2  # samples
     sample_period = 0.1  # s
@@ -15,7 +15,7 @@ class LastStep:
         self.asked = 0
 
     def predict(self, history: np.ndarray, time_step: float, steps: int) -> np.ndarray:
-        """Returns (steps+1,6,3) joints, m, of history (T,6,3), the newest last."""
+        """Returns predicted joints (steps+1,6,3), m, from a history (T,6,3), newest last."""
         self.asked += 1
         velocity = np.nan_to_num(np.diff(history, axis=0)[-1]) / self.sample_period
         ahead = np.minimum(time_step * np.arange(steps + 1), 0.5)

@@ -19,7 +19,7 @@ _INPUTS = {
 
 
 def make_controller_diagram(p: Parts) -> Diagram:
-    """Returns a diagram of prediction, global controller and, if the method has one, local one.
+    """Returns the diagram of prediction, global controller and, if in use, local controller.
 
     Inputs: `garment_position`, `garment_velocity` (3m,) of the controller's garment, m, m/s;
     `joint_position` (18,), m; with a local controller `{left,right}_gripper_position` (3,), m.
