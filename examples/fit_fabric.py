@@ -1,4 +1,4 @@
-"""Fits a fabric's stretch stiffness to the height of a hanging strip by gradients: fit_fabric.py."""
+"""Fits a fabric's stretch stiffness to a hanging strip's height by gradients: fit_fabric.py."""
 
 import numpy as np
 import torch

@@ -29,7 +29,7 @@ def main(video: list[str]) -> None:
     total, ended = 0.0, False
     while not ended:
         way = seen["joint_position"][LEFT_HAND] - seen["garment_position"][armhole].mean(axis=0)
-        velocity = np.clip(GAIN * way, -FASTEST, FASTEST)  # same for both grippers
+        velocity = np.clip(GAIN * way, -FASTEST, FASTEST)  # for both, to keep the coat's shape
         seen, reward, terminated, truncated, _ = env.step(np.tile(velocity, (2, 1)))
         total, ended = total + float(reward), terminated or truncated
     print(f"armhole {100.0 * np.linalg.norm(way):.0f} cm from the hand, reward {total:+.3f}")
