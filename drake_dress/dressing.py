@@ -158,8 +158,8 @@ def run(
         out: directory to write to; results of an earlier run in it are replaced.
         own: your own parts.
         meshcat: whether to show the run live.
-        realtime_rate: largest number of simulated seconds per second; 0 means no limit, or 1 on
-            hardware.
+        realtime_rate: largest number of simulated seconds per second; 0 means no limit (1 on
+            hardware).
         report: whether report and replay are written in addition to log and summary.
         base: directory that the names of garment files are relative to.
         told: called with each line that says where the run is shown or how it ended, such as

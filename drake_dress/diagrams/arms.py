@@ -38,7 +38,7 @@ class _Search:
     Attributes:
         steps: largest number of steps.
         reached: distance of both grippers from their goals at which the search ends, m.
-        allowed: largest distance of a gripper from its goal at the end, m.
+        allowed: largest admissible distance of a gripper from its goal at the end, m.
     """
 
     steps: int
@@ -62,7 +62,7 @@ class ArmPlacement:
 
     Attributes:
         distance_behind: of the bases, m. spread: between them, m. height: of both, m.
-        tilt: angle by which the hands point below the forward direction, rad.
+        tilt: angle of the hands below the horizontal, rad.
     """
 
     distance_behind: float
@@ -79,7 +79,7 @@ class ArmPlacement:
 
     @property
     def hand(self) -> np.ndarray:
-        """R_WT (3,3): z forward and down, x to the left along a seam, which the fingers grip."""
+        """R_WT (3,3): z forward and down; x to the left, along the seam that the fingers grip."""
         c, s = np.cos(self.tilt), np.sin(self.tilt)
         return np.array([[0.0, s, c], [1.0, 0.0, 0.0], [0.0, c, -s]])
 
@@ -150,8 +150,8 @@ def _sent(
 
     Args:
         pair: the arms.
-        q: (2,7) joint angles at first, rad.
-        rate: (2,7) joint rates at first, rad/s.
+        q: (2,7) initial joint angles, rad.
+        rate: (2,7) initial joint rates, rad/s.
         goals: of left and right gripper.
         what: description of the goals, for messages.
         person: obstacle for the arms.
@@ -181,7 +181,7 @@ def _sent(
 def check_reach(
     setup: ArmSetup, placement: ArmPlacement, places: Mapping[str, np.ndarray], person: Capsules
 ) -> None:
-    """Checks that the arms can reach a sequence of gripper goals; moves no simulated arm.
+    """Checks that the arms can reach a sequence of gripper goals, by kinematics alone.
 
     Args:
         setup: arms at the start.

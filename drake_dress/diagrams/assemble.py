@@ -105,13 +105,13 @@ def hardware_parts(
     Args:
         setup: the scenario's values.
         page: Meshcat page that shows the run, if any.
-        told: called with the name of each source when its first message arrives.
+        told: called with the name of each source when its first sound message arrives.
         stopped: returns whether to give up waiting.
         own: the user's own parts.
 
     Raises:
         ArmReachError: the arms cannot reach the start of the run, or later goals of a dressing.
-        StationSilentError: a source is silent.
+        StationSilentError: a source sent no sound message in time.
         NotAtStartError: an arm is not at its start.
         NoBusError: the bus cannot be opened.
     """

@@ -28,7 +28,7 @@ from drake_dress.systems.hand_tremor import HandTremor
 from drake_dress.systems.passive_person import PassivePerson
 
 Kind = Literal["dummy", "passive", "active"]
-# Plant steps between two decisions of an active person; people do not decide faster.
+# Plant steps between updates of an active person's set-points; people do not react faster.
 _WILL_STEPS = 3
 
 

@@ -123,7 +123,7 @@ def write_board(board: Board, path: Path) -> None:
 
 
 def parse_board(text: str) -> Board:
-    """Returns the board described by COLUMNSxROWS:SQUARE:MARKER:DICTIONARY, with lengths in m.
+    """Returns the board described by COLUMNSxROWS:SQUARE:MARKER:DICTIONARY; lengths are in m.
 
     Raises:
         UserError: the text describes no board.

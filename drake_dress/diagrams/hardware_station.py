@@ -117,8 +117,8 @@ class HardwareParameters:
             without a fault.
         patience: how long faults are tolerated.
         wait: longest wait for the first messages, s.
-        start_distance: largest distance of a gripper from the start of the run, m.
-        start_angle: largest distance of a joint from the start of the run, rad.
+        start_distance: largest distance of a gripper from its place at the start of the run, m.
+        start_angle: largest deviation of a joint from its angle there, rad.
         wall: whether staleness is measured by this machine's clock instead of the diagram's.
     """
 
@@ -177,7 +177,7 @@ class HardwareStation(Station):
 
     @property
     def in_real_time(self) -> bool:
-        """Whether the world goes on while a controller solves."""
+        """Whether the world keeps moving while a controller solves."""
         return True
 
     def make_ready(self, rehearse: Callable[[FloatArray, FloatArray], None]) -> None:
@@ -527,7 +527,7 @@ def _add_meter(builder: DiagramBuilder, links: Links, inboxes: _Inboxes) -> Comm
 
 
 def _export_estimates(builder: DiagramBuilder, inboxes: _Inboxes, heard: Heard) -> None:
-    """Exports the estimates of garment and person, at first from the first messages."""
+    """Exports the estimates of garment and person; until new messages come, the first ones."""
     starts: Mapping[str, FloatArray] = {"garment": heard.garment, "person": heard.person}
     for name, exported in (
         ("garment", {"position": "garment_position", "velocity": "garment_velocity"}),

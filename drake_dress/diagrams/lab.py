@@ -41,7 +41,7 @@ def run_lab(
         scenario: loaded and validated; its variation is drawn here from its seed.
         source: the scenario's file, for messages and paths relative to it.
         out: directory to write to.
-        realtime_rate: at most this many simulated seconds per second.
+        realtime_rate: largest number of simulated seconds per second.
         report: whether report and replay are written in addition to log and summary.
 
     Raises:

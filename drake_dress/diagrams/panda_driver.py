@@ -46,8 +46,8 @@ class SimPandaDriver(Diagram):
     velocity and all outputs of their kind: (7,) rad, rad/s, rad/s², N·m. fresh, stop, desired_state
     (14,): as in `CommandGuard`. Names and kinds are those of Drake's PandaCommandReceiver and
     PandaStatusSender. torque_commanded equals torque_measured, because the simulated drives apply
-    the torque that the maker's control demands at once. acceleration_commanded is 0, because
-    commands have none.
+    the torque of the maker's control without delay. acceleration_commanded is 0, because commands
+    have none.
 
     Args:
         start: (7,) joint angles at time 0, rad.

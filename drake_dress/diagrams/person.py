@@ -64,7 +64,7 @@ class JointParameters:
         shoulder_damping: of each of these hinges, N·m·s/rad.
         elbow_stiffness: N·m/rad.
         elbow_damping: N·m·s/rad.
-        abduction_limits: smallest and largest angle, rad, as for the limits below.
+        abduction_limits: smallest and largest angle, rad; the limits below likewise.
         extension_limits: backward is positive.
         rotation_limits: outward is positive.
         elbow_limits: of its flexion.

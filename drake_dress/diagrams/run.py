@@ -50,8 +50,8 @@ class RunOptions:
 
     Attributes:
         meshcat: whether to show the run live.
-        realtime_rate: largest number of simulated seconds per second; 0 means no limit, or 1 on
-            hardware.
+        realtime_rate: largest number of simulated seconds per second; 0 means no limit (1 on
+            hardware).
         in_workers: whether the simulated garment is stepped, and the global controller solves, in
             worker processes.
         report: whether report and replay are written in addition to log and summary.
@@ -228,7 +228,7 @@ def concluded(
     interrupt: Interrupt | None,
     told: Callable[[str], None] = print,
 ) -> int:
-    """Writes the files of `conclude`, reports how the run ended and returns the exit status.
+    """Calls `conclude`, reports how the run ended and returns the exit status.
 
     Args:
         out: directory of the run.
@@ -253,7 +253,7 @@ def conclude(
     The files are independent: one that cannot be written is reported and does not stop the others.
 
     Returns:
-        Success, and the reason of a failure.
+        Success, and the reason for a failure.
     """
     log_file, summary_file, report_file, replay_file = (out / name for name in RUN_FILES)
     with RunLog.open(log_file) as log:

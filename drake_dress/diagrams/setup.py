@@ -37,7 +37,7 @@ class Setup:
     """The values of a scenario with nothing left to draw.
 
     Attributes:
-        scenario: the source of the values.
+        scenario: from which the values were read.
         source: its file, for messages and relative paths.
         garments: of plant and controller.
         station: parameters of the simulated station.
