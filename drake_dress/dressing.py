@@ -1,4 +1,4 @@
-"""Dressings in Python: scenarios, the whole diagram, runs, logs, and parts of one's own.
+"""Dressings in Python: scenarios, the whole diagram, runs, logs, and your own parts.
 
     from drake_dress import dressing
 
@@ -9,9 +9,9 @@
     with dressing.open_log("out/mine/run.h5") as log:
         print(log.time[-1])
 
-`make_dressing` gives the Drake diagram without running it. `OwnParts` puts a predictor, costs or a
-controller of one's own into either; `register_cost` and `register_predictor` make them keys of
-scenarios. What stands in `__all__` is public.
+`make_dressing` returns the Drake diagram without running it. `OwnParts` adds your own predictor,
+costs or controller to a run or a diagram; `register_cost` and `register_predictor` make costs and
+predictors available as scenario keys. The names in `__all__` are public.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RunResult:
-    """What came of a run.
+    """Result of a run.
 
     Attributes:
         out: directory with run.h5, summary.json, report.html and replay.html.
@@ -91,7 +91,7 @@ class RunResult:
 
     @property
     def reason(self) -> str | None:
-        """Why it is no success; None if it is one."""
+        """Why the dressing failed; None if it succeeded."""
         reason: str | None = self.summary["reason"]
         return reason
 
@@ -106,9 +106,9 @@ def load_scenario(
     """Returns a scenario.
 
     Args:
-        scenario: a YAML file, or the name of a scenario that ships; see `shipped_scenarios`.
-        overrides: KEY=VALUE each, as `--set` takes them.
-        seed: in place of the scenario's own.
+        scenario: a YAML file, or the name of a shipped scenario; see `shipped_scenarios`.
+        overrides: KEY=VALUE each, as for `--set`.
+        seed: replaces the scenario's own.
 
     Raises:
         UserError: file, key or value cannot be used.
@@ -126,13 +126,13 @@ def make_dressing(
 
     Args:
         scenario: its variation is drawn here from its seed.
-        own: parts of one's own.
-        meshcat: where it is shown, if it is.
+        own: your own parts.
+        meshcat: page that shows it, if any.
         base: directory that the names of garment files are relative to.
 
     Raises:
         UserError: a value or a garment file cannot be used.
-        ValueError: a part of one's own cannot be used, or the station is hardware.
+        ValueError: one of your own parts cannot be used, or the station is hardware.
     """
     if scenario.station.kind != "simulated":
         raise ValueError(f"the station is {scenario.station.kind}, expected simulated; see `run`")
@@ -156,16 +156,18 @@ def run(
     Args:
         scenario: simulated or on hardware; its variation is drawn here from its seed.
         out: directory to write to; results of an earlier run in it are replaced.
-        own: parts of one's own.
+        own: your own parts.
         meshcat: whether to show the run live.
-        realtime_rate: at most this many simulated seconds per second; 0 for no limit.
-        report: whether report and replay are written beside log and summary.
+        realtime_rate: largest number of simulated seconds per second; 0 means no limit (1 on
+            hardware).
+        report: whether report and replay are written in addition to log and summary.
         base: directory that the names of garment files are relative to.
-        told: takes the lines that say where the run is shown and how it ended, such as `print`.
+        told: called with each line that says where the run is shown or how it ended, such as
+            `print`.
 
     Raises:
         UserError: a value, a garment file or `out` cannot be used.
-        ValueError: a part of one's own cannot be used.
+        ValueError: one of your own parts cannot be used.
     """
     checked, source = checked_scenario(scenario), Path(base) / "scenario"
     to = prove_directory("out", out, RUN_FILES)
@@ -179,11 +181,11 @@ def open_log(path: str | Path) -> RunLog:
     """Returns a log, to be used in a `with` block.
 
     Raises:
-        UserError: it is no log of a run, or is damaged.
+        UserError: the file is not the log of a run, or is damaged.
     """
     return RunLog.open(path)
 
 
 def write_replay(log: RunLog, path: str | Path) -> None:
-    """Writes a log's replay as one HTML file that needs nothing else."""
+    """Writes a log's replay as one self-contained HTML file."""
     write_replay_html(log, Path(path))

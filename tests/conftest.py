@@ -1,7 +1,7 @@
-"""What holds for all tests."""
+"""Settings of all tests."""
 
 from hypothesis import settings
 
-# Speed is measured in benchmarks: how long a draw takes depends on what else runs.
+# No deadlines: benchmarks measure speed, and the time of a draw depends on the machine's load.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")

@@ -21,7 +21,7 @@ def modules() -> list[str]:
 
 
 def own_test(module: str) -> Path:
-    """Returns where a module's own test file stands, if it has one."""
+    """Returns the path at which a module's own test file would be."""
     parts = Path(module).parts
     folders = parts[1:-1] if parts[0] == "drake_dress" else parts[:-1]
     return ROOT.joinpath("tests", *folders, f"test_{parts[-1]}")
@@ -39,7 +39,7 @@ def told() -> dict[str, str]:
 
 
 def write_table(data_file: str = ".coverage") -> None:
-    """Writes the table from coverage data with one context a test; keeps what it cannot tell."""
+    """Writes the table from coverage data with one context a test; keeps entries without data."""
     from coverage import CoverageData
 
     data = CoverageData(data_file)
@@ -52,7 +52,7 @@ def write_table(data_file: str = ".coverage") -> None:
             for context in contexts:
                 if "::" in context:
                     lines[context.split("::")[0]].add(line)
-        # the test file nearest to the module wins where several run as many lines
+        # among test files that run equally many lines, the one nearest to the module wins
         most = max(lines, key=lambda test: (len(lines[test]), _near(test, module)), default=None)
         table[module] = most or old.get(module, "")
     text = json.dumps(table, indent=1, sort_keys=True) + "\n"
@@ -60,7 +60,7 @@ def write_table(data_file: str = ".coverage") -> None:
 
 
 def _near(test: str, module: str) -> int:
-    """Returns how many leading folders a test file shares with where a module's own would be."""
+    """Returns how many leading folders a test file shares with the module's own would-be file."""
     there = own_test(module).relative_to(ROOT).parts
     here = Path(test).parts
     return next((i for i, (a, b) in enumerate(zip(here, there, strict=False)) if a != b), len(here))

@@ -1,4 +1,4 @@
-"""Seeds that are drawn when tests run, printed, and can be given to run a test again."""
+"""Seeds drawn when tests run; they are printed and can be set to repeat a test."""
 
 import os
 import secrets
@@ -7,9 +7,9 @@ VARIABLE = "DRAKE_DRESS_TEST_SEED"
 
 
 def drawn_seed(below: int = 2**32) -> int:
-    """Returns a seed: that of the environment variable if it is set, else a new one.
+    """Returns the seed of the environment variable if it is set, else a new one.
 
-    It is printed, with how to run the test again; pytest shows that where a test fails.
+    It is printed together with the setting that repeats the test; pytest shows this for failures.
     """
     given = os.environ.get(VARIABLE)
     seed = secrets.randbelow(below) if given is None else int(given)

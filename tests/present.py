@@ -1,4 +1,4 @@
-"""Narrows a value that may be None to one that is there."""
+"""Narrows the type of a value that may be None."""
 
 from typing import TypeVar
 
@@ -6,6 +6,6 @@ T = TypeVar("T")
 
 
 def present(value: T | None) -> T:
-    """Returns the value; the test fails where there is none."""
+    """Returns the value; the test fails if it is None."""
     assert value is not None
     return value

@@ -1,4 +1,4 @@
-"""What cannot be used is told in one line, with status 2, and leaves nothing behind."""
+"""Unusable input is reported in one line, with status 2, and leaves no files behind."""
 
 import os
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from drake_dress.__main__ import main
 from drake_dress.diagrams.scenario import load_scenario
 
-# scenario text, then words that the line must hold
+# scenario text, then words that the line must contain
 BAD_YAML = {
     "unknown key": ("sede: 3", ["sede", "seed"]),
     "unknown nested key": ("plant: {materiel: {}}", ["plant.materiel", "material"]),
@@ -192,7 +192,7 @@ BAD_YAML = {
 
 
 def refused(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
-    """Runs the command line, checks that it refuses by the rules, and returns its line."""
+    """Runs the command line, checks the form of its refusal, and returns the line."""
     try:
         status = main(arguments)
     except SystemExit as error:

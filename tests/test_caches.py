@@ -1,4 +1,4 @@
-"""Caches go where they can be written, and none is needed."""
+"""Caches go to writable folders, and the program works without any."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def read_only(path: Path) -> str:
-    """Returns a folder that cannot be: even root cannot make one below a file."""
+    """Returns a folder that cannot be created: even root cannot make one below a file."""
     path.write_text("")
     return str(path / "home")
 
@@ -105,11 +105,11 @@ print(type(kernel_of_a_test.twice._cache).__name__, kernel_of_a_test.twice.stats
 
 
 def kernel_run(place: Path, **environment: str) -> str:
-    """Has a kernel compiled whose module cannot have a cache beside it; returns where it is."""
+    """Compiles a kernel whose module cannot have a cache beside it; returns the cache's kind."""
     source = place / "source"
     if not source.exists():
         source.mkdir()
-        (source / "__pycache__").write_text("")  # a file: no folder can be there
+        (source / "__pycache__").write_text("")  # a file, so that no such folder can exist
         (source / "kernel_of_a_test.py").write_text(
             "import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2 * x\n"
         )
@@ -131,7 +131,7 @@ def test_kernels_are_kept_below_the_temporary_folder_or_in_memory(place: Path) -
     assert str(place / "tmp") in told
     kept = list((place / "tmp").rglob("*.nb?"))
     assert len(kept) == 2
-    # Nobody may write to a cache, and it is damaged: kernels are compiled again.
+    # A damaged cache is replaced: kernels are compiled again.
     for path in kept:
         path.write_bytes(b"damaged")
     kernel_run(place, TMPDIR=str(place / "tmp"), **nowhere)

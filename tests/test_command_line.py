@@ -1,4 +1,4 @@
-"""What the command line tells of itself."""
+"""Help, options and error messages of the command line."""
 
 import errno
 from pathlib import Path
@@ -109,7 +109,7 @@ OPTIONS = [
         ["calibrate", ".", "--board", f"7x5:0.03:0.022:{dictionary}"]
         for dictionary in ("", "ArucoDetector", "DICT_0X0_1", "_native", "DICT_")
     ),
-    # more squares than the dictionary has markers for
+    # more squares than the dictionary has markers
     *(
         ["calibrate", ".", "--board", f"{size}:0.03:0.022:DICT_4X4_50"]
         for size in ("11x10", "9e9x3")

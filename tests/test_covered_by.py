@@ -1,4 +1,4 @@
-"""Every module has a test file of its own, or the table says which one covers it."""
+"""Every module has its own test file, or the table names the one that covers it."""
 
 import pytest
 

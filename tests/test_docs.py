@@ -1,4 +1,4 @@
-"""The documentation: links lead somewhere, every page is found, what it shows is true.
+"""The documentation: links are valid, every page is reachable, and its examples are true.
 
 The site itself is built by `make docs`, where every warning is an error.
 """
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "reference" not in page.parts)
 TEXTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
-# Made when the site is built.
+# Generated when the site is built.
 GENERATED = {DOCS / "scenario_keys.md", DOCS / "reference" / "index.md"}
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 TOCTREE = re.compile(r"```\{toctree\}\n(.*?)```", re.DOTALL)

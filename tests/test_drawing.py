@@ -1,4 +1,4 @@
-"""Pictures are drawn into files, whatever the user's Matplotlib is set to."""
+"""Pictures are drawn into files, whatever the user's Matplotlib settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dressings in Python: what comes of a run, and parts of a user's own act where they are put."""
+"""Dressings in Python: results of a run, and effects of the user's own parts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHORT = ("plant.fidelity=quick", "plant.spacing=0.05", "duration=1.5", "log.rate
 
 
 class _Requests(LeafSystem):
-    """Requests one velocity of both grippers, and keeps what it sees of the left one's force."""
+    """Requests one velocity of both grippers, and records the forces on the left one."""
 
     def __init__(self, velocity: tuple[float, float, float], missing: str = "") -> None:
         super().__init__()

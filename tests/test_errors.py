@@ -1,4 +1,4 @@
-"""Errors of the user's input are one readable line, whatever the input was."""
+"""Errors in the user's input are reported in one readable line, whatever the input."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""The examples: short, and do what they say."""
+"""The examples are short and do what they say."""
 
 import re
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).parents[1] / "examples"
-# By file, what its output has to match.
+# Regular expression for the output of each file.
 EXPECTED = {
     "add_cost": r"without .* are at 1\.19 m after 3 s\nwith .* are at 1\.[01]\d m after 3 s",
     "add_scenario_key": r"\{'light_touch': \{'weight': 0\.01, .*\} swift\nlargest force \d",

@@ -1,4 +1,4 @@
-"""What `drake_dress.explain` makes public, and what it takes and refuses."""
+"""The public names of `drake_dress.explain`, and the input that it accepts and refuses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_an_effect_of_a_users_own_is_a_candidate_with_its_shape() -> None:
     assert "hem_chain" not in {c.name for c in candidates(rest)}
     with registered():
         (own,) = [c for c in candidates(rest) if c.name == "hem_chain"]
-        # what shapes it is no column of its own
+        # a shape parameter is no probe of its own
         assert [p.parameter for p in own.probes] == ["mass"]
         assert own.effect(np.array([1.2])) == HemChain(mass=1.2 * 0.05, height=0.05)
         assert plain("hem_chain") == "a chain in the hem"
@@ -151,7 +151,7 @@ workers.end()
 
 
 def test_processes_work_with_an_effect_of_a_notebook(tmp_path: Path) -> None:
-    """As in a notebook, the class is in `__main__`, which has no file to import again."""
+    """In a notebook, the class is in `__main__`, which has no file to import again."""
     done = subprocess.run(
         [sys.executable, "-c", NOTEBOOK], cwd=tmp_path, capture_output=True, text=True, timeout=120
     )

@@ -1,4 +1,4 @@
-"""What cannot be written to is told before work begins, and nothing is left of finding out."""
+"""Unwritable output is reported before work begins, and the check leaves no files behind."""
 
 from __future__ import annotations
 

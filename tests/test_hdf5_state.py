@@ -1,4 +1,4 @@
-"""Whether a file is whole is told from its bytes, length and locks, for each format of HDF5."""
+"""The state of a file follows from its bytes, length and locks, for each format of HDF5."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiled kernels give the same bits in every process."""
+"""Compiled kernels return bitwise equal results in every process."""
 
 import importlib
 import pkgutil
@@ -27,21 +27,21 @@ def callees(kernel: Any) -> list[Any]:
 
 @cache
 def rounds_freely(kernel: Any) -> bool:
-    """Says whether a compiler may choose how a kernel's sums are rounded."""
+    """Returns whether the compiler may choose how a kernel's sums are rounded."""
     return bool(kernel.targetoptions.get("fastmath")) or any(map(rounds_freely, callees(kernel)))
 
 
 def has_one_compilation(kernel: Any) -> bool:
-    """Says whether no second one can take its place."""
+    """Returns whether a second compilation can never take the place of the first."""
     options = kernel.targetoptions
     compiled_at_import = not kernel._can_compile
     return options.get("inline") == "always" or options.get("forceinline") or compiled_at_import
 
 
 def test_a_kernel_that_others_call_has_one_compilation_where_rounding_is_free() -> None:
-    # One that is neither inlined nor compiled at import lies in its own library and, optimised once
-    # more, in its caller's. Which of the two is called depends on which was loaded first, and so on
-    # whether the cache was warm; with free rounding their last bits differ.
+    # A kernel that is neither inlined nor compiled at import lies in its own library and, optimised
+    # once more, in its caller's. The one that was loaded first is called, which depends on whether
+    # the cache was warm. With free rounding their last bits differ.
     found = kernels()
     called = {id(g): g for k in found for g in callees(k)}
     assert len(found) > 200

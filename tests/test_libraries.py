@@ -1,4 +1,4 @@
-"""A library that is missing is told by its name, in one line."""
+"""A missing library is reported by name, in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job uses the cores that it may use."""
+"""A job uses only the cores that it is allowed to use."""
 
 from __future__ import annotations
 

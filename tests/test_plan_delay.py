@@ -1,4 +1,4 @@
-"""The delay of plans that was measured on a machine, and what a scenario makes of it."""
+"""The plan delay measured on a machine, and its use in a scenario."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_measured_is_the_least_multiple_that_holds_it(
     assert loaded.controller.global_mpc.delay == pytest.approx(delay)
     plain = scenario(tmp_path, time_step=step)
     assert load_scenario(plain, ["controller.global_mpc.delay=measured"]) == loaded
-    # what is logged can be run on another machine
+    # a logged scenario gives the same on another machine
     path.write_text(resolved_yaml(loaded), encoding="utf-8")
     keep_plan_delay(np.full(LEAST, 0.01))
     assert load_scenario(path) == loaded

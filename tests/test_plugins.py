@@ -1,4 +1,4 @@
-"""Code of a user's own is loaded by name, in this process and those that it starts."""
+"""A user's own code is loaded by name, in this process and in those that it starts."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Moon(GravityEffect):
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder for plugins, after which nothing of them is left."""
+    """A folder for plugins; afterwards all traces of them are removed."""
     modules, path = set(sys.modules), list(sys.path)
     monkeypatch.setenv(VARIABLE, "")
     plugins._load_entry_points.cache_clear()

@@ -1,4 +1,4 @@
-"""What `drake_dress.cloth`, `.control` and the other public modules offer."""
+"""Names of `drake_dress.cloth`, `.control` and the other public modules."""
 
 import importlib
 import subprocess
@@ -7,7 +7,7 @@ import sys
 import pytest
 
 MODULES = ("cloth", "control", "dressing", "explain", "gym")
-# Those that need neither Drake nor torch.
+# Modules that need neither Drake nor torch.
 PLAIN = ("cloth", "control")
 
 

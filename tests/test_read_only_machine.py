@@ -1,4 +1,4 @@
-"""Kernels, processes and pictures where installation, home and /dev/shm are read-only mounts."""
+"""Kernels, processes and pictures work where installation, home and /dev/shm are read-only."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def test_nothing_but_time_is_lost(temporary: bool, tmp_path: Path) -> None:
     command = [sys.executable, "-c", WORK]
     settings = {"HOME": str(home), "TMPDIR": str(folder), "PYTHONPATH": str(ROOT)}
     if not temporary:
-        # a folder that others can write to is not used, and there is no other
+        # a folder that others can write to is not used, and there is no alternative
         (folder / f"drake-dress-{os.getuid()}").mkdir()
         (folder / f"drake-dress-{os.getuid()}").chmod(0o777)
     if os.geteuid() == 0:
         command = ["unshare", "-m", "sh", "-c", READ_ONLY, "sh", str(ROOT), *command]
     else:
-        # without the right to mount: what is below a file cannot be written to
+        # without the right to mount, use a path below a file, which cannot be written to
         (home / "file").touch()
         nowhere = str(home / "file" / "x")
         settings |= {"HOME": nowhere, "NUMBA_CACHE_DIR": nowhere}

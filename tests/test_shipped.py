@@ -1,4 +1,4 @@
-"""Scenarios that ship are found by name, from any folder."""
+"""Shipped scenarios are found by name, from any folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""However a run ends, what stands in its directory is of that run alone."""
+"""However a run ends, its directory contains results of that run alone."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ controller: {spacing: 0.06, global_mpc: {horizon: 3, max_iterations: 2}}
 
 @pytest.fixture(autouse=True)
 def hanging_up_ends() -> Iterator[None]:
-    """Has SIGHUP do what it usually does, also where tests were begun under nohup."""
+    """Restores the default action of SIGHUP, which nohup changes."""
     usual = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     yield
     signal.signal(signal.SIGHUP, usual)
@@ -176,7 +176,7 @@ def test_the_first_signal_is_a_flag_and_the_second_an_exception(number: signal.S
 def test_a_signal_inside_an_import_comes_after_it(
     number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A module may take an exception for a failure of what it loads; here it would hide it."""
+    """A module may mistake the exception for a failure of an import and hide it, as here."""
     inner = f"import os\nos.kill(os.getpid(), {int(number)})\ncame = len(range(1000))\n"
     (tmp_path / "interrupted_inner.py").write_text(inner)
     outer = "try:\n    import interrupted_inner\nexcept BaseException as error:\n"
@@ -195,7 +195,7 @@ def test_a_signal_inside_an_import_comes_after_it(
 
 
 class Ends:
-    """Sends a signal to this process when nobody knows it any more."""
+    """Sends a signal to this process when its last reference is gone."""
 
     def __init__(self, number: signal.Signals) -> None:
         self.number = number
@@ -220,7 +220,7 @@ def test_a_signal_whose_exception_is_swallowed_comes_again(
 
 @pytest.mark.parametrize("threads", [0, 4])
 def test_a_signal_waits_where_it_is_deferred(threads: int) -> None:
-    """Whichever thread the system has chosen to take it."""
+    """This holds whichever thread the system chooses to receive the signal."""
     over = threading.Event()
     others = [threading.Thread(target=over.wait) for _ in range(threads)]
     for thread in others:
@@ -243,7 +243,7 @@ def _defer_and_take() -> None:
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:
-    """As SIGHUP is under nohup."""
+    """For example SIGHUP under nohup."""
     usual = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with signals_raised(), caught_interrupt() as interrupt:

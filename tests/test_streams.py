@@ -1,4 +1,4 @@
-"""Output never ends a command, and all is as before when it returns."""
+"""Output problems never end a command, and streams and signals are restored afterwards."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_closed_stream_is_passed_over(closed: str, monkeypatch: pytest.MonkeyP
 
 
 def test_a_closed_pipe_is_no_error() -> None:
-    """Nor where Python flushes at its end."""
+    """A flush at the exit of Python is no error either."""
     command = f"'{sys.executable}' -m drake_dress bench --help"
     done = subprocess.run(
         ["bash", "-c", f"{{ {command}; echo status $? >&2; }} | true"],

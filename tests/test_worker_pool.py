@@ -1,4 +1,4 @@
-"""Work in other processes, with nothing of /dev/shm, ends with who began it."""
+"""Worker processes need no /dev/shm and end with the process that started them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(autouse=True)
 def no_semaphores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has each semaphore fail, as where /dev/shm is read-only."""
+    """Makes each semaphore fail, as on a read-only /dev/shm."""
 
     def refused(*_: object, **__: object) -> None:
         raise OSError(30, "Read-only file system", "/dev/shm/sem")
@@ -105,7 +105,7 @@ def test_a_program_that_forgets_its_processes_ends_all_the_same() -> None:
 def test_a_signal_to_the_whole_group_reaches_no_process_that_begins(
     number: signal.Signals, tmp_path: Path
 ) -> None:
-    """Though the first process that is spawned has Python let these signals through again."""
+    """This holds although Python unblocks these signals when it spawns the first process."""
     code = (
         "import os, signal, sys\n"
         "from multiprocessing import get_context\n"
@@ -126,7 +126,7 @@ def test_a_signal_to_the_whole_group_reaches_no_process_that_begins(
 
 @pytest.mark.parametrize("large", [10, 10_000_000])
 def test_a_process_that_ends_at_its_beginning_is_told(large: int) -> None:
-    """However much it was to be given, which nobody reads."""
+    """This holds however much data it should have received, which is never read."""
     with WorkerPool(1, initializer=end_after, initargs=(bytes(large),)) as pool:
         with pytest.raises(BrokenProcessPool, match="exit 3"):
             pool.submit(abs, 1).result(60.0)

@@ -1,4 +1,4 @@
-"""YAML is read in one way only: what has two readings is refused, with its line and both."""
+"""Ambiguous YAML is refused, with its line and both readings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def refused(text: str) -> str:
     return line
 
 
-# text, and what the message must hold
+# text, and part of the message
 TWICE = {
     "far apart": ("plant: {a: 1}\nseed: 1\n\nplant: {b: 2}", "plant: stands twice, lines 1 and 4"),
     "flow": ("plant: {a: 1, a: 2}", "plant.a: stands twice in line 1"),
@@ -35,7 +35,7 @@ TWICE = {
     "merges": ("a: &x {b: 1}\nc:\n  <<: [*x, *x]", "c.b: stands twice in line 3"),
     "two merges": ("a: &x {b: 1}\nc:\n  <<: *x\n  <<: *x", "c.<<: stands twice, lines 3 and 4"),
 }  # fmt: skip
-# word, and what the message offers
+# word, and parts of the message
 TWO_READINGS = {
     "010": ["8", "10"],
     "-010": ["-8", "-10"],
@@ -138,7 +138,7 @@ def test_what_is_written_is_read_back(value: Any) -> None:
     assert read_yaml("a.yaml", write_yaml({"a": value})) == {"a": value}
 
 
-# Words of digits and of the letters and signs that numbers have.
+# Words of digits and of the letters and signs that occur in numbers.
 WORDS = st.text("0123456789+-._:eExob", min_size=1, max_size=8).filter(lambda w: w[0] not in "-:")
 
 
@@ -148,7 +148,7 @@ WORDS = st.text("0123456789+-._:eExob", min_size=1, max_size=8).filter(lambda w:
 @example("1__0.")
 @example("0b_")
 def test_what_is_read_is_what_a_reader_of_yaml_1_1_has(word: str) -> None:
-    """Or it is refused; but for exponents, which 1.1 takes for text where 1.2 has numbers."""
+    """Otherwise it is refused; exponents are an exception: text in 1.1, numbers in 1.2."""
     text = f"a: {word}"
     try:
         read = read_yaml("a.yaml", text)["a"]

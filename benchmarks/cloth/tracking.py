@@ -22,7 +22,7 @@ from benchmarks.cloth.garments import CONTROLLER_SPACING, QUICK_SPACING, grasp, 
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.scene import SOFT
 from benchmarks.cloth.table import Table, milliseconds
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import make_elements
@@ -69,36 +69,12 @@ def measure(session: Session) -> Result:
         if session.stop.is_set():
             break
         x, v, _, _ = cloth.step(x, v, motion, arm)
-    kept: dict[str, list[list[float]]] = {
-        name: [] for name in ("sleeve", "left", "right", "target")
-    }
-    error, cost, contacts, deepest = [], [], [], 0.0
-    # exclude held nodes, which move with the gripper regardless of the arm
-    free = np.setdiff1d(np.arange(len(x)), held)
-    none = np.zeros((len(held), 3))
+    course = _Course(hand, along, key)
     for k in range(round(duration / _STEP)):
         if session.stop.is_set():
             break
-        now = k * _STEP
-        way = min(max(now - _WAITING, 0.0) * _TARGET_SPEED, _ARM_LENGTH)
-        target = hand + way * along
-        begin = time.perf_counter()
-        x, v, _, tape = cloth.step(x, v, motion, arm)
-        sleeve = x[key].mean(axis=0)
-        x_bar = np.zeros_like(x)
-        x_bar[key] = (target - sleeve) / _KEY_NODES
-        gradient = cloth.vector_jacobian_product(tape, x_bar, np.zeros_like(x), none)
-        motion = _gripper_motion(gradient.held_motion)
-        cost.append(time.perf_counter() - begin)
-        half = len(held) // 2
-        kept["sleeve"].append(sleeve.tolist())
-        kept["target"].append(target.tolist())
-        kept["left"].append(x[held[:half]].mean(axis=0).tolist())
-        kept["right"].append(x[held[half:]].mean(axis=0).tolist())
-        error.append(float(np.linalg.norm(target - sleeve)))
-        near = find_proximity(x, arm, 0.0)
-        contacts.append(int(np.count_nonzero(near.gap < SOFT.margin + 1e-3)))
-        deepest = max(deepest, -float(near.gap[free].min()))
+        x, v, motion = course.step(cloth, x, v, motion, arm, k * _STEP)
+    error, cost = course.error, course.cost
     followed = error[round((_WAITING + _APPROACH) / _STEP) :] if not session.quick else error
     links = arm_linking_number(
         x[loop], shoulder, 0.5 * (hand + shoulder), hand, shoulder + 0.2 * along
@@ -109,14 +85,14 @@ def measure(session: Session) -> Result:
         "gain_1_s": _GAIN,
         "arm": {"hand": hand.tolist(), "shoulder": shoulder.tolist(), "radius": _ARM_RADIUS},
         "time_s": [k * _STEP for k in range(len(error))],
-        "trajectory_m": kept,
+        "trajectory_m": course.kept,
         "error_m": error,
         "error_followed_mean_m": float(np.mean(followed)) if followed else None,
         "error_followed_max_m": max(followed, default=None),
         "error_end_m": error[-1] if error else None,
         "linking": links,
-        "contacts_most": max(contacts, default=0),
-        "penetration_m": max(0.0, deepest),
+        "contacts_most": max(course.contacts, default=0),
+        "penetration_m": max(0.0, course.deepest),
         "cost_median_s": float(np.median(cost)) if cost else None,
     }
     if error:
@@ -125,6 +101,64 @@ def measure(session: Session) -> Result:
             f"at the end, armhole round the arm: {'yes' if abs(links) == 1 else 'no'}"
         )
     return result
+
+
+class _Course:
+    """Follows the target with the gradient of the sleeve's error, and keeps what happens.
+
+    Args:
+        hand: (3,) start of the target, m.
+        along: (3,) unit, its direction.
+        key: nodes whose mean is the sleeve's position.
+    """
+
+    def __init__(self, hand: FloatArray, along: FloatArray, key: IntArray) -> None:
+        self._hand, self._along, self._key = hand, along, key
+        self.kept: dict[str, list[list[float]]] = {
+            name: [] for name in ("sleeve", "left", "right", "target")
+        }
+        self.error: list[float] = []
+        self.cost: list[float] = []
+        self.contacts: list[int] = []
+        self.deepest = 0.0
+
+    def step(
+        self,
+        cloth: ExplicitBiasCloth,
+        x: FloatArray,
+        v: FloatArray,
+        motion: FloatArray,
+        arm: Obstacles,
+        now: float,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Returns position, velocity and the next motion of the held nodes after one step."""
+        key, held = self._key, cloth.held
+        way = min(max(now - _WAITING, 0.0) * _TARGET_SPEED, _ARM_LENGTH)
+        target = self._hand + way * self._along
+        begin = time.perf_counter()
+        x, v, _, tape = cloth.step(x, v, motion, arm)
+        sleeve = x[key].mean(axis=0)
+        x_bar = np.zeros_like(x)
+        x_bar[key] = (target - sleeve) / _KEY_NODES
+        none = np.zeros((len(held), 3))
+        gradient = cloth.vector_jacobian_product(tape, x_bar, np.zeros_like(x), none)
+        motion = _gripper_motion(gradient.held_motion)
+        self.cost.append(time.perf_counter() - begin)
+        half = len(held) // 2
+        for name, point in (
+            ("sleeve", sleeve),
+            ("target", target),
+            ("left", x[held[:half]].mean(axis=0)),
+            ("right", x[held[half:]].mean(axis=0)),
+        ):
+            self.kept[name].append(point.tolist())
+        self.error.append(float(np.linalg.norm(target - sleeve)))
+        near = find_proximity(x, arm, 0.0)
+        self.contacts.append(int(np.count_nonzero(near.gap < SOFT.margin + 1e-3)))
+        # held nodes move with the gripper regardless of the arm
+        free = np.setdiff1d(np.arange(len(x)), held)
+        self.deepest = max(self.deepest, -float(near.gap[free].min()))
+        return x, v, motion
 
 
 def _gripper_motion(held_gradient: FloatArray) -> FloatArray:

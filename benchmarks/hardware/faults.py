@@ -161,6 +161,50 @@ BELIEFS |= OUT_OF_ORDER
 REACTIONS = FAULTS | BELIEFS
 
 
+@dataclass(frozen=True)
+class _Injected:
+    """A fault with its source, its start and duration, s, and the rate of the run."""
+
+    kind: str
+    source: str
+    start: float
+    lasting: float
+    rate: float
+
+    def plan(self, scenario: str, out: Path, overrides: Sequence[str], report: bool) -> Plan:
+        """Returns the plan of both processes."""
+        kind, start, rate = self.kind, self.start, self.rate
+        return Plan(
+            scenario,
+            str(out),
+            [
+                *COARSE,
+                *([CAMERA] if kind == "stale_camera" else []),
+                f"duration={start + self.lasting + AFTER + 1.0}",
+                # the patience is in this machine's time
+                f"station.hardware.patience={PATIENCE / rate}",
+                *(_patient(rate) if kind in OUT_OF_ORDER else []),
+                *overrides,
+            ],
+            self._of_lab(),
+            rate=rate,
+            kill_at=start / rate if kind == "killed" else None,
+            fill_at=start / rate if kind == "disk_full" else None,
+            timeout=120.0 / rate,
+            report=report,
+        )
+
+    def _of_lab(self) -> list[str]:
+        """Returns the lab's settings that play the fault."""
+        if self.kind in ("killed", "disk_full"):
+            return []
+        played = self.kind.split("_")[0] if self.kind.startswith("stale") else self.kind
+        return [
+            f"lab.faults=[{{kind: {played}, source: {self.source or 'left_arm'}, "
+            f"start: {self.start}, duration: {self.lasting}}}]"
+        ]
+
+
 def inject(
     kind: str,
     seed: int,
@@ -190,40 +234,15 @@ def inject(
     stated = REACTIONS[kind].at(rate)
     start = float(rng.uniform(1.0, 4.0))
     source = str(rng.choice(stated.source))
-    played = kind.split("_")[0] if kind.startswith("stale") else kind
-    lasting = stated.lasting
-    lab = []
-    if kind not in ("killed", "disk_full"):
-        lab = [
-            f"lab.faults=[{{kind: {played}, source: {source or 'left_arm'}, start: {start}, "
-            f"duration: {lasting}}}]"
-        ]
-    plan = Plan(
-        scenario,
-        str(out),
-        [
-            *COARSE,
-            *([CAMERA] if kind == "stale_camera" else []),
-            f"duration={start + lasting + AFTER + 1.0}",
-            # the patience is in this machine's time
-            f"station.hardware.patience={PATIENCE / rate}",
-            *(_patient(rate) if kind in OUT_OF_ORDER else []),
-            *overrides,
-        ],
-        lab,
-        rate=rate,
-        kill_at=start / rate if kind == "killed" else None,
-        fill_at=start / rate if kind == "disk_full" else None,
-        timeout=120.0 / rate,
-        report=report,
-    )
+    setup = _Injected(kind, source, start, stated.lasting, rate)
+    plan = setup.plan(scenario, out, overrides, report)
     outcome = play_usable(plan)
     kept = read_summary(out / "lab" / "summary.json")["realtime_factor"]
     if kept < KEPT_UP * rate:
         raise RuntimeError(
             f"the lab played {kept:.2f} of time, expected {rate:g}; a slower rate may be kept"
         )
-    found = _judged(kind, stated, start, lasting, out)
+    found = _judged(kind, stated, start, stated.lasting, out)
     wrong: list[str] = found["wrong"]
     expected = -9 if kind == "killed" else 1
     if outcome.run_status != expected:

@@ -26,7 +26,7 @@ def random_problem(rng: np.random.Generator) -> tuple[LocalProblem, FloatArray]:
     that a random trajectory is feasible; some fifty of them are active at a typical optimum.
     """
     n, h = HORIZON, TIME_STEP
-    eye, none = np.eye(3), np.zeros((3, 3))
+    eye = np.eye(3)
     left, right = rng.uniform(0.0, 0.5, 2) if rng.random() < _TETHERED else (0.0, 0.0)
     share = np.array([[1.0 - left, left], [right, 1.0 - right]])
     b = h * np.vstack([np.kron(share, eye), np.eye(6)])
@@ -47,32 +47,15 @@ def random_problem(rng: np.random.Generator) -> tuple[LocalProblem, FloatArray]:
         axis /= np.linalg.norm(axis)
         across.append(eye - np.outer(axis, axis))
     on_arm = rng.random(2) < _ON_ARM
-    matrix = np.zeros((n + 1, 5, 3, 12))
-    for k, blocks in enumerate(
-        ((eye, none, none, -eye), (none, eye, -eye, none), (eye, -eye, none, none))
-    ):
-        matrix[:, k] = np.hstack(blocks)
-    for i in (0, 1):
-        matrix[:, 3 + i, :, 3 * i : 3 * i + 3] = across[i]
     beside = position.copy()
     beside[:, :6] -= arm
-    offset = np.einsum("tkab,tb->tka", matrix, position)
-    offset[:, 3:] = np.einsum("tkab,tb->tka", matrix[:, 3:], beside)
-    bounds = NormBounds(matrix, offset, np.empty((n + 1, 5)))
-    needed = bounds.norms(_path(obeying, b))
+    state_bounds = _state_bounds(position, beside, across)
+    needed = state_bounds.norms(_path(obeying, b))
     usual = np.array(_RADIUS) * rng.uniform(0.5, 1.5, 5)
     radius = np.maximum(usual, 1.001 * needed + 1e-3)
     radius[:, 3:][:, ~on_arm] = np.inf
 
-    input_matrix = np.zeros((n, 4, 3, 6))
-    input_offset = np.zeros((n, 4, 3))
-    for i in (0, 1):
-        rows = slice(3 * i, 3 * i + 3)
-        input_matrix[:, i] = across[i] @ b[rows]
-        input_offset[:, i] = np.diff(beside, axis=0)[:, rows] @ across[i]
-        input_matrix[:, 2 + i, :, rows] = eye
-        input_offset[:, 2 + i] = velocity[:, rows]
-    input_bounds = NormBounds(input_matrix, input_offset, np.empty((n, 4)))
+    input_bounds = _input_bounds(velocity, beside, across, b)
     needed = input_bounds.norms(obeying)
     usual = np.array(_SPEED) * np.array([h, h, 1.0, 1.0])
     input_radius = np.maximum(usual, 1.001 * needed + 1e-4)
@@ -84,10 +67,40 @@ def random_problem(rng: np.random.Generator) -> tuple[LocalProblem, FloatArray]:
         state_target=target,
         input_weight=input_weight,
         input_target=-velocity,
-        state_bounds=replace(bounds, radius=radius),
+        state_bounds=replace(state_bounds, radius=radius),
         input_bounds=replace(input_bounds, radius=input_radius),
     )
     return problem, obeying
+
+
+def _state_bounds(position: FloatArray, beside: FloatArray, across: list[FloatArray]) -> NormBounds:
+    """Returns bounds, without radii, on spans between sleeves and grippers, and beside the arms."""
+    eye, none = np.eye(3), np.zeros((3, 3))
+    matrix = np.zeros((len(position), 5, 3, 12))
+    for k, blocks in enumerate(
+        ((eye, none, none, -eye), (none, eye, -eye, none), (eye, -eye, none, none))
+    ):
+        matrix[:, k] = np.hstack(blocks)
+    for i in (0, 1):
+        matrix[:, 3 + i, :, 3 * i : 3 * i + 3] = across[i]
+    offset = np.einsum("tkab,tb->tka", matrix, position)
+    offset[:, 3:] = np.einsum("tkab,tb->tka", matrix[:, 3:], beside)
+    return NormBounds(matrix, offset, np.empty((len(position), 5)))
+
+
+def _input_bounds(
+    velocity: FloatArray, beside: FloatArray, across: list[FloatArray], b: FloatArray
+) -> NormBounds:
+    """Returns bounds, without radii, on speeds beside the arms and on those of the grippers."""
+    n = len(velocity)
+    matrix, offset = np.zeros((n, 4, 3, 6)), np.zeros((n, 4, 3))
+    for i in (0, 1):
+        rows = slice(3 * i, 3 * i + 3)
+        matrix[:, i] = across[i] @ b[rows]
+        offset[:, i] = np.diff(beside, axis=0)[:, rows] @ across[i]
+        matrix[:, 2 + i, :, rows] = np.eye(3)
+        offset[:, 2 + i] = velocity[:, rows]
+    return NormBounds(matrix, offset, np.empty((n, 4)))
 
 
 def _path(velocity: FloatArray, b: FloatArray) -> FloatArray:

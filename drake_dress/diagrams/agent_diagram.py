@@ -1,4 +1,4 @@
-"""A station whose grippers an agent moves in place of the controllers."""
+"""A station whose grippers are moved by an agent instead of the controllers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from drake_dress.systems.safety_governor import SafetyGovernor
 
 @dataclass(frozen=True)
 class AgentDiagram:
-    """The diagram, and the systems of it that an agent's environment looks at.
+    """The diagram and the systems that an agent's environment reads.
 
     Attributes:
         diagram: with the input `velocity`, (6,) of left, then right gripper, m/s.
-        governor: of safety, between the agent and the grippers.
+        governor: safety governor between the agent and the grippers.
     """
 
     diagram: Diagram
@@ -30,8 +30,8 @@ class AgentDiagram:
 def make_agent_diagram(p: Parts) -> AgentDiagram:
     """Returns the diagram of a scenario's parts, with an agent in place of the controllers.
 
-    Station, safety governor and, where there are any, arms with their controller are those of a
-    run; nothing plans.
+    Station, safety governor and, if there are any, arms with their controller are those of a run.
+    There is no planning.
     """
     w = Wiring(p.station)
     control = ControlSetup(p.policy, p.setup.rates, p.setup.limits)

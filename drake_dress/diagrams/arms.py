@@ -18,27 +18,27 @@ from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
 from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal, RateParameters
 from drake_dress.models.sides import SIDES, Side
 
-# Of the drives at the joints: stiff as the maker's own position control, N·m/rad and N·m·s/rad.
+# Gains of the joint drives, as stiff as the maker's position control, N·m/rad and N·m·s/rad.
 _STIFFNESS = np.array([6000.0, 6000.0, 5000.0, 5000.0, 3000.0, 2000.0, 1500.0])
 _DAMPING = 2.0 * np.sqrt(_STIFFNESS) * np.array([1.2, 1.2, 0.8, 0.8, 0.3, 0.3, 0.2])
 
 
-# Joints that the arms like: elbows bent, wrists in the middle of what they can, rad.
+# Preferred joint angles: elbows bent, wrists in the middle of their range, rad.
 HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
-# Of the limits of speed, acceleration used; how far from those of position joints stay, rad.
+# Fraction of the speed and acceleration limits in use; margin to the position limits, rad.
 _SPEED_SHARE, _ROOM = 0.85, 0.02
-# Between the steps of a search for joints, s.
+# Time step of a search for joint angles, s.
 _SEARCH_STEP = 0.01
 
 
 @dataclass(frozen=True)
 class _Search:
-    """How long joints are searched for, and how near to its place a gripper has to come.
+    """Length of a search for joint angles, and its tolerances.
 
     Attributes:
-        steps: at most.
-        reached: distance at which the search ends, m.
-        allowed: distance by which a gripper may end short of its place, m.
+        steps: largest number of steps.
+        reached: distance of both grippers from their goals at which the search ends, m.
+        allowed: largest admissible distance of a gripper from its goal at the end, m.
     """
 
     steps: int
@@ -46,23 +46,23 @@ class _Search:
     allowed: float
 
 
-# For the start of a run, and for each place that a dressing leads to, where a garment makes up for
-# more.
+# For the start of a run, and for the later goals of a dressing, where the garment compensates for
+# larger errors.
 _TO_START = _Search(steps=1500, reached=0.0, allowed=1e-3)
 _ON_THE_WAY = _Search(steps=800, reached=0.01, allowed=0.05)
 
 
 class ArmReachError(ValueError):
-    """An arm does not reach where its gripper shall be."""
+    """An arm cannot reach the goal of its gripper."""
 
 
 @dataclass(frozen=True)
 class ArmPlacement:
-    """Where two arms stand behind a person, and how their hands point.
+    """Placement of two arms behind a person, and orientation of their hands.
 
     Attributes:
         distance_behind: of the bases, m. spread: between them, m. height: of both, m.
-        tilt: of the hands, which point forward and this much down, rad.
+        tilt: angle of the hands below the horizontal, rad.
         control: settings of the control of the joints.
     """
 
@@ -81,21 +81,21 @@ class ArmPlacement:
 
     @property
     def hand(self) -> np.ndarray:
-        """R_WT (3,3): z forward and down, fingers that close across a seam to the left, x."""
+        """R_WT (3,3): z forward and down; x to the left, along the seam that the fingers grip."""
         c, s = np.cos(self.tilt), np.sin(self.tilt)
         return np.array([[0.0, s, c], [1.0, 0.0, 0.0], [0.0, c, -s]])
 
 
 @dataclass(frozen=True)
 class ArmSetup:
-    """Two arms, and their joints (2,7) at the start, rad."""
+    """Two arms and their joint angles (2,7) at the start, rad."""
 
     pair: ArmPair
     start: np.ndarray
 
 
 def arm_bases(setup: ArmSetup | None) -> dict[Side, np.ndarray] | None:
-    """Returns X_WB (4,4) of each arm; None where there are none."""
+    """Returns X_WB (4,4) of each arm; None without arms."""
     if setup is None:
         return None
     return {side: arm.base for side, arm in zip(SIDES, setup.pair.arms, strict=True)}
@@ -111,12 +111,12 @@ def set_up_arms(
     Args:
         placement: of the arms.
         grippers: left, then right.
-        person: to keep away from.
+        person: obstacle for the arms.
 
     Raises:
         ArmReachError: one cannot get there; the message tells which and by how much.
     """
-    # what drives overshoot by stays within the limits, too
+    # tighter limits, so that the overshoot of the drives stays within the true ones
     left, right = (
         replace(arm, limits=arm.limits.within(_SPEED_SHARE, _ROOM))
         for arm in (panda(placement.base(side)) for side in SIDES)
@@ -130,7 +130,7 @@ def set_up_arms(
 
 
 def _goals(grippers: np.ndarray, placement: ArmPlacement) -> tuple[GripperGoal, GripperGoal]:
-    """Returns goals of both arms with grippers at rest at (2,3), m, hands as they are placed."""
+    """Returns goals with grippers at rest at `grippers` (2,3), m, and hands as in `placement`."""
     left, right = (GripperGoal(p, np.zeros(3), placement.hand) for p in grippers)
     return left, right
 
@@ -144,19 +144,19 @@ def _sent(
     person: Capsules,
     search: _Search,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns joints and their rates (2,7) of arms that were sent to their goals.
+    """Returns joint angles and rates (2,7) of the arms after a search for their goals.
 
     Args:
-        pair: of arms.
-        q: (2,7) joints from where on, rad.
-        rate: (2,7) of them then, rad/s.
+        pair: the arms.
+        q: (2,7) initial joint angles, rad.
+        rate: (2,7) initial joint rates, rad/s.
         goals: of left and right gripper.
-        what: the goals are at, for messages.
-        person: to keep away from.
-        search: how long, and how near.
+        what: description of the goals, for messages.
+        person: obstacle for the arms.
+        search: length and tolerances.
 
     Raises:
-        ArmReachError: one ends further away than the search allows.
+        ArmReachError: an arm ends farther from its goal than the search allows.
     """
     grippers = np.stack([goal.position for goal in goals])
     short = np.full(2, np.inf)
@@ -179,17 +179,17 @@ def _sent(
 def check_reach(
     setup: ArmSetup, placement: ArmPlacement, places: Mapping[str, np.ndarray], person: Capsules
 ) -> None:
-    """Sends the arms, in numbers alone, where grippers have to come to in turn.
+    """Checks that the arms can reach a sequence of gripper goals, by kinematics alone.
 
     Args:
-        setup: at the start.
+        setup: arms at the start.
         placement: of the arms.
-        places: what they are at, for messages, and p_WG (2,3) of left and right, m.
-        person: to keep away from.
+        places: p_WG (2,3) of left and right, m, by a description for messages.
+        person: obstacle for the arms.
 
     Raises:
-        ArmReachError: an arm stays further away than a garment makes up for; the message tells
-            which, from where, and by how much.
+        ArmReachError: an arm stays farther away than a garment can compensate for; the message
+            tells which arm, its goal, and the remaining distance.
     """
     q, rate = setup.start, np.zeros_like(setup.start)
     for what, grippers in places.items():
@@ -203,7 +203,7 @@ class PlantArm:
 
     Attributes:
         model: its model instance; its joints are the plant's actuated ones there.
-        arm: the same in plain numbers.
+        arm: its kinematic model.
         tool: body between the fingertips.
     """
 
@@ -213,11 +213,11 @@ class PlantArm:
 
 
 def add_arms(plant: MultibodyPlant, bases: Mapping[Side, np.ndarray]) -> dict[Side, PlantArm]:
-    """Adds a Panda for each side, with drives that hold positions and speeds asked for.
+    """Adds a Panda for each side, with joint drives that follow desired positions and velocities.
 
-    A Panda carries its own weight (its maker's control does), so gravity is off for it. Its torques
-    are limited. The plant has a discrete solver that takes drives implicitly, so that they are
-    stiff at the garment's time step.
+    Gravity is off for a Panda, because its maker's control compensates its weight. Its torques are
+    limited. The plant's discrete solver treats the drives implicitly, so they can be stiff at the
+    plant's time step.
 
     Args:
         plant: not finalised.

@@ -1,4 +1,4 @@
-"""From a scenario's setup to the whole diagram."""
+"""Assembles the whole diagram from a scenario's setup."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class Parts:
         setup: the scenario's values.
         station: simulated or hardware.
         policy: of the global controller.
-        page: Meshcat page on which the run is shown, if it is.
+        page: Meshcat page that shows the run, if any.
         in_worker: whether garment and global controller run in worker processes.
-        own: parts of a user's own.
+        own: the user's own parts.
     """
 
     setup: Setup
@@ -64,7 +64,7 @@ def simulated_station(
 
     Args:
         setup: the scenario's values.
-        page: Meshcat page on which the run is shown, if it is.
+        page: Meshcat page that shows the run, if any.
         in_worker: whether the garment is stepped in a worker process.
     """
     transfer = barycentric_transfer(setup.garments.plant, setup.garments.belief)
@@ -79,13 +79,13 @@ def parts(
 
     Args:
         setup: the scenario's values.
-        page: Meshcat page on which the run is shown, if it is.
+        page: Meshcat page that shows the run, if any.
         in_worker: whether the garment is stepped, and the global controller solves, in worker
             processes.
-        own: parts of a user's own.
+        own: the user's own parts.
 
     Raises:
-        ArmReachError: the arms do not reach where the run begins.
+        ArmReachError: the arms cannot reach the start of the run, or later goals of a dressing.
     """
     station = simulated_station(setup, page, in_worker)
     return Parts(setup, station, setup.policy(station.person, own.costs), page, in_worker, own)
@@ -104,14 +104,14 @@ def hardware_parts(
 
     Args:
         setup: the scenario's values.
-        page: Meshcat page on which the run is shown, if it is.
-        told: called with the name of each source when its first message arrives.
+        page: Meshcat page that shows the run, if any.
+        told: called with the name of each source when its first sound message arrives.
         stopped: returns whether to give up waiting.
-        own: parts of a user's own.
+        own: the user's own parts.
 
     Raises:
-        ArmReachError: the arms do not reach where the run begins.
-        StationSilentError: a source is silent.
+        ArmReachError: the arms cannot reach the start of the run, or later goals of a dressing.
+        StationSilentError: a source sent no sound message in time.
         NotAtStartError: an arm is not at its start.
         NoBusError: the bus cannot be opened.
     """
@@ -120,7 +120,7 @@ def hardware_parts(
     planned = planned_arms(setup.station, person)
     policy = setup.policy(person, own.costs)
     p = hardware_parameters(setup.scenario.station, setup.station)
-    # Subscriptions from Python live as long as their bus: the run opens one without any.
+    # Subscriptions from Python live as long as their bus, so the run opens a new one without any.
     heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
     robots = at_start(p, planned, heard.joints)
     station = make_hardware_station(p, open_bus(p.links.lcm_url), person, robots, heard)
@@ -128,17 +128,18 @@ def hardware_parts(
 
 
 def described_person(p: StationParameters) -> Person:
-    """Returns the person in a plant of its own, which is never simulated."""
+    """Returns the scenario's person, in a plant of its own that is never simulated."""
     return add_person(
         MultibodyPlant(p.body_time_step), p.measures, p.posture, p.arms, p.joints, turns=False
     )
 
 
 def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
-    """Returns both arms where a run begins.
+    """Returns both arms at the start of a run.
 
     Raises:
-        ArmReachError: they do not reach there, or not where a dressing leads.
+        ArmReachError: they cannot reach it, or later goals of a dressing.
+        ValueError: the grippers float.
     """
     if p.placement is None:
         raise ValueError("grippers float, expected arms")
@@ -173,7 +174,7 @@ def wired(
     """Returns the diagram.
 
     Args:
-        p: its parts, which serve one diagram.
+        p: its parts, which can be used in one diagram only.
         writer: open log, if one is kept.
         record: list to which the local controller appends the problems that it solves.
     """

@@ -1,9 +1,9 @@
-"""What moves the person: nothing but the garment, a habit of following it, or a will of its own.
+"""The person's behaviour: arms on springs, arms that follow the garment, or motions of its own.
 
     PassivePerson | ActivePerson ──set-point──▶ ArmMuscles ──┐
                        dummy: constant tone ────────────────┴▶ (+ HandTremor) ──▶ plant
 
-The controller is told of none of this.
+The controller receives none of this.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from drake_dress.systems.hand_tremor import HandTremor
 from drake_dress.systems.passive_person import PassivePerson
 
 Kind = Literal["dummy", "passive", "active"]
-# Steps of the plant from one decision of an active person to the next: no will is faster.
+# Plant steps between updates of an active person's set-points; people do not react faster.
 _WILL_STEPS = 3
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """How a person behaves.
+    """Behaviour of a person.
 
     Attributes:
         kind: a dummy's arms are springs about the rest pose; a passive person follows the garment;
             an active one has motions of its own and follows between them.
-        active: of both; a passive person uses its `following` alone.
+        active: parameters of passive and active persons; a passive one only uses `following`.
         motions: of an active person.
-        tremor: of any; None for steady hands.
+        tremor: of any kind of person; None for steady hands.
         seed: of the tremor.
     """
 
@@ -53,7 +53,7 @@ class Behaviour:
 
     @property
     def turns(self) -> bool:
-        """Returns whether the person turns at all."""
+        """Whether the person turns at all."""
         return self.kind == "active" and any(isinstance(m, Turn) for m in self.motions)
 
 
@@ -66,14 +66,14 @@ def add_behaviour(
     mesh: GarmentMesh,
     garment_position: OutputPort,
 ) -> None:
-    """Adds what moves the person, wired to the plant.
+    """Adds the systems that move the person, wired to the plant.
 
     Args:
         builder: of the station.
         plant: finalized.
-        person: in it; made to turn if `behaviour.turns`.
-        arms: as `person_arms` gives them for the person.
-        behaviour: how it behaves.
+        person: in the plant; made with `turns` if `behaviour.turns`.
+        arms: those that `person_arms` returns for the person.
+        behaviour: of the person.
         mesh: the true garment.
         garment_position: port (3n,) of the true garment, m.
     """

@@ -1,8 +1,8 @@
-"""Limbs that do not go through the body: contact of the arms with trunk, legs and each other.
+"""Contact of the arms with trunk, legs and each other.
 
-Compliant point contact of Drake, between capsules that are as thick as the limbs. What touches in
-the rest pose already, as an arm that hangs at the side, is taken to be pressed together there: the
-arm's capsule is thinner by that much, so that the rest pose stays one.
+The model is Drake's compliant point contact between capsules as thick as the limbs. An arm that
+overlaps the torso in the rest pose, such as one that hangs at the side, is taken to be compressed
+there: its capsule is thinner by the overlap, so that the rest pose stays in equilibrium.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from drake_dress.models.human.body import (
 )
 from drake_dress.models.sides import Side
 
-# Of each surface, N/m; two in series have half of it. An arm that the garment draws against the
-# chest with 20 N goes 4 mm into it, as flesh does.
+# Stiffness of each surface, N/m; two in series have half of it. An arm that the garment pulls
+# against the chest with 20 N sinks in by 4 mm, like flesh.
 _STIFFNESS = 1e4
-# s/m; and of skin and clothes.
+# Dissipation, s/m, and friction coefficient of skin and clothes.
 _DISSIPATION, _FRICTION = 5.0, 0.4
-# A capsule that the rest pose leaves less of than this has no contact, m.
+# Capsules that the rest pose makes thinner than this radius have no contact, m.
 _LEAST_RADIUS = 0.01
 
 
@@ -43,9 +43,9 @@ def add_body_contact(
     posture: Posture,
     arms: dict[Side, ArmPose],
 ) -> None:
-    """Registers what of a person collides with the rest of it.
+    """Registers the collision geometry of a person.
 
-    The shoulder girdle does not: upper arms begin in it.
+    The shoulder girdle has none, because the upper arms begin in it.
 
     Args:
         plant: not finalized, with a SceneGraph.
@@ -78,7 +78,7 @@ def add_body_contact(
 
 
 def _placed(capsules: list[Capsule], rotation: FloatArray, origin: FloatArray) -> Capsules:
-    """Returns capsules of a body in the torso's frame."""
+    """Returns a body's capsules in the torso's frame."""
     return Capsules(
         np.stack([c.a_B for c in capsules]) @ rotation.T + origin,
         np.stack([c.b_B for c in capsules]) @ rotation.T + origin,

@@ -1,4 +1,4 @@
-"""Where a camera stands, from pictures of a board in a gripper: `drake-dress calibrate`."""
+"""Camera pose from pictures of a board in a gripper: `drake-dress calibrate`."""
 
 from __future__ import annotations
 
@@ -48,15 +48,16 @@ def calibrate_camera(
     camera: str | None,
     out: Path,
 ) -> None:
-    """Finds a camera and writes it as JSON; prints what it found.
+    """Finds the pose of a camera, writes it as JSON and prints it.
 
     Args:
         directory: with `poses.csv` (image, q1 … q7 in rad) and the pictures it names.
-        scenario: which tells where the arm stands.
+        scenario: with the placement of the arm.
         source: its file, for messages.
         side: of the arm that holds the board.
-        board: that it holds.
-        camera: name in the scenario of the camera, whose intrinsics are taken; found when None.
+        board: the board that the arm holds.
+        camera: name of the scenario's camera whose intrinsics are used; when None, they are
+            estimated from the pictures.
         out: file to write.
 
     Raises:
@@ -73,7 +74,7 @@ def calibrate_camera(
     size = (0, 0)
     for name, q in rows:
         picture = directory / name
-        # OpenCV would wait for a pipe without a writer.
+        # OpenCV would block on a named pipe without a writer.
         image = cv2.imread(str(picture)) if os.path.isfile(picture) else None
         if image is None:
             raise UserError(str(directory / name), "", "is no readable picture")
@@ -102,7 +103,7 @@ def calibrate_camera(
 
 
 def write_board(board: Board, path: Path) -> None:
-    """Writes a board to print, at 600 dots per inch.
+    """Writes a picture of a board, to be printed at 600 dots per inch.
 
     Raises:
         UserError: there is no such board, or it cannot be written.
@@ -122,10 +123,10 @@ def write_board(board: Board, path: Path) -> None:
 
 
 def parse_board(text: str) -> Board:
-    """Returns the board that COLUMNSxROWS:SQUARE:MARKER:DICTIONARY means; m.
+    """Returns the board described by COLUMNSxROWS:SQUARE:MARKER:DICTIONARY; lengths are in m.
 
     Raises:
-        UserError: it means none.
+        UserError: the text describes no board.
     """
     try:
         size, square, marker, dictionary = text.split(":")
@@ -192,7 +193,7 @@ def _intrinsics(
                     f"{camera} has {c.width} × {c.height} pixels, its pictures {size[0]} × "
                     f"{size[1]}",
                 )
-            # as Drake's CameraInfo has it
+            # same definition as Drake's CameraInfo
             focal = 0.5 * c.height / math.tan(0.5 * math.radians(c.fov_deg))
             matrix = np.array(
                 [[focal, 0.0, 0.5 * c.width - 0.5], [0.0, focal, 0.5 * c.height - 0.5], [0, 0, 1.0]]

@@ -1,4 +1,4 @@
-"""Cameras that look at the person, in a simulated station."""
+"""Cameras of a simulated station, which look at the person."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.systems.garment_geometry import GarmentGeometry
 
 _RENDERER = "vtk"
-_NEAR, _FAR = 0.05, 6.0  # what is drawn, m
-_DEPTH = (0.1, 5.0)  # what is measured, m
-# Ports of an RgbdSensor, and what they are exported as.
+_NEAR, _FAR = 0.05, 6.0  # range of rendering, m
+_DEPTH = (0.1, 5.0)  # range of depth measurement, m
+# Ports of an RgbdSensor, and the names under which they are exported.
 IMAGES = {"color_image": "color_image", "depth_image_32f": "depth_image"}
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera for colour and depth, at one place.
+    """A fixed pinhole camera for colour and depth.
 
     Attributes:
         name: of its ports and channel.
         position: p_WC (3,), m.
-        target: that is in the middle of its image (3,), m.
+        target: point in the middle of its image (3,), m.
         width, height: of the image, pixels.
         fov: vertical, rad.
         rate: of images, Hz.
@@ -63,10 +63,10 @@ class Camera:
 
 
 def looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Returns R_WC (3,3) of a camera at `position` that has `target` in the middle, (3,) m.
+    """Returns R_WC (3,3) of a camera at `position` (3,) that looks at `target` (3,), m.
 
     Raises:
-        ValueError: the one is straight above the other, or both are one.
+        ValueError: one is straight above the other, or both coincide.
     """
     ahead = np.asarray(target, dtype=float) - position
     right = np.cross(ahead, [0.0, 0.0, 1.0])
@@ -83,14 +83,14 @@ def export_cameras(
     garment_position: OutputPort,
     cameras: Sequence[Camera],
 ) -> None:
-    """Adds cameras, shows them the garment, and exports `NAME.color_image`, `NAME.depth_image`.
+    """Adds cameras that see the garment; exports `NAME.color_image` and `NAME.depth_image`.
 
     Args:
         builder: of the station.
-        scene_graph: with the person and what else is seen.
+        scene_graph: with the person and all other visible bodies.
         mesh: the true garment.
         garment_position: its nodes, (3n,) m.
-        cameras: with different names; none leaves the scene graph as it is.
+        cameras: with distinct names; without any, the scene graph is left unchanged.
     """
     if not cameras:
         return

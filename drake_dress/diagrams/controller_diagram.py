@@ -1,4 +1,4 @@
-"""The controllers of a scenario alone, to be fed with observations from outside the diagram."""
+"""The controllers of a scenario alone, for observations from outside the diagram."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _INPUTS = {
 
 
 def make_controller_diagram(p: Parts) -> Diagram:
-    """Returns prediction, global controller and, where the method has one, local controller.
+    """Returns the diagram of prediction, global controller and, if in use, local controller.
 
     Inputs: `garment_position`, `garment_velocity` (3m,) of the controller's garment, m, m/s;
     `joint_position` (18,), m; with a local controller `{left,right}_gripper_position` (3,), m.
     Outputs: `{left,right}_velocity_request` (3,), m/s, which a run passes to its safety governor.
 
     Args:
-        p: of a run of the scenario; its station is not used.
+        p: parts of a run of the scenario; the station is not used.
     """
     builder = DiagramBuilder()
     exported: dict[str, InputPortIndex] = {}

@@ -1,4 +1,4 @@
-"""The dressing diagram: station, what is seen of it, controllers, and what is shown and logged."""
+"""The dressing diagram: station, controllers, recorder and live view."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from drake_dress.systems.safety_governor import SafetyGovernor
 
 @dataclass(frozen=True)
 class Dressing:
-    """The whole diagram, and of what it is made that a run asks for something.
+    """The whole diagram, and the parts of it that a run uses.
 
     Attributes:
-        diagram: the whole.
-        station: with people, arms and garment, or the messages of these.
+        diagram: the whole diagram.
+        station: with person, arms and garment, or with their messages.
         mpc: the global controller.
         local: the local controller, if there is one.
     """
@@ -45,12 +45,12 @@ class Dressing:
     def rehearse(
         self, garment: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool] = lambda: False
     ) -> None:
-        """Has each controller solve once, so that nothing is compiled when time counts.
+        """Has each controller solve once, so that nothing is compiled during the run.
 
         Args:
-            garment: (m,3) of the controller's garment, m.
-            joints: (6,3) of the person, m.
-            stopped: whether to give up.
+            garment: (m,3) nodes of the controller's garment, m.
+            joints: (6,3) joint positions of the person, m.
+            stopped: returns whether to give up.
         """
         plan = self.mpc.rehearse(garment, joints, stopped)
         if plan is None or self.local is None:
@@ -73,9 +73,9 @@ class _Controllers:
 
     Attributes:
         mpc: the global controller.
-        requests: what turns plans into requested velocities.
-        governor: of safety.
-        arms: of the joints; None where grippers float.
+        requests: system that turns plans into requested velocities.
+        governor: safety governor.
+        arms: controller of the arms' joints; None where grippers float.
     """
 
     mpc: GlobalMpc
@@ -95,10 +95,10 @@ def make_dressing(
 
     Args:
         station: simulated or hardware; only its exported ports are used.
-        mesh: the true garment; where it is not known, the controller's.
+        mesh: the true garment; the controller's if the true one is unknown.
         control: the controllers.
         writer: open log, if one is kept.
-        meshcat: where the run is shown, if it is.
+        meshcat: page that shows the run, if any.
     """
     w = Wiring(station)
     controllers = _add_controllers(w, control)
@@ -138,10 +138,10 @@ def add_governor(w: Wiring, control: ControlSetup) -> SafetyGovernor:
 def command_grippers(
     w: Wiring, control: ControlSetup, governor: SafetyGovernor
 ) -> ArmController | None:
-    """Has grippers go where the governor commands.
+    """Makes the grippers follow the governor's commands.
 
     Returns:
-        What moves the arms; None where grippers float.
+        The controller of the arms; None where grippers float.
     """
     if w.of.robots is not None:
         return _add_arms(w, w.of.robots, control, governor)
@@ -157,7 +157,7 @@ def wire_governor(w: Wiring, requests: Any, governor: SafetyGovernor) -> None:
     Args:
         w: the diagram being built.
         requests: a system with outputs `{left,right}_velocity_request` and `request_time`.
-        governor: of safety.
+        governor: safety governor.
     """
     w.connect(requests, "request_time", governor, "request_time")
     w.connect(w.station, "permission", governor, "permission")
@@ -168,7 +168,7 @@ def wire_governor(w: Wiring, requests: Any, governor: SafetyGovernor) -> None:
 
 
 def _show_grippers(w: Wiring, system: Any, *quantities: str) -> None:
-    """Connects what the station measures of both grippers."""
+    """Connects the station's measurements of both grippers."""
     for side in SIDES:
         for quantity in quantities:
             measured = f"{side}_gripper.{quantity}_measured"
@@ -181,7 +181,7 @@ def _add_arms(
     control: ControlSetup,
     governor: SafetyGovernor,
 ) -> ArmController:
-    """Adds what moves both arms' joints so that grippers go where the governor commands."""
+    """Adds the arm controller, which moves the joints so that grippers follow the governor."""
     arms = w.add(
         "arm_controller",
         ArmController(
@@ -211,7 +211,7 @@ def _add_recorder(
     control: ControlSetup,
     controllers: _Controllers,
 ) -> None:
-    """Adds what writes the log: the truth where it is known, else what is believed."""
+    """Adds the system that logs true values where they are known, otherwise estimates."""
     policy, rates, arms = control.policy, control.rates, controllers.arms
     recorder = w.add(
         "run_recorder",
@@ -249,7 +249,7 @@ def _add_recorder(
 
 
 def _add_visualizer(w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, mpc: GlobalMpc) -> None:
-    """Adds what shows garment, grippers and targets live."""
+    """Adds the live view of garment, grippers and targets."""
     shown = w.add(
         "garment_visualizer", GarmentVisualizer(meshcat, mesh.faces, len(mesh.rest_position))
     )

@@ -1,4 +1,4 @@
-"""The garment that a scenario asks for."""
+"""The garment of a scenario."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from drake_dress.models.garment.coat import make_coat
 from drake_dress.models.garment.load import MeshOptions, Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 
-_MOST_KEPT = 4  # files that are kept in memory
+_MOST_KEPT = 4  # mesh files kept in memory
 _kept: OrderedDict[tuple[object, ...], WholeGarment] = OrderedDict()
 
 
 def build_garment(garment: schema.Garment, spacing: float, base: Path) -> GarmentMesh:
     """Returns the garment meshed at `spacing`, m.
 
-    A mesh file is read and checked once, however often and at whatever spacing it is asked for,
-    as long as it does not change.
+    Recently used mesh files are cached: an unchanged file is read and checked once, for all
+    spacings.
 
     Args:
         garment: pattern or mesh file.
@@ -42,9 +42,9 @@ def build_garment_like(
 ) -> GarmentMesh:
     """Returns a garment on the nodes that the nominal garment has at `spacing`, m.
 
-    A variation draws garments of different sizes, whose meshes differ in their numbers of nodes.
-    Meshes of this function all have those of the nominal garment, each at the same place of the
-    pattern.
+    A variation draws garments of different sizes, and meshing each by itself would give different
+    numbers of nodes. Meshes from this function all have the nodes of the nominal garment, each at
+    the same place of the pattern.
 
     Args:
         garment: pattern or mesh file, drawn from `nominal` by a variation.
@@ -88,7 +88,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarmen
 
 
 def _identity(path: Path, mesh: schema.Mesh) -> tuple[object, ...] | None:
-    """Returns what changes if the file or how it is read does; None where there is no file."""
+    """Returns a key that changes with the file and its options; None if there is no file."""
     try:
         state = path.stat()
     except (OSError, ValueError):

@@ -4,9 +4,9 @@
     PANDA_COMMAND_LEFT, _RIGHT    lcmt_panda_command   to them, at a fixed rate
     GARMENT_ESTIMATE              lcmt_point_cloud     nodes of the controller's garment, m, m/s
     PERSON_ESTIMATE               lcmt_point_cloud     shoulder, elbow, hand of left, then right, m
-    CAMERA_<NAME>                 lcmt_image_array     of each camera
+    CAMERA_<NAME>                 lcmt_image_array     images of each camera
 
-`drake-dress sim-station` sends and takes the same. Each source is watched: see
+`drake-dress sim-station` sends and receives the same messages. Each source is supervised; see
 `models/supervision/`.
 """
 
@@ -55,23 +55,23 @@ from drake_dress.systems.point_messages import PointReceiver, decode_points
 from drake_dress.systems.station_watch import StationWatch
 from drake_dress.systems.status_messages import StatusCheck
 
-# Of looking at what has come, s.
+# Period of the watch, and longest wait for a message while listening, s.
 _WATCH_PERIOD = 0.005
 _LISTENING_STEP = 0.05
-# Of taking what has piled up, and something new of each source, s.
+# Time to receive the backlog and a new message of each source, s.
 _CATCHING_UP = 0.2
 
 
 @dataclass(frozen=True)
 class Links:
-    """Where messages go, and how often.
+    """Channels of the messages, and rate of the commands.
 
     Attributes:
         lcm_url: of the bus.
         status, command: channels of the arms; _LEFT and _RIGHT are appended.
         garment, person: channels of the estimates.
         camera: channels of images; _NAME is appended.
-        command_period: s. command_offset: of the first command, s.
+        command_period: s. command_offset: time of the first command, s.
     """
 
     lcm_url: str
@@ -84,7 +84,7 @@ class Links:
     command_offset: float = 0.001
 
     def of_arm(self, kind: str, side: str) -> str:
-        """Returns the channel of an arm's status or command."""
+        """Returns the channel of an arm's `kind`, status or command."""
         return f"{getattr(self, kind)}_{side.upper()}"
 
     def of_camera(self, name: str) -> str:
@@ -94,7 +94,7 @@ class Links:
 
 @dataclass(frozen=True)
 class Beliefs:
-    """What messages may say to be believed: of each arm's joints, the person, the garment."""
+    """Bounds within which messages about arm joints, person and garment are plausible."""
 
     joints: JointBounds
     person: PersonBounds
@@ -103,22 +103,23 @@ class Beliefs:
 
 @dataclass(frozen=True)
 class HardwareParameters:
-    """What the hardware station is made of.
+    """Parameters of the hardware station.
 
     Attributes:
-        links: of the messages.
-        mode: of `panda_driver.MODES`.
-        node_count: of the controller's garment.
-        arms: left and right, where they stand.
-        beliefs: bounds of what messages say.
+        links: channels of the messages.
+        mode: one of `panda_driver.MODES`.
+        node_count: number of nodes of the controller's garment.
+        arms: left and right, at their bases.
+        beliefs: bounds of plausible messages.
         cameras: their names.
-        stale_status, stale_estimate, stale_camera: age at which a source is stale, s. A message
-            that is older than the newest one by no more is dropped without a fault.
-        patience: with faults.
-        wait: for the first messages, s.
-        start_distance: of a gripper from where the run begins, at most, m.
-        start_angle: of a joint, rad.
-        wall: whether staleness is measured by this machine's clock, and not by the diagram's.
+        stale_status, stale_estimate, stale_camera: age at which a source is stale, s. An
+            out-of-order message that is older than the newest one by no more than this is dropped
+            without a fault.
+        patience: how long faults are tolerated.
+        wait: longest wait for the first messages, s.
+        start_distance: largest distance of a gripper from its place at the start of the run, m.
+        start_angle: largest deviation of a joint from its angle there, rad.
+        wall: whether staleness is measured by this machine's clock instead of the diagram's.
     """
 
     links: Links
@@ -138,20 +139,20 @@ class HardwareParameters:
 
 
 class StationSilentError(RuntimeError):
-    """Something that the station needs was not heard."""
+    """A source that the station needs sent no sound message."""
 
 
 class NoBusError(RuntimeError):
-    """There is no bus at a URL."""
+    """No bus can be opened at a URL."""
 
 
 class NotAtStartError(RuntimeError):
-    """An arm is not where the run begins."""
+    """An arm is not at the start of the run."""
 
 
 @dataclass(frozen=True)
 class Heard:
-    """What sources said first: joints (2,7) rad, garment (m,3) m, person's joints (6,3) m."""
+    """First sound messages: arm joints (2,7) rad, garment (m,3) m, person's joints (6,3) m."""
 
     joints: FloatArray
     garment: FloatArray
@@ -163,10 +164,10 @@ class HardwareStation(Station):
     """A station over LCM.
 
     Attributes:
-        watch: of its sources.
-        meter: of its commands.
-        lcm: its bus, which must live as long.
-        heard: what its sources said first.
+        watch: supervises its sources.
+        meter: records the times of its commands.
+        lcm: its bus, which must live as long as the station.
+        heard: first messages of its sources.
     """
 
     watch: StationWatch
@@ -176,21 +177,21 @@ class HardwareStation(Station):
 
     @property
     def in_real_time(self) -> bool:
-        """Whether the world goes on while a controller solves."""
+        """Whether the world keeps moving while a controller solves."""
         return True
 
     def make_ready(self, rehearse: Callable[[FloatArray, FloatArray], None]) -> None:
-        """Has controllers solve once for what was heard first, and takes what comes meanwhile."""
+        """Has controllers solve once for the first messages, then receives the backlog."""
         print("rehearsing: each controller solves once", flush=True)
         rehearse(self.heard.garment, self.heard.person)
         self.catch_up()
 
     def fault(self, root: Context) -> str | None:
-        """Returns what has been wrong for longer than patience lasts."""
+        """Returns the fault that has lasted longer than is tolerated; None if there is none."""
         return self.watch.conclusion(self.watch.GetMyContextFromRoot(root))
 
     def note(self, root: Context, writer: RunLogWriter) -> None:
-        """Writes what was wrong with the sources, and when commands were sent."""
+        """Writes the faults of the sources, and the times of the commands."""
         context = self.watch.GetMyContextFromRoot(root)
         events = self.watch.events(context)
         writer.note("events", "\n".join(f"{t:.3f} {line}" for t, line in events))
@@ -202,8 +203,8 @@ class HardwareStation(Station):
             writer.note("start_up", process_age(self.meter.first))
 
     def catch_up(self) -> None:
-        """Takes what has come while the diagram was made, so that a run begins with the newest."""
-        # a bus keeps the oldest messages of those that do not fit, so what is there now is old
+        """Receives the messages that came meanwhile, so that a run begins with the newest."""
+        # a full bus drops new messages and keeps the oldest, so waiting messages are old
         end = clock.monotonic() + _CATCHING_UP
         while clock.monotonic() < end:
             self.lcm.HandleSubscriptions(round(1e3 * _LISTENING_STEP))
@@ -218,7 +219,7 @@ class _Source:
 
     @cached_property
     def decoder(self) -> Decoder:
-        """Shared by all who take the messages."""
+        """Decoder shared by all subscribers to the messages."""
         return Decoder(self.lcm_type, self.check, self.max_age)
 
 
@@ -230,7 +231,7 @@ def _image_finding(message: Any) -> Finding:
 
 
 def _sources(p: HardwareParameters) -> dict[str, _Source]:
-    """Returns the sources of one listener, with checks that remember what it heard."""
+    """Returns the sources of one listener; their checks remember the messages that it received."""
     arms = {
         f"{side}_arm": _Source(
             p.links.of_arm("status", side),
@@ -270,10 +271,10 @@ def _sources(p: HardwareParameters) -> dict[str, _Source]:
 
 
 def open_bus(url: str) -> DrakeLcm:
-    """Returns a bus.
+    """Returns the bus at a URL.
 
     Raises:
-        NoBusError: there is none at this URL.
+        NoBusError: no bus can be opened there.
     """
     try:
         lcm = DrakeLcm(url)
@@ -293,17 +294,17 @@ def listen(
     told: Callable[[str], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Heard:
-    """Waits until every source has said something sound, and returns what.
+    """Waits until every source has sent a sound message, and returns these messages.
 
     Args:
-        p: of the station.
+        p: parameters of the station.
         lcm: a bus that is used for nothing else.
-        told: is called with the name of a source when it is heard.
-        stopped: whether to give up.
+        told: called with the name of each source when its first sound message arrives.
+        stopped: returns whether to give up.
 
     Raises:
-        StationSilentError: not all were heard in time; the message tells which, and what came
-            instead.
+        StationSilentError: a source sent no sound message in time; the message tells which, and
+            what it sent instead.
     """
     first = _First(_sources(p), told)
     for name, source in first.sources.items():
@@ -327,30 +328,30 @@ class _First:
 
     Args:
         sources: to listen to.
-        told: is called with the name of a source when it is heard.
+        told: called with the name of each source when its first sound message arrives.
 
     Attributes:
-        sources: likewise.
-        messages: by the names of the sources that were heard.
+        sources: to listen to.
+        messages: first sound messages so far, by the name of the source.
     """
 
     def __init__(self, sources: dict[str, _Source], told: Callable[[str], None]) -> None:
         self.sources = sources
         self.messages: dict[str, Any] = {}
         self._told = told
-        # what was wrong with the last message of a source
+        # fault of the last message of each source
         self._wrong: dict[str, Finding] = {}
-        # a garment is held against the grippers, so it waits for both arms
+        # a garment is checked against the grippers, so it waits for both arms
         self._waiting: set[str] = set()
         self._arms = {f"{side}_arm" for side in SIDES}
 
     @property
     def missing(self) -> list[str]:
-        """Returns the sources that were not heard yet."""
+        """Sources without a sound message so far."""
         return [name for name in self.sources if name not in self.messages]
 
     def take(self, name: str, raw: bytes) -> None:
-        """Takes a message of a source."""
+        """Receives a message of a source."""
         if name in self.messages:
             return
         if name == "garment" and not self._arms <= set(self.messages):
@@ -360,18 +361,18 @@ class _First:
         taken = self.sources[name].decoder(raw)
         if taken.finding is None:
             return
-        # before the first command, an arm is idle
+        # an arm is idle before the first command, so that is no fault here
         if taken.finding.fault & ~Fault.IDLE:
             self._wrong[name] = taken.finding
         elif stamp(taken.message) == 0.0:
-            # it may be the first message of a clock that begins
+            # a clock may start at 0; then the next message has a stamp and is accepted
             self._wrong[name] = Finding(Fault.UNSTAMPED, "utime is never filled in: it is 0")
         else:
             self.messages[name] = taken.message
             self._told(name)
 
     def unheard(self) -> list[str]:
-        """Returns for each missing source what came in place of something sound.
+        """Returns for each missing source what it sent instead of a sound message.
 
         A garment that only waits for the arms is left out.
         """
@@ -380,7 +381,7 @@ class _First:
 
 
 def _unheard(channel: str, wrong: Finding | None) -> str:
-    """Returns what came on a channel in place of something sound."""
+    """Returns in words what a channel carried instead of a sound message."""
     if wrong is None:
         return f"{channel} is silent"
     reason = f": {wrong.reason}" if wrong.reason else ""
@@ -388,15 +389,16 @@ def _unheard(channel: str, wrong: Finding | None) -> str:
 
 
 def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> ArmSetup:
-    """Returns the arms as they are, which must be near to where the run begins.
+    """Returns the arms at their measured joint angles, which must be near the start of the run.
 
     Args:
-        p: of the station.
-        planned: where the run begins.
-        joints: (2,7) where the arms are, rad.
+        p: parameters of the station.
+        planned: arms at the start of the run.
+        joints: (2,7) measured joint angles, rad.
 
     Raises:
-        NotAtStartError: an arm is too far; the message tells which, by how much, and where to.
+        NotAtStartError: an arm is too far away; the message tells which one, how far, and the
+            joint angles to move it to.
     """
     for i, side in enumerate(SIDES):
         arm = planned.pair.arms[i]
@@ -410,7 +412,7 @@ def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> Ar
                 f"begins, expected {100.0 * p.start_distance:g} cm and {p.start_angle:g} rad at "
                 f"most; move its joints to {np.round(planned.start[i], 3).tolist()} rad"
             )
-    # a joint that begins at a limit may be reported a little beyond
+    # a joint that starts at a limit may be measured slightly beyond it
     inside = [
         np.clip(q, arm.limits.lower, arm.limits.upper)
         for q, arm in zip(joints, planned.pair.arms, strict=True)
@@ -421,14 +423,14 @@ def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> Ar
 def make_hardware_station(
     p: HardwareParameters, lcm: DrakeLcm, person: Person, robots: ArmSetup, heard: Heard
 ) -> HardwareStation:
-    """Returns a station whose arms, garment and person are behind messages.
+    """Returns a station that exchanges messages with arms and trackers of garment and person.
 
     Args:
-        p: what it is made of.
+        p: its parameters.
         lcm: its bus.
-        person: as it is described.
-        robots: the arms where they are.
-        heard: what sources said first.
+        person: as the scenario describes it.
+        robots: the arms at their measured joint angles.
+        heard: first messages of the sources.
     """
     builder = DiagramBuilder()
     bus = builder.AddNamedSystem("lcm", LcmInterfaceSystem(lcm))
@@ -453,14 +455,14 @@ def make_hardware_station(
     return HardwareStation(diagram, person, grippers, robots, watch, meter, lcm, heard)
 
 
-# Subscribers to the sources' messages, by the name of the source.
+# Subscribers to the messages, by the name of the source.
 _Inboxes = dict[str, LcmSubscriberSystem]
 
 
 def _add_watch(
     builder: DiagramBuilder, p: HardwareParameters, sources: dict[str, _Source]
 ) -> StationWatch:
-    """Adds what watches the sources and permits motion."""
+    """Adds the system that supervises the sources and permits motion."""
     watch: StationWatch = builder.AddNamedSystem(
         "station_watch",
         StationWatch(
@@ -479,7 +481,7 @@ def _add_inboxes(
     sources: dict[str, _Source],
     watch: StationWatch,
 ) -> _Inboxes:
-    """Adds what takes the messages of each source, for the watch and for whoever reads them."""
+    """Adds the subscriber of each source, for the watch and for other readers."""
     inboxes = {}
     for name, source in sources.items():
         inboxes[name] = builder.AddNamedSystem(
@@ -497,7 +499,7 @@ def _add_inboxes(
 def _wire_gripper(
     builder: DiagramBuilder, side: str, watch: StationWatch, measure: ArmMeasurement
 ) -> None:
-    """Has a gripper measured by its arm's joints, and exports that and whether the arm stopped."""
+    """Exports a gripper's measurements, derived from its arm's joints, and the arm's `stopped`."""
     status = builder.GetSubsystemByName(f"{side}_arm_status")
     for name, port in (
         ("position", "position_measured"),
@@ -515,7 +517,7 @@ def _wire_gripper(
 
 
 def _add_meter(builder: DiagramBuilder, links: Links, inboxes: _Inboxes) -> CommandMeter:
-    """Adds what measures how old an arm's status is when a command is sent."""
+    """Adds the system that records the age of the arms' status at each command."""
     meter: CommandMeter = builder.AddNamedSystem(
         "command_meter", CommandMeter(links.command_period, links.command_offset)
     )
@@ -525,7 +527,7 @@ def _add_meter(builder: DiagramBuilder, links: Links, inboxes: _Inboxes) -> Comm
 
 
 def _export_estimates(builder: DiagramBuilder, inboxes: _Inboxes, heard: Heard) -> None:
-    """Exports where garment and person are believed to be; until there is news, what was heard."""
+    """Exports the estimates of garment and person; until new messages come, the first ones."""
     starts: Mapping[str, FloatArray] = {"garment": heard.garment, "person": heard.person}
     for name, exported in (
         ("garment", {"position": "garment_position", "velocity": "garment_velocity"}),
@@ -579,7 +581,7 @@ def _wire_arm(
 
 
 def control_modes(mode: str) -> dict[str, int]:
-    """Returns Drake's bits of a mode of `panda_driver.MODES`, by the name of their port."""
+    """Returns Drake's control mode bits of one of `panda_driver.MODES`, by port name."""
     both = {"position": PandaControlMode.kPosition, "velocity": PandaControlMode.kVelocity}
     return {name: one for name, one in both.items() if name in mode}
 

@@ -1,4 +1,4 @@
-"""A lab in a process of its own: arms, garment, person behind the messages of hardware."""
+"""A simulated lab in its own process: arms, garment and person behind hardware messages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.worker_process import WorkerProcess
 
-# Is said when statuses come.
+# Printed once statuses are being sent.
 OPEN = "the lab is open"
 _CHUNK = 0.05
 
@@ -35,14 +35,14 @@ _CHUNK = 0.05
 def run_lab(
     scenario: Scenario, source: Path, out: Path, realtime_rate: float = 1.0, report: bool = True
 ) -> int:
-    """Plays a scenario's lab until its commands have ended; returns the exit status.
+    """Runs a scenario's lab until commands stop coming; returns the exit status.
 
     Args:
         scenario: loaded and validated; its variation is drawn here from its seed.
         source: the scenario's file, for messages and paths relative to it.
         out: directory to write to.
-        realtime_rate: at most this many simulated seconds per second.
-        report: whether report and replay are written beside log and summary.
+        realtime_rate: largest number of simulated seconds per second.
+        report: whether report and replay are written in addition to log and summary.
 
     Raises:
         UserError: the garment or the arms cannot be used, or there is no bus.
@@ -69,7 +69,7 @@ def run_lab(
         ):
             lab = make_lab(setup, station, lcm, writer, take)
             simulator = _rehearsed(lab, realtime_rate)
-            # a look at all garbage takes 0.1 s, for which no status would be sent
+            # a full garbage collection takes 0.1 s, during which no status would be sent
             with left_out_of_garbage():
                 heard, ended, wall_time = _play(lab, simulator, scenario, writer, interrupt)
         signal = interrupt if ended is None else None
@@ -81,7 +81,7 @@ def run_lab(
 
 
 def _rehearsed(lab: LabDiagram, realtime_rate: float) -> Simulator:
-    """Returns the lab's simulator; what steps first anywhere is compiled, which takes a minute."""
+    """Returns the lab's simulator after a rehearsal, whose compilation takes up to a minute."""
     simulator = Simulator(lab.diagram)
     simulator.set_target_realtime_rate(realtime_rate)
     cloth = lab.station.cloth
@@ -97,9 +97,9 @@ def _play(
     writer: RunLogWriter,
     interrupt: Interrupt,
 ) -> tuple[bool, str | None, float]:
-    """Runs until commands have ended.
+    """Runs until commands stop coming.
 
-    Returns whether there were any, why it ended unless by a signal, and how long the run took, s.
+    Returns whether any came, why the run ended unless by a signal, and its wall time, s.
     """
     root = simulator.get_context()
     at = lab.player.GetMyContextFromRoot(root)

@@ -1,4 +1,4 @@
-"""A lab as a diagram: a simulated station with arms, behind the messages of hardware."""
+"""The diagram of a lab: a simulated station with arms, behind hardware messages."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.spoiler import Spoil, spoil_points
 from drake_dress.systems.station_watch import StationWatch
 
-# What pictures are taken of.
+# Ports of the station that pictures are rendered from.
 _PICTURED = ("cheat_plant_state", "cheat_garment_position")
 _WATCH_PERIOD = 0.005
-# By which a joint is reported elsewhere, rad.
+# Offset of a joint's reported position in the fault `joint_leap`, rad.
 _LEAP = 0.3
 
 
 @dataclass(frozen=True)
 class LabDiagram:
-    """A lab's diagram, and what its loop looks at."""
+    """A lab's diagram, and the parts of it that its loop reads."""
 
     diagram: Diagram
     station: SimulatedStation
@@ -81,8 +81,8 @@ def make_lab(
         station: with arms and estimates.
         lcm: its bus.
         writer: of the lab's own log, if one is kept.
-        take: has pictures taken elsewhere; they are taken on the way, which holds up the arms,
-            when None.
+        take: renders pictures in another process. When None, the diagram renders them itself,
+            which delays the arms.
     """
     make = _LabMaker(setup, station, lcm)
     for side in SIDES:
@@ -104,7 +104,7 @@ def make_lab(
 
 
 class _LabMaker(Wiring):
-    """A lab's diagram in the making: station, bus, and who plays its faults."""
+    """A lab's diagram under construction: station, bus, and the player of faults."""
 
     def __init__(self, setup: Setup, station: SimulatedStation, lcm: DrakeLcm) -> None:
         super().__init__(station)
@@ -125,7 +125,7 @@ class _LabMaker(Wiring):
         self.connect(self.player, "push", self.station, "cheat_push")
 
     def receive_commands(self, side: Side) -> None:
-        """Lets commands to an arm through that are sound, and tells who watches of all others."""
+        """Passes an arm's sound commands to the station, and all of them to the watch."""
         channel = self.links.of_arm("command", side)
         check = _command_check(sum(self.modes.values()))
         decoder = Decoder(lcmt_panda_command, check, self.scenario.lab.stale_command)
@@ -154,7 +154,7 @@ class _LabMaker(Wiring):
             self.connect(command, name, self.station, f"{side}_arm.{name}")
 
     def send_status(self, side: Side) -> None:
-        """Sends what an arm reports."""
+        """Sends the status of an arm."""
         status = self.add(f"{side}_status", PandaStatusSender())
         for name in ARM_STATUS:
             self.connect(self.station, f"{side}_arm.{name}", status, name)
@@ -181,7 +181,7 @@ class _LabMaker(Wiring):
         return noise.get_output_port()
 
     def send_points(self, name: str, count: int, ports: list[OutputPort]) -> None:
-        """Sends an estimate: `count` points, and their velocities where there are two ports."""
+        """Sends an estimate: `count` points, and their velocities if there are two ports."""
         sender = self.add(f"{name}_points", PointSender(count, len(ports) > 1))
         for i, port in enumerate(ports):
             self.builder.Connect(port, sender.get_input_port(i))
@@ -196,7 +196,7 @@ class _LabMaker(Wiring):
         )
 
     def send_pictures(self, camera: Camera) -> None:
-        """Sends what a camera of the station sees."""
+        """Sends the pictures of a camera of the station."""
         self._send(
             f"camera_{camera.name}",
             self.links.of_camera(camera.name),
@@ -208,7 +208,7 @@ class _LabMaker(Wiring):
         )
 
     def send_pictures_taken_elsewhere(self, camera: Camera, take: Take) -> None:
-        """Sends what a camera sees, once another process has drawn it."""
+        """Sends the pictures of a camera, which another process renders."""
         sizes = tuple(self.station.GetOutputPort(name).size() for name in _PICTURED)
         outbox = self.add(
             f"camera_{camera.name}_outbox",
@@ -227,7 +227,7 @@ class _LabMaker(Wiring):
         self.connect(self.player, "since", outbox, "since")
 
     def record(self, writer: RunLogWriter) -> None:
-        """Adds what writes the lab's own log."""
+        """Adds the recorder of the lab's own log."""
         recorder = self.add(
             "run_recorder",
             RunRecorder(
@@ -260,7 +260,7 @@ class _LabMaker(Wiring):
             }
         for name, port in to.items():
             self.connect(self.station, name, recorder, port)
-        # recorded from the first command on
+        # the log starts at the first command
         self.connect(self.player, "since", recorder, "active")
 
     def _send(
@@ -286,10 +286,10 @@ class _LabMaker(Wiring):
 
 
 def _command_check(mode: int) -> Check:
-    """Returns what tells what is wrong with a `lcmt_panda_command`."""
+    """Returns the check of an `lcmt_panda_command`."""
 
     def check(message: Any) -> Finding:
-        # Drake's sender writes what it sends
+        # Drake's sender fills in only the arrays of its control mode
         sizes = {1: message.num_joint_position, 2: message.num_joint_velocity}
         for bit, size in sizes.items():
             if size != (7 if mode & bit else 0):

@@ -1,4 +1,4 @@
-"""Stands where trackers of garment and person will: what a perfect one would tell."""
+"""Perfect trackers of garment and person, in place of real ones."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ def export_oracles(
     effects: Sequence[Effect],
     period: float,
 ) -> None:
-    """Adds what sees garment and person, and exports `estimate.…`.
+    """Adds the oracles of garment and person, and exports `estimate.…`.
 
     Args:
         builder: of the station.
         cloth: the true garment.
         plant: with the person.
-        joint_points: of the person's joints in their bodies.
+        joint_points: the person's joints: body index, and point in the body's frame, m.
         transfer: (m,n) from the true garment's nodes to the controller's.
-        effects: those on cameras and their clock. A clock that is behind changes nothing for
-            controllers that do not look at stamps.
-        period: to which what is late is rounded, s.
+        effects: those on cameras and their clock are applied. A clock that is behind has no effect,
+            because controllers do not read time stamps.
+        period: to which the delay of the garment's estimate is rounded, s.
     """
     garment = builder.AddNamedSystem("garment_oracle", GarmentOracle(transfer, effects))
     joints = builder.AddNamedSystem("joint_oracle", JointOracle(joint_points, effects))

@@ -1,4 +1,4 @@
-"""Parts of a user's own that take the place of parts of the dressing, or are added to them."""
+"""A user's own parts, which replace parts of the dressing or are added to them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.human.prediction import MotionPredictor
 from drake_dress.models.sides import SIDES
 
-# Ports of a user's controller: what it may read, with sizes where they are fixed, and what it has
-# to give.
+# Ports of a user's controller: inputs that it may have, and outputs that it must have, with sizes.
 INPUTS = (
     "plan",
     "garment_position",
@@ -25,7 +24,7 @@ OUTPUTS = {"left_velocity_request": 3, "right_velocity_request": 3, "request_tim
 
 @dataclass(frozen=True)
 class OwnParts:
-    """What a user adds to a scenario; each is optional.
+    """A user's additions to a scenario; each is optional.
 
     Attributes:
         predictor: of the person's arms, in place of the scenario's `controller.predictor`.
@@ -35,8 +34,8 @@ class OwnParts:
             abstract), `garment_position` (3m,) m, `joint_position` (18,) m, and
             `left_gripper_position` and `left_gripper_force` (3,), m and N, likewise `right_…`. Its
             outputs are `left_velocity_request` and `right_velocity_request`, (3,) m/s, and
-            `request_time`, (1,) s, when was measured what they answer; the safety governor, which
-            stands between it and the grippers, stops on old requests.
+            `request_time`, (1,) s, the time of the measurement that the requests are based on. The
+            safety governor between it and the grippers stops on old requests.
     """
 
     predictor: MotionPredictor | None = None
@@ -51,7 +50,7 @@ def own_controller(make: Callable[[], LeafSystem]) -> Any:
     """Returns the user's controller.
 
     Raises:
-        ValueError: its ports are not those that can be connected.
+        ValueError: it has an unknown input port, or lacks an output port of the right size.
     """
     system: Any = make()
     inputs = [system.get_input_port(i).get_name() for i in range(system.num_input_ports())]

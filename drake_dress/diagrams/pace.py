@@ -1,8 +1,8 @@
 """Keeps a run that drives hardware from making up for lost time.
 
-Drake's simulator holds the average rate: after a stall of half a second it runs as fast as it can
-until it is where it would have been, and commands that were to take half a second leave in a few
-hundredths of one. Arms are to go on instead, at the rate that was asked for.
+Drake's simulator keeps the average rate: after a stall of half a second it runs as fast as it can
+until it has caught up, and the commands of half a second are sent within a few hundredths of one.
+Instead, arms must continue at the target rate.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from collections.abc import Callable
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-# Behind the asked rate by so much real time, s, and it is given up: ten commands' worth.
+# Largest lag behind the target rate that is made up for, s of real time: ten command periods.
 _MOST_BEHIND = 0.05
 
 
 class SteadyPace:
-    """Takes over a simulator's monitor; real time begins anew wherever it has fallen behind.
+    """Sets a simulator's monitor, which restarts the pace when the simulation has fallen behind.
 
     Args:
-        simulator: with its target rate set; a rate of zero has no pace to keep.
-        now: real time, s.
+        simulator: with its target rate set; at a rate of zero there is no pace to keep.
+        now: returns real time, s.
 
     Attributes:
         lost: real time given up so far, s.

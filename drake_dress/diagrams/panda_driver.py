@@ -1,4 +1,4 @@
-"""An arm's own driver, simulated: its ports are those that Drake's Panda messages carry."""
+"""Simulated driver of an arm, with the ports that Drake's Panda messages carry."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from drake_dress.models.arm.description import panda_urdf
 from drake_dress.systems.command_guard import CommandGuard
 from drake_dress.systems.external_torque import ExternalTorque
 
-# Of the arm's estimate of what pulls at it, s.
+# Time constant of the arm's estimate of external torque, s.
 _FILTER_TIME = 0.01
 MODES = ("position_velocity", "position", "velocity")
 
 
 class SimPandaDriver(Diagram):
-    """Stands between a plant with an arm in it and whoever commands that arm.
+    """Driver between an arm in a plant and the system that commands it.
 
     .. pydrake_system::
 
@@ -42,17 +42,18 @@ class SimPandaDriver(Diagram):
         - torque_external
         - stop
 
-    state: (14,) of the arm in the plant. actuation: (7,) net of its drives, N·m. position, velocity
-    and all outputs of their kind: (7,) rad, rad/s, rad/s², N·m. fresh, stop, desired_state (14,):
-    as at `CommandGuard`. Names and kinds are those of Drake's PandaCommandReceiver and
-    PandaStatusSender. The maker's torque_commanded is what its control asks its drives for, which
-    do it at once here; acceleration_commanded is 0, as commands have none.
+    state: (14,) of the arm in the plant. actuation: (7,) net torque of its drives, N·m. position,
+    velocity and all outputs of their kind: (7,) rad, rad/s, rad/s², N·m. fresh, stop, desired_state
+    (14,): as in `CommandGuard`. Names and kinds are those of Drake's PandaCommandReceiver and
+    PandaStatusSender. torque_commanded equals torque_measured, because the simulated drives apply
+    the torque of the maker's control without delay. acceleration_commanded is 0, because commands
+    have none.
 
     Args:
-        start: (7,) joints at time 0, rad.
+        start: (7,) joint angles at time 0, rad.
         limits: of the joints.
         period: of the plant, s.
-        mode: of `MODES`, what is commanded.
+        mode: one of `MODES`: the commanded quantities.
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class SimPandaDriver(Diagram):
 
 
 def _arm_alone() -> MultibodyPlant:
-    """Returns a Panda that is all there is, weightless, as its own control knows it."""
+    """Returns a plant with only a Panda, without gravity, as the arm's own control models it."""
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(panda_urdf()))
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_link0"))

@@ -1,14 +1,14 @@
-"""The person as bodies of a MultibodyPlant: a torso that stands or turns, arms that yield.
+"""The person as bodies of a MultibodyPlant: a torso that is fixed or turns, and compliant arms.
 
-Each arm is three hinges at the shoulder and one at the elbow, each a spring and a damper about the
-scenario's pose. The pose is held against gravity by muscle tone: constant torques, as a person who
-holds still sets once and then forgets. Away from the pose gravity acts in full, so what a hand
-yields to a force follows from the springs and from the change of gravity's torques together.
-A person who turns has a joint about the vertical as well, held by its stance at the yaw it wants.
+Each arm has three hinges at the shoulder and one at the elbow, each with a spring and a damper
+about the scenario's pose. Muscle tone holds the pose against gravity: constant torques, which do
+not change when the arm moves. So a hand's compliance follows from the springs together with the
+change of gravity's torques away from the pose. A person who turns also has a joint about the
+vertical, which the stance holds at the wanted yaw.
 
-Limitations: the torso does not sway, and turns as one with the legs. Above the horizontal, gravity
-pulls an arm away from its pose; a pose there topples unless the shoulder's stiffness is more than
-what the arm's weight takes away (up to 7.6 N·m/rad for the measures preset).
+Limitations: the torso does not sway, and it turns as one body with the legs. Above the horizontal,
+gravity pulls an arm away from its pose. A pose there is unstable unless the shoulder's stiffness
+exceeds the negative stiffness of the arm's weight (up to 7.6 N·m/rad for the measures preset).
 """
 
 from __future__ import annotations
@@ -50,28 +50,28 @@ from drake_dress.models.sides import SIDES, Side
 
 Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
-# A coat that pulls at one side of the chest with 20 N turns a person who stands firm by less than
-# a degree; critically damped with the torso's inertia. N·m/rad, N·m·s/rad.
+# Stance, N·m/rad and N·m·s/rad: a coat that pulls at one side of the chest with 20 N turns the
+# person by less than a degree; critically damped with the torso's inertia.
 _STANCE_STIFFNESS, _STANCE_DAMPING = 300.0, 40.0
 
 
 @dataclass(frozen=True)
 class JointParameters:
-    """How the arms' joints yield, the same for both arms.
+    """Stiffness, damping and limits of the arms' joints, the same for both arms.
 
     Attributes:
         shoulder_stiffness: of each of the shoulder's three hinges, N·m/rad.
-        shoulder_damping: likewise, N·m·s/rad.
+        shoulder_damping: of each of these hinges, N·m·s/rad.
         elbow_stiffness: N·m/rad.
         elbow_damping: N·m·s/rad.
-        abduction_limits: least and greatest angle, rad; those below likewise.
+        abduction_limits: smallest and largest angle, rad; the limits below likewise.
         extension_limits: backward is positive.
         rotation_limits: outward is positive.
         elbow_limits: of its flexion.
 
     Raises:
         UserError: stiffness or damping is negative or not finite, or limits are not two finite
-            angles in rising order.
+            angles in ascending order.
     """
 
     shoulder_stiffness: float = 6.0
@@ -97,17 +97,17 @@ class JointParameters:
 
 @dataclass(frozen=True)
 class Person:
-    """What `add_person` made.
+    """A person that `add_person` added to a plant.
 
     Attributes:
         model: the person's model instance.
         capsules: of all bodies, in body frames.
         body_indices: of the bodies that have capsules, by name.
-        joint_points: body index and point in its frame (3,), m, of shoulder, elbow, hand, left
-            then right; `joint_positions` evaluates them.
+        joint_points: body index and point in the body's frame (3,), m, of shoulder, elbow, hand,
+            left then right; `joint_positions` evaluates them.
         radius: (6,) limb radius at those points, m.
         origin: of the torso's frame (3,), m, world.
-        turns: whether a joint about the vertical turns the torso.
+        turns: whether the torso has a joint about the vertical.
     """
 
     model: ModelInstanceIndex
@@ -126,11 +126,11 @@ class Person:
     def tone_torque(self, plant: MultibodyPlant) -> FloatArray:
         """Returns the generalized forces (nv,) that balance gravity in the rest pose, N·m.
 
-        Muscle tone holds the arms up; it does not change when they are moved. It belongs on the
-        plant's applied generalized force port, and is zero for whatever else is in the plant.
+        This muscle tone holds the arms up and does not change when they move. Connect it to the
+        plant's applied generalized force port; it is zero for all other models in the plant.
 
         Args:
-            plant: finalized, its default context in the person's rest pose.
+            plant: finalized, with the person's rest pose in its default context.
         """
         gravity = plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext())
         torque = np.zeros(plant.num_velocities())
@@ -140,18 +140,18 @@ class Person:
         return torque
 
     def arm_dofs(self, plant: MultibodyPlant) -> IndexArray:
-        """Returns (8,) the arms' joints in the plant's velocities: left, then right.
+        """Returns the indices (8,) of the arms' joints in the plant's velocities: left, then right.
 
-        Each arm's are abduction, extension, rotation, elbow.
+        The order in each arm is abduction, extension, rotation, elbow.
         """
         names = [f"{side}_{name}" for side in SIDES for name in JOINT_NAMES]
         starts = [plant.GetJointByName(n, self.model).velocity_start() for n in names]
         return np.array(starts, dtype=np.intp)
 
     def own_dofs(self, plant: MultibodyPlant) -> IndexArray:
-        """Returns which of the plant's velocities are the person's, in the instance's order.
+        """Returns the indices of the person's velocities in the plant's, in the instance's order.
 
-        All joints are hinges, so positions and velocities are ordered alike.
+        All joints are hinges, so positions and velocities have the same order.
         """
         every = np.arange(plant.num_velocities(), dtype=np.float64)
         return plant.GetVelocitiesFromArray(self.model, every).astype(np.intp)
@@ -168,20 +168,21 @@ def add_person(
 ) -> Person:
     """Adds a person who stands or sits at `position` (2,), m, and faces +x.
 
-    The default context of the finalized plant has the person in the rest pose. Where the plant has
-    a SceneGraph, bodies are drawn, and arms do not go through trunk, legs and each other.
+    The default context of the finalized plant has the person in the rest pose. If the plant has a
+    SceneGraph, the bodies are drawn, and the arms have contact with trunk, legs and each other.
 
     Args:
         plant: not finalized.
         measures: body sizes and masses.
         posture: standing or sitting.
-        arms: rest pose of each arm. One past a limit is kept, and the limit moved to it.
+        arms: rest pose of each arm. An angle beyond a limit is kept, and the limit moved to it.
         joints: stiffness, damping and limits.
         position: of the torso on the floor; the origin when None.
         turns: whether the torso turns about the vertical; else it is welded to the world.
 
     Raises:
-        UserError: posture, position or arms are not as said here.
+        UserError: an arm is missing, the position is not two finite numbers, or the posture is
+            unknown.
     """
     missing = [side for side in SIDES if side not in arms]
     if missing:
@@ -234,7 +235,7 @@ def _origin(position: FloatArray | None) -> FloatArray:
 def person_arms(
     measures: BodyMeasures, posture: Posture, arms: dict[Side, ArmPose], joints: JointParameters
 ) -> Arms:
-    """Returns both arms as `add_person` makes them of the same values."""
+    """Returns the model of both arms that `add_person` makes from the same values."""
     rest = np.array([_angles(arms[side]) for side in SIDES])
     limits = np.array([getattr(joints, f"{name}_limits") for name in JOINT_NAMES]).T
     left, right = (Arm(measures, posture, side) for side in SIDES)
@@ -274,7 +275,7 @@ def _add_torso(
 
 
 def _add_stance(plant: MultibodyPlant, torso: RigidBody, X_WTorso: RigidTransform) -> None:
-    """Adds the joint by which a person turns; its actuator holds it at the yaw it is given."""
+    """Adds the joint about which a person turns; its actuator holds a desired yaw."""
     foot = plant.AddFrame(FixedOffsetFrame("stance_frame", plant.world_frame(), X_WTorso))
     joint = plant.AddJoint(
         RevoluteJoint("stance", foot, torso.body_frame(), np.array([0.0, 0.0, 1.0]))
@@ -294,7 +295,7 @@ def _add_arm(
     joints: JointParameters,
 ) -> tuple[RigidBody, RigidBody]:
     sign = 1.0 if side == "left" else -1.0
-    # The shoulder is three hinges; the bodies between them only need to have some inertia.
+    # The shoulder is three hinges; the bodies between them exist only to connect these.
     link = SpatialInertia.SolidSphereWithMass(0.05, 0.03)
     first = plant.AddRigidBody(f"{side}_shoulder_1", model, link)
     second = plant.AddRigidBody(f"{side}_shoulder_2", model, link)
@@ -376,7 +377,7 @@ def _is_number(value: object) -> bool:
 
 
 def _expected_of_limits(value: object) -> str | None:
-    """Returns what is wrong with limits, as what was expected; None when nothing is."""
+    """Returns what was expected instead of `value`; None if it is a valid pair of limits."""
     if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(_is_number, value)):
         return "two finite angles in rad"
     if value[0] >= value[1]:

@@ -1,4 +1,4 @@
-"""The controllers from prediction to requested velocities, wired to whatever gives estimates."""
+"""The controllers from prediction to requested velocities, wired to a source of estimates."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class LocalSetup:
         period: between solves, s.
         delay: from the observation to the use of its solution, s.
         feedback: whether it corrects between solves.
-        joints_step: time step of the prediction of the person's joints that it uses, s.
-        joints_count: steps of that prediction beyond the present.
+        joints_step: time step of the prediction of the person's joints, s.
+        joints_count: steps of that prediction after the current time.
         record: list to which each solved problem is appended, if given.
     """
 
@@ -79,11 +79,11 @@ class ControlSetup:
     Attributes:
         policy: of the global controller, with the controller's garment.
         rates: of controllers and log.
-        limits: that the safety governor keeps between controllers and grippers.
+        limits: enforced by the safety governor between controllers and grippers.
         predictor: of the person's arms; the default predicts no motion.
         local: the local controller between plan and governor; None to follow the plan directly.
         in_worker: whether controllers solve in the background, the global one in a worker process.
-        own: the user's system that requests velocities in place of all of these; see `OwnParts`.
+        own: the user's system that requests velocities in place of `local`; see `OwnParts`.
     """
 
     policy: DressingPolicy
@@ -116,7 +116,7 @@ def add_planning(
     Args:
         builder: of the diagram.
         control: the controllers.
-        feed: connects the station's outputs that they need.
+        feed: connects the station's outputs to their inputs.
         waits: whether simulated time stands still while the global controller solves.
     """
     rates, p = control.rates, control.policy.parameters
@@ -171,7 +171,7 @@ def _add_local_controller(
 def _add_own_controller(
     builder: DiagramBuilder, mpc: GlobalMpc, controller: Any, feed: Feed
 ) -> Any:
-    """Adds a user's controller, and connects those input ports that it has."""
+    """Adds a user's controller and connects the input ports that it has."""
     builder.AddNamedSystem("own_controller", controller)
     if controller.HasInputPort("plan"):
         builder.Connect(mpc.GetOutputPort("plan"), controller.GetInputPort("plan"))

@@ -1,4 +1,4 @@
-"""Frees what a diagram holds that nobody uses any more."""
+"""Frees the memory of a diagram that is no longer used."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ from pydrake.systems.framework import Diagram
 
 
 def release(diagram: Diagram) -> None:
-    """Lets go of all that the systems of a diagram hold, and of the diagram.
+    """Clears the attributes of a diagram and of all its systems.
 
-    A system written in Python is never freed by pydrake: its C++ part holds its bound methods,
-    which hold the system, and Python's garbage collector does not see the C++ part. Each system
-    keeps its diagram, so that a process which builds diagrams again and again grows by all of them.
-    This empties the Python parts; what is left of a dressing's station is 0.8 MB in C++, where a
-    whole one has several.
+    pydrake never frees a system written in Python: its C++ part holds its bound methods, which hold
+    the system, and Python's garbage collector does not see the C++ part. Each system keeps its
+    diagram, so a process that builds many diagrams grows by all of them. This function empties the
+    Python parts. A dressing's station then keeps 0.8 MB in C++, where a whole one has several.
 
-    Neither the diagram nor a system of it may be used afterwards.
+    Neither the diagram nor any of its systems may be used afterwards.
 
     Args:
-        diagram: of which no simulator is left.
+        diagram: one that no simulator uses any more.
     """
     for system in diagram.GetSystems():
         if isinstance(system, Diagram):

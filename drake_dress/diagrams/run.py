@@ -39,23 +39,23 @@ from drake_dress.report.summary import summarize, write_summary
 from drake_dress.report.web_page import open_page
 
 DONE, NOT_DRESSED = 0, 1
-# Simulated time between looks at the stages, s, and for which both sleeves must stay done.
+# Simulated time between checks of the stages, and time for which both sleeves must stay done, s.
 _CHUNK = 0.1
 _STAY = 1.0
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a scenario is run.
+    """Options of a run.
 
     Attributes:
         meshcat: whether to show the run live.
-        realtime_rate: at most this many simulated seconds per second; 0 for no limit, which is 1
-            for hardware.
+        realtime_rate: largest number of simulated seconds per second; 0 means no limit (1 on
+            hardware).
         in_workers: whether the simulated garment is stepped, and the global controller solves, in
             worker processes.
-        report: whether report and replay are written beside log and summary.
-        told: takes the lines that say where the run is shown and how it ended.
+        report: whether report and replay are written in addition to log and summary.
+        told: called with each line that says where the run is shown or how it ended.
     """
 
     meshcat: bool = True
@@ -74,18 +74,19 @@ def run_scenario(
 ) -> int:
     """Runs a scenario and writes log, summary, report and replay; returns the exit status.
 
-    What an earlier run left in `out` is removed. A signal ends the run; what had run is in the log.
+    Results of an earlier run in `out` are removed. If a signal ends the run, the log holds what was
+    simulated until then.
 
     Args:
         scenario: loaded and validated; its variation is drawn here from its seed.
         source: the scenario's file, for messages and paths relative to it.
-        out: directory to write to; made when all input has proved usable.
-        options: how it is run.
-        own: parts of a user's own.
+        out: directory to write to; created once all input has proved usable.
+        options: of the run.
+        own: the user's own parts.
 
     Raises:
         UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
-            hardware is silent, or not where the run begins; or another run writes to `out`.
+            hardware is silent, or not at the start of the run; or another run writes to `out`.
     """
     setup = read_setup(apply_variation(scenario), source)
     page = _open_meshcat(options.told) if options.meshcat else None
@@ -144,7 +145,7 @@ def _parts(setup: Setup, page: Meshcat | None, in_worker: bool, own: OwnParts) -
 
 
 def _open_meshcat(told: Callable[[str], None]) -> Meshcat | None:
-    """Returns a page that listens on localhost only, and says where; None where none can be."""
+    """Opens a page that listens on localhost only and reports its URL; None if that fails."""
     try:
         page = open_page()
     except UserError as error:
@@ -156,9 +157,9 @@ def _open_meshcat(told: Callable[[str], None]) -> Meshcat | None:
 
 @dataclass(frozen=True)
 class Ending:
-    """Why a run ended before its time: a signal came, or the station had a fault.
+    """Why a run ended early: a signal, or a fault of station, controller or log.
 
-    `behind` is real time, s, by which a run on hardware fell behind the rate that was asked for.
+    `behind` is the real time, s, by which a run on hardware fell behind its target rate.
     """
 
     interrupted: bool = False
@@ -203,7 +204,7 @@ def _simulate(
             try:
                 simulator.AdvanceTo(now)
             except OSError as error:
-                # no command without a log of it: commands end, and arms stop by themselves
+                # no command is sent unlogged: commands end here, and the arms stop by themselves
                 fault = f"log: cannot be written: {error}"
                 break
             fault = station.fault(simulator.get_context()) or dressing.mpc.failure(context)
@@ -227,14 +228,14 @@ def concluded(
     interrupt: Interrupt | None,
     told: Callable[[str], None] = print,
 ) -> int:
-    """Writes what `conclude` does, tells how the run ended; returns the exit status.
+    """Calls `conclude`, reports how the run ended and returns the exit status.
 
     Args:
         out: directory of the run.
-        wall_time: that it took, s.
+        wall_time: of the run, s.
         report: whether report and replay are written.
         interrupt: the signal that ended it, if one did.
-        told: takes the lines that say so.
+        told: called with each line of the outcome.
     """
     success, reason = conclude(out, wall_time, report, told)
     if interrupt is not None:
@@ -249,10 +250,10 @@ def conclude(
 ) -> tuple[bool, str | None]:
     """Writes the summary of the log in `out`, and report and replay if they are wanted.
 
-    Each is written by itself: one that fails is told in a line and takes nothing else with it.
+    The files are independent: one that cannot be written is reported and does not stop the others.
 
     Returns:
-        success and reason.
+        Success, and the reason for a failure.
     """
     log_file, summary_file, report_file, replay_file = (out / name for name in RUN_FILES)
     with RunLog.open(log_file) as log:
@@ -270,14 +271,14 @@ def conclude(
 
 
 def _write_report(out: Path, measures: Measures) -> None:
-    # its plots take a second to import, which no robot has to wait for
+    # importing its plots takes a second, for which no robot should wait
     from drake_dress.report.report_html import write_report
 
     write_report(out, measures=measures)
 
 
 def _written(path: Path, write: Callable[[], object]) -> bool:
-    """Writes a file about a run that is over; returns whether that went well, and tells if not."""
+    """Writes a file of a finished run; returns whether that succeeded, and reports a failure."""
     try:
         write()
     except Exception as error:

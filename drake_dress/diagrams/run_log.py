@@ -20,7 +20,7 @@ def open_run_log(out: Path, setup: Setup, station: Station) -> RunLogWriter:
     Args:
         out: folder; the results of an earlier run are removed from it.
         setup: of the scenario.
-        station: that is logged.
+        station: the logged station.
     """
     person, scenario, garments = station.person, setup.scenario, setup.garments
     return RunLogWriter(

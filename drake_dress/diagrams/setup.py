@@ -1,4 +1,4 @@
-"""A scenario, read once: each of its sections as the values that the diagram's builders take."""
+"""A scenario's sections, converted once to the values that the diagram's builders take."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Setup:
     """The values of a scenario with nothing left to draw.
 
     Attributes:
-        scenario: from which they were read.
+        scenario: from which the values were read.
         source: its file, for messages and relative paths.
         garments: of plant and controller.
         station: parameters of the simulated station.
@@ -53,7 +53,7 @@ class Setup:
     rates: Rates
 
     def as_estimated(self) -> Setup:
-        """Returns the setup where the true garment is unknown: the controller's replaces it."""
+        """Returns the setup for an unknown true garment, which the controller's replaces."""
         belief = self.garments.belief
         station = replace(self.station, mesh=belief)
         return replace(self, garments=Garments(belief, belief), station=station)
@@ -62,8 +62,8 @@ class Setup:
         """Returns the policy of the global controller.
 
         Args:
-            person: as it was added to a plant.
-            costs: a user's own, beside those that the scenario lists.
+            person: as added to a plant.
+            costs: the user's own, in addition to those that the scenario lists.
         """
         controller = self.scenario.controller
         in_real_time = self.scenario.station.kind == "hardware"
@@ -84,7 +84,7 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
         source: its file, for messages and relative paths.
 
     Raises:
-        UserError: the garment cannot be used, or hangs outside the grippers' limits at first.
+        UserError: the garment cannot be used, or hangs outside the grippers' limits at the start.
     """
     plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)

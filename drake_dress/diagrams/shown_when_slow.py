@@ -1,4 +1,4 @@
-"""A line of progress on stderr for work that is mostly quick."""
+"""Progress on stderr for work that is usually quick."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _PATIENCE = 2.0  # s before anything is shown
 
 
 class ShownWhenSlow:
-    """Shows stages and their progress, once the work has taken two seconds.
+    """Shows stages and their progress once the work has taken two seconds.
 
-    On a terminal this is a bar, which goes when the work is done. Elsewhere it is one line.
+    A terminal shows a bar, which disappears when the work is done; other outputs show one line.
 
         with ShownWhenSlow("jacket.obj") as progress:
             progress("reading", 0.0)
@@ -42,7 +42,7 @@ class ShownWhenSlow:
         return self
 
     def __call__(self, stage: str, share: float) -> None:
-        """Tells what is being done, and which share of it is."""
+        """Sets the current stage, and the fraction of it that is done."""
         self._stage = stage
         self._bar.update(self._task, description=f"{self._subject}: {stage}", completed=share)
 

@@ -1,4 +1,4 @@
-"""The station: where robots, person and garment are. Simulated here; hardware has the same ports.
+"""The station: robots, person and garment. Simulated here; hardware has the same ports.
 
 With arms:
 
@@ -6,9 +6,9 @@ With arms:
     outputs  {left,right}_arm.position_commanded, position_measured, velocity_commanded,
              velocity_measured, acceleration_commanded, torque_commanded, torque_measured,
              torque_external                                 (7,) as in Drake's Panda messages
-             {left,right}_arm.stopped                        (1,) > 0: its driver does not follow
+             {left,right}_arm.stopped                        (1,) > 0: driver ignores commands
 
-Without, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
+Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
 
     outputs  {left,right}_gripper.position_measured          (3,) m
              {left,right}_gripper.velocity_measured          (3,) m/s
@@ -16,18 +16,18 @@ Without, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
              estimate.garment_position, garment_velocity     (3m,) of the controller's garment
              estimate.joint_position                         (18,) of the person's arms, m
              NAME.color_image, NAME.depth_image              of each camera
-             permission                                      (1,) 0: arms shall come to rest
+             permission                                      (1,) 0: arms must come to rest
              cheat_garment_position, cheat_garment_velocity  (3n,)
              cheat_contact (n,), cheat_contact_force (3n,)
              cheat_joint_position                            (18,) of the person's arms
-             cheat_{left,right}_arm_stop                     (1,) why a driver does not follow
+             cheat_{left,right}_arm_stop                     (1,) why a driver ignores commands
     inputs   cheat_{left,right}_arm_fresh                    (1,) 0: its commands have ended
-             cheat_push                                      (6,) on the arms' tools, N
+             cheat_push                                      (6,) force on the arms' tools, N
     outputs  cheat_plant_state                               of the MultibodyPlant
              cheat_body_poses                                of the person's bodies
 
-What only simulation can know has the prefix `cheat_`. What arms measure of their grippers comes
-from their joints; a floating gripper measures itself.
+Ports that only a simulation can have carry the prefix `cheat_`. With arms, the measurements of
+grippers are derived from the joints; floating grippers are measured directly.
 """
 
 from __future__ import annotations
@@ -103,9 +103,9 @@ from drake_dress.systems.person_bodies import PersonBodies
 from drake_dress.systems.tool_load import ToolLoad
 from drake_dress.systems.tool_motion import ToolMotion
 
-# What a station takes and tells of a garment or a gripper.
+# Quantities of motion of a garment, an arm or a gripper, in names of ports.
 MOTION = ("position", "velocity")
-# What an arm reports, as Drake's PandaStatusSender has it.
+# Quantities that an arm reports, as named by Drake's PandaStatusSender.
 ARM_STATUS = (
     "position_commanded",
     "position_measured",
@@ -119,14 +119,14 @@ ARM_STATUS = (
 # Time for which the coat hangs from still grippers before the run begins, and its damping then, s.
 _SETTLING_TIME = 1.6
 _SETTLING_DAMPING = 0.03
-# Beyond this a node's motion is none of a dressing's, m/s: a hem that swings does 1.7. One that has
-# broken down is at 8 m/s a tenth of a second later, and then takes minutes for each further one.
+# Speed of a node above which the simulation counts as diverged, m/s; a swinging hem reaches 1.7. A
+# diverged simulation is at 8 m/s a tenth of a second later, and each further tenth takes minutes.
 _BROKEN_SPEED = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class StationParameters:
-    """What the simulated station is made of; SI units.
+    """Parameters of the simulated station; SI units.
 
     `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
     `in_worker` steps the garment in a worker process.
@@ -162,11 +162,11 @@ class StationParameters:
 
 @dataclass(frozen=True)
 class Sight:
-    """What is seen of garment and person.
+    """Parameters of the estimates of garment and person.
 
     Attributes:
         transfer: (m,n) from the true garment's nodes to the controller's.
-        period: of the controllers' commands, to which what is late is rounded, s.
+        period: of the controllers' commands, to which the estimates' delay is rounded, s.
     """
 
     transfer: sp.csr_array
@@ -175,11 +175,11 @@ class Sight:
 
 @dataclass(frozen=True)
 class Station:
-    """A station's diagram, and what its users need to know of it.
+    """A station's diagram, and the data that its users need.
 
     Attributes:
         diagram: with the ports above.
-        person: as it is described.
+        person: as the scenario describes it.
         start_grippers: (2,3) of left and right at time 0, m.
         robots: the arms; None where grippers float.
     """
@@ -191,34 +191,34 @@ class Station:
 
     @property
     def in_real_time(self) -> bool:
-        """Whether the world goes on while a controller solves."""
+        """Whether the world keeps moving while a controller solves."""
         return False
 
     def make_ready(self, rehearse: Callable[[FloatArray, FloatArray], None]) -> None:
-        """Is called once, before a run begins.
+        """Prepares the station; called once, before a run begins.
 
         Args:
             rehearse: has all controllers solve once, for a garment (m,3) and joints (6,3), m.
         """
 
     def fault(self, root: Context) -> str | None:
-        """Returns why the station ends the run; None while it does not."""
+        """Returns the fault by which the station ends the run; None if there is none."""
         return None
 
     def note(self, root: Context, writer: RunLogWriter) -> None:
-        """Writes to the log what the station alone knows of a run that is over."""
+        """Writes the station's own records of a finished run to the log."""
 
 
 @dataclass(frozen=True)
 class SimulatedStation(Station):
-    """A station, and what is inside."""
+    """A simulated station and its main systems."""
 
     plant: MultibodyPlant
     scene_graph: SceneGraph
     cloth: ClothPlant
 
     def fault(self, root: Context) -> str | None:
-        """Returns that the garment moves as no garment does, where its simulation broke down."""
+        """Returns a message if a node is so fast that the simulation must have diverged."""
         velocity = self.cloth.GetOutputPort("garment_velocity").Eval(
             self.cloth.GetMyContextFromRoot(root)
         )
@@ -234,12 +234,12 @@ def make_simulated_station(
     """Returns a station whose grippers, on arms or floating, hold a coat behind a person.
 
     Args:
-        p: what it is made of.
-        meshcat: where it is shown, if it is.
-        sight: what is seen of garment and person; without it there are no estimates.
+        p: its parameters.
+        meshcat: page that shows it, if any.
+        sight: parameters of the estimates; without it there are no estimates.
 
     Raises:
-        ArmReachError: the arms do not reach where the grippers are at first, or will have to be.
+        ArmReachError: the arms cannot reach the grippers' start, or later goals of a dressing.
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.body_time_step)
@@ -299,7 +299,7 @@ def _add_cloth(
     grippers: FloatArray,
     p: StationParameters,
 ) -> ClothPlant:
-    """Adds the garment as it hangs at first, in contact with the plant's bodies."""
+    """Adds the garment as it hangs at the start, with contact with the person's bodies."""
     cloth: ClothPlant = builder.AddNamedSystem(
         "cloth",
         ClothPlant(
@@ -321,7 +321,7 @@ def _add_cloth(
 def _add_floating_grippers(
     builder: DiagramBuilder, grippers: FloatArray, p: StationParameters
 ) -> _Ports:
-    """Adds two grippers that nothing carries; returns the ports of their motion."""
+    """Adds two grippers without arms; returns the ports of their motion."""
     motion = {}
     for i, side in enumerate(SIDES):
         gripper = builder.AddNamedSystem(
@@ -345,8 +345,8 @@ def _connect_grippers(
     grippers: FloatArray,
     p: StationParameters,
 ) -> None:
-    """Has the garment follow the grippers, as late as the effects say."""
-    # a gripper that were earlier than it reports would have to know the future
+    """Makes the garment follow the grippers, with the latency of the effects."""
+    # a negative latency has no effect, because it would need future positions
     late = -float(true_times(np.zeros(1), p.effects, GripperLatency.NAME)[0])
     for i, side in enumerate(SIDES):
         for quantity in MOTION:
@@ -374,7 +374,7 @@ def _wire_drivers(
     robots: ArmSetup,
     p: StationParameters,
 ) -> dict[tuple[Side, str], OutputPort]:
-    """Adds the arms' drivers and exports their ports; returns what arms measure of grippers."""
+    """Adds the arms' drivers and exports their ports; returns the grippers' measurements."""
     measure = builder.AddNamedSystem("arm_measurement", ArmMeasurement(robots.pair.arms))
     for i, side in enumerate(SIDES):
         model = arms[side].model
@@ -416,7 +416,7 @@ def _wire_tools(
     cloth: ClothPlant,
     arms: dict[Side, PlantArm],
 ) -> tuple[dict[tuple[Side, str], OutputPort], OutputPort]:
-    """Returns the true motion of the arms' tools, and the garment's forces on them."""
+    """Returns the true motion of the arms' tools, and the spatial forces on them."""
     tools = [arms[side].tool for side in SIDES]
     tool = builder.AddNamedSystem("tool_motion", ToolMotion(tools))
     load = builder.AddNamedSystem("tool_load", ToolLoad(tools))
@@ -432,7 +432,7 @@ def _wire_tools(
 
 
 def _joined(builder: DiagramBuilder, first: OutputPort, second: OutputPort) -> OutputPort:
-    """Returns the port of two lists of spatial forces as one."""
+    """Returns a port that joins two lists of spatial forces."""
     both = builder.AddSystem(ExternallyAppliedSpatialForceMultiplexer(2))
     builder.Connect(first, both.get_input_port(0))
     builder.Connect(second, both.get_input_port(1))
@@ -440,19 +440,19 @@ def _joined(builder: DiagramBuilder, first: OutputPort, second: OutputPort) -> O
 
 
 def person_at_rest(p: StationParameters, body: BodyMeasures, person: Person) -> Capsules:
-    """Returns the person's capsules before anything moves."""
+    """Returns the person's capsules at the start."""
     joints = np.concatenate([arm_points(body, p.posture, side, p.arms[side]) for side in SIDES])
     return Capsules(*person_capsules(person_model(body, p.posture, person), joints))
 
 
 def hung_garment(p: StationParameters) -> FloatArray:
-    """Returns the garment's rest shape (n,3) where its grippers are at first, p_WN, m."""
+    """Returns the garment's rest shape (n,3) at its place at the start, p_WN, m."""
     top = shoulder_height(p.measures, p.posture) + p.height_offset
     return p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
 
 
 def start_grippers(p: StationParameters) -> FloatArray:
-    """Returns where left and right gripper are at first, p_WG (2,3), m."""
+    """Returns the positions of left and right gripper at the start, p_WG (2,3), m."""
     hung = hung_garment(p)
     return np.stack([hung[p.mesh.grasp[side]].mean(axis=0) for side in SIDES])
 
@@ -460,11 +460,13 @@ def start_grippers(p: StationParameters) -> FloatArray:
 def robots_at_start(
     p: StationParameters, placement: ArmPlacement, body: BodyMeasures, person: Person
 ) -> ArmSetup:
-    """Returns two arms whose grippers hold the coat where a run begins.
+    """Returns two arms whose grippers hold the coat at the start of a run.
+
+    An armhole hangs below its gripper and has to go over the hand and up to the shoulder, so
+    grippers must also reach points above hand and shoulder.
 
     Raises:
-        ArmReachError: they do not reach there, or not where a dressing leads: an armhole hangs
-            below its gripper, and goes over the hand and up to the shoulder.
+        ArmReachError: the arms cannot reach the start or these points.
     """
     capsules = person_at_rest(p, body, person)
     setup = set_up_arms(placement, start_grippers(p), capsules)
@@ -487,7 +489,7 @@ def robots_at_start(
 
 
 def plant_integrator(p: StationParameters) -> Integrator:
-    """Returns what steps the plant's garment, held by both grippers."""
+    """Returns the integrator of the plant's garment, which both grippers hold."""
     settings: ImplicitSettings | ProjectiveSettings
     if p.integrator == "projective_dynamics":
         settings = ProjectiveSettings(quasi_newton=True)
@@ -509,7 +511,7 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
 
 
 def settled(p: StationParameters, hung: FloatArray) -> FloatArray:
-    """Returns the garment (n,3), m, after it has hung from still grippers for a while."""
+    """Returns the garment (n,3), m, after it has hung from resting grippers for a while."""
     settings = ImplicitSettings(buckling_wavelength=p.buckling_wavelength)
     cloth = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings, _SETTLING_DAMPING))
     state = ClothState.at_rest(hung)

@@ -1,4 +1,4 @@
-"""Takes a station's pictures in a process of its own: rendering must not hold up the arms."""
+"""Renders a station's pictures in a process of its own, so that it does not delay the arms."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from drake_dress.models.effects.composition import body_with_effects
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.lcm_inbox import cpp_serializer
 
-# Of a camera's picture, in the order in which they are sent.
+# Images of a picture message, in the order in which they are sent.
 _KINDS = (("color", PixelType.kRgba8U), ("depth", PixelType.kDepth32F))
 
 
 def add_picture_messages(builder: DiagramBuilder, station: Diagram, name: str) -> Any:
-    """Adds what makes a `lcmt_image_array` of a camera's pictures; returns its output port."""
+    """Adds the packing of a camera's images as `lcmt_image_array`; returns its output port."""
     images = builder.AddNamedSystem(f"{name}_images", ImageToLcmImageArrayT(True))
     for kind, pixels in _KINDS:
         port = images.DeclareImageInputPort[pixels](kind)
@@ -34,16 +34,16 @@ def add_picture_messages(builder: DiagramBuilder, station: Diagram, name: str) -
 
 
 class Studio:
-    """Renders what cameras of a station see, as bytes of `lcmt_image_array`.
+    """Renders the pictures of a station's cameras as bytes of `lcmt_image_array`.
 
-    It can be pickled; its scene is made where it is first asked for a picture.
+    It can be pickled, because the scene is built only at the first request for a picture.
 
     Args:
         parameters: of the station.
     """
 
     def __init__(self, parameters: StationParameters) -> None:
-        # what the scene does not need may not be picklable
+        # the scene does not need effects, and they may not be picklable
         self._parameters = replace(parameters, effects=())
         self._body = body_with_effects(parameters.measures, parameters.effects)
         self._scene: tuple[Any, ...] | None = None

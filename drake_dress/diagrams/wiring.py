@@ -1,4 +1,4 @@
-"""A diagram in the making around a station, whose ports have names."""
+"""A diagram under construction around a station, wired by port names."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from drake_dress.diagrams.station import Station
 
 
 class Wiring:
-    """What builders of diagrams share: systems by name, ports by name.
+    """Base of diagram builders: adds systems by name and connects ports by name.
 
     Attributes:
         builder: of the diagram.
-        of: the station as it was made.
+        of: the station.
         station: its system in the diagram.
     """
 
@@ -29,7 +29,7 @@ class Wiring:
         return bool(self.station.HasOutputPort("cheat_garment_position"))
 
     def true(self, name: str) -> str:
-        """Returns the port of the true value, or of its estimate where that is all there is."""
+        """Returns the name of the port of the true value, or of its estimate if it is unknown."""
         return f"cheat_{name}" if self.sees_truth else f"estimate.{name}"
 
     def add(self, name: str, system: Any) -> Any:

@@ -28,7 +28,7 @@ def test_an_agent_that_asks_as_the_controllers_do_has_their_run() -> None:
     other = Simulator(agent.diagram)
     command = agent.diagram.GetInputPort("velocity")
     ports = [follower.GetOutputPort(f"{side}_velocity_request") for side in SIDES]
-    # plans change what they ask for at multiples of 0.1 s, just after the events of that time
+    # plans change their requests at multiples of 0.1 s, just after the events of that time
     for k in range(1, 9):
         at = follower.GetMyContextFromRoot(simulator.get_context())
         if k > 1:

@@ -1,4 +1,4 @@
-"""A scenario on arms: where they start, what is logged, and what is said when they cannot reach."""
+"""A scenario with arms: their start, their log, and the message when they cannot reach."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ BEHIND = ArmPlacement(0.85, 1.0, 0.95, 0.6)
 
 @pytest.mark.parametrize("ahead", [0.0, 0.4])
 def test_arms_start_where_grippers_are(ahead: float) -> None:
-    """With their hands as asked, unless that is too near to their bases."""
+    """The hands also have the wanted orientation, unless too near to their bases."""
     grippers = GRIPPERS + [ahead, 0.0, 0.0]
     setup = set_up_arms(BEHIND, grippers, NOBODY)
     assert np.linalg.det(BEHIND.hand) == pytest.approx(1.0)
@@ -56,7 +56,7 @@ def test_a_run_that_cannot_succeed_writes_nothing(
 
 
 def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
-    # steps so short that most of them are between samples
+    # steps so short that most of them fall between samples
     scenario = load_scenario(SCENARIO, [*COARSE, "duration=2.0", "plant.body_time_step=0.004"])
     run_scenario(scenario, SCENARIO, tmp_path, RunOptions(meshcat=False))
     with h5py.File(tmp_path / "run.h5") as log:
@@ -66,7 +66,7 @@ def test_grippers_on_arms_go_where_they_are_sent(tmp_path: Path) -> None:
             assert (np.abs(log[f"arm/{side}/v"][:]) <= LIMITS.speed).all()
             assert (q > LIMITS.lower).all()
             assert (q < LIMITS.upper).all()
-            # what joints came to between samples is in the log, too
+            # extreme values between samples are in the log, too
             least, most = log[f"arm/{side}/q_least"][:], log[f"arm/{side}/q_most"][:]
             assert (least <= q).all()
             assert (q <= most).all()

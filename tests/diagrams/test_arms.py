@@ -1,4 +1,4 @@
-"""Pandas in a plant: as the plain model says, as limited as their maker says, and stiff."""
+"""Pandas in a plant: they agree with the kinematic model, keep the maker's limits and are stiff."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ def base(side: str) -> np.ndarray:
 
 @dataclass
 class Lab:
-    """Two arms alone in a plant of the garment's time step."""
+    """Two arms alone in a plant with a time step of 4 ms."""
 
     plant: MultibodyPlant
     arms: dict[Side, PlantArm]
@@ -109,7 +109,7 @@ def test_an_arm_holds_itself_and_follows(lab: Lab) -> None:
 
 
 def test_torques_stay_within_limits(lab: Lab) -> None:
-    """A jump of half a radian asks for far more than a drive has."""
+    """A jump of half a radian would need far more torque than a drive has."""
     lab.ask(HOME + 0.5, np.zeros(7))
     port = lab.plant.get_net_actuation_output_port()
     most = np.zeros(14)

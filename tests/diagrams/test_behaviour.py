@@ -1,4 +1,4 @@
-"""Persons in the plant: who is led stays led, who wants moves as said, and a dummy is as it was."""
+"""Persons in the plant: passive ones stay where led, active ones move, dummies are springs."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_dummy_has_nothing_but_its_constant_tone() -> None:
 
 
 def test_dummy_moves_to_the_bit_as_a_plant_with_tone_alone() -> None:
-    """As dummies did before persons had behaviours."""
+    """Dummies moved like this before persons had behaviours."""
     with_behaviour = scene(Behaviour())
     plant = MultibodyPlant(PERIOD)
     person = add_person(plant, M, "standing", ARMS, JOINTS)
@@ -167,7 +167,7 @@ def test_arm_led_away_stays_near_where_it_was_led() -> None:
     assert np.linalg.norm(led - start) > 3.0 * np.linalg.norm(ends[1][0] - start)
     assert np.linalg.norm(stayed - start) > 0.8 * np.linalg.norm(led - start)
     assert np.linalg.norm(ends[1][1] - start) < 1e-3
-    # its weight is carried there: it does not sag any more
+    # its weight is carried there, so it does not sag any more
     s.simulator.AdvanceTo(8.0)
     assert np.linalg.norm(s.joints()[2] - stayed) < 1e-3
     np.testing.assert_allclose(s.joints()[3:], scene(Behaviour()).joints()[3:], atol=1e-6)
@@ -185,7 +185,7 @@ def test_arm_led_by_less_than_the_threshold_comes_back() -> None:
 
 
 def test_led_round_and_let_go_the_person_has_only_taken_work() -> None:
-    """A hand drawn round by a force that turns: until it is let go, work flows in, never out."""
+    """A rotating force leads the hand round; its net work on the person is never negative."""
     s = scene(passive(time_constant=0.3, threshold=0.2))
     hand, work, least = s.joints()[2], 0.0, 0.0
     for k in range(300):
@@ -212,7 +212,7 @@ def test_turn_ends_at_its_angle_without_haste() -> None:
     assert np.rad2deg(yaw[-1]) == pytest.approx(15.0, abs=0.05)
     assert np.rad2deg(yaw.max()) < 15.5
     assert np.abs(np.diff(yaw) / 0.02).max() < 1.1 * turn.speed
-    # the arms, which hang on it, come along
+    # the arms turn with the torso
     c, s_ = np.cos(yaw[-1]), np.sin(yaw[-1])
     turned = start @ np.array([[c, -s_, 0.0], [s_, c, 0.0], [0.0, 0.0, 1.0]]).T
     np.testing.assert_allclose(joints[-1], turned, atol=2e-3)
@@ -224,9 +224,10 @@ def test_who_does_not_turn_is_welded_to_the_floor() -> None:
 
 
 def coat_near_the_hand(yaw: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Returns a coat (n,3) of which the left armhole is a little out from the left hand, m.
+    """Returns a coat (n,3) with its left armhole slightly outside the left hand, m.
 
-    Also that armhole's centre (3,). It is turned so that the hand comes in along its sleeve.
+    The second value is the centre (3,) of that armhole, m. The coat is rotated so that the hand
+    enters along the sleeve.
     """
     x, loop = np.array(MESH.rest_position), MESH.loops["left_armhole"]
     center = x[loop].mean(axis=0)
@@ -248,7 +249,7 @@ def coat_near_the_hand(yaw: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("yaw", [0.0, np.deg2rad(20.0)])
 def test_reach_brings_the_hand_into_the_armhole(yaw: float) -> None:
-    """Also after a turn, that the armhole has made too."""
+    """This also holds after a turn, if the armhole has turned too."""
     garment, goal = coat_near_the_hand(yaw)
     turns = (Turn(start=0.0, angle=yaw, duration=1.0),) if yaw else ()
     s = scene(active(Reach(start=1.5, sides=("left",)), *turns), garment)
@@ -317,7 +318,7 @@ def test_active_person_does_the_same_again() -> None:
 
 
 def test_arms_model_is_that_of_the_plant() -> None:
-    """Gravity's torques in closed form are those of the plant, wherever it has turned."""
+    """Gravity torques in closed form equal those of the plant, whatever the torso's yaw."""
     plant = MultibodyPlant(PERIOD)
     person = add_person(plant, M, "standing", ARMS, JOINTS, turns=True)
     plant.Finalize()

@@ -1,4 +1,4 @@
-"""What messages may say: dressings pass, and a run does not begin on what cannot be."""
+"""Plausibility of messages: those of dressings pass, and impossible ones prevent a run."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -71,7 +71,7 @@ def test_a_dressing_is_believed_from_its_first_message_to_its_last(
     garment: GarmentTrack | None = None
     person: PersonTrack | None = None
     for k, time in enumerate(log.time):
-        # a point of a person may be off by no more than point_error
+        # errors of a person's points must not exceed point_error
         error = rng.normal(size=(6, 3))
         error *= 2.0 * noise / np.linalg.norm(error, axis=1, keepdims=True)
         found, garment = judge_garment(
@@ -88,7 +88,7 @@ def test_a_dressing_is_believed_from_its_first_message_to_its_last(
 
 
 class Lab:
-    """Says the same of arms, garment and person each time, with stamps that go on."""
+    """Sends the same arms, garment and person each time, with increasing time stamps."""
 
     def __init__(self, wait: float, stamped: bool = True) -> None:
         scenario = load_scenario(LAB, ["controller.spacing=0.06", f"station.hardware.wait={wait}"])

@@ -1,4 +1,4 @@
-"""Arms that are drawn against the body stop at it."""
+"""Arms that are pulled against the body stop at it."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ TRUNK = 3  # capsules of the chest come first
 def drawn(
     posture: Posture, arms: dict[Side, ArmPose], forces: dict[int, list[float]], duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns joints (6,3), m, before and after `forces` (3,), N, acted at some of them."""
+    """Returns joints (6,3), m, before and after `forces` (3,), N, acted on some of them."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.004)
     person = add_person(plant, M, posture, arms, JointParameters(2.0, 1.0, 1.5, 0.4))
@@ -50,7 +50,7 @@ def drawn(
 
 
 def into_chest(joints: np.ndarray, capsules: Capsules) -> float:
-    """Returns how deep, m, arms of `joints` (6,3) are in the chest."""
+    """Returns the depth, m, by which arms of `joints` (6,3) penetrate the chest."""
     first, second = joints[[0, 1, 3, 4]], joints[[1, 2, 4, 5]]
     radius = np.array([M.upper_arm_radius, M.forearm_radius] * 2)
     pairs = np.array([[i, j] for i in range(4) for j in range(len(capsules.radius))])
@@ -74,7 +74,7 @@ def test_an_arm_that_is_drawn_inward_stops_at_the_chest(posture: Posture, side: 
     _, free = drawn(posture, OPEN, {}, 0.1)
     assert into_chest(free, chest(posture)) < 0.0
     _, joints = drawn(posture, OPEN, {3 * side + 1: [0.0, 20.0 * inward, 0.0]}, 2.0)
-    # touches, and sinks in by what 20 N and the springs do to flesh
+    # it touches, and sinks into the flesh under 20 N and the springs
     assert -0.002 < into_chest(joints, chest(posture)) < 0.01
 
 

@@ -79,7 +79,7 @@ class Photographer:
         builder.Connect(self.scene.get_query_output_port(), self.sensor.query_object_input_port())
         builder.ExportInput(self.scene.get_source_pose_port(source), "pose")
         self.diagram = builder.Build()
-        # of the box in the board: OpenCV counts from a corner, z into the board
+        # pose of the box in the board's frame: OpenCV's origin is a corner, with z into the board
         self.box = np.eye(4)
         self.box[:3, :3] = np.diag([1.0, -1.0, -1.0])
         self.box[:3, 3] = [0.5 * size[0], 0.5 * size[1], 0.5 * THICK]
@@ -109,7 +109,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray
     camera = np.eye(4)
     camera[:3, 3] = tool[:3, 3] + [0.75, 0.25, 0.15]
     camera[:3, :3] = looking(camera[:3, 3], tool[:3, 3])
-    # the board stands in the hand and looks at the camera, but not quite
+    # the hand holds the board facing the camera, but not exactly
     held = np.eye(4)
     facing = tool[:3, :3].T @ camera[:3, :3]
     held[:3, :3] = facing @ cv2.Rodrigues(np.array([0.1, -0.15, 0.05]))[0]

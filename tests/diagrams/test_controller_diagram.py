@@ -1,4 +1,4 @@
-"""See `tests/gym/test_controller_policy.py` for what its controllers request."""
+"""`tests/gym/test_controller_policy.py` tests the requests of its controllers."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A scenario that says nothing has the defaults of the models that it is read into."""
+"""An empty scenario has the defaults of the models that it is converted to."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 
-# What a default of the library and one of a scenario are for differs in these.
+# Fields whose defaults differ on purpose between library and scenario.
 _MEANT = {
-    # cloth of a scenario is a fabric; of the library, what is given
+    # a scenario has a certain fabric; the library has no preset one
     "Material.damping",
     "Material.stretch_stiffness",
-    # a pose is the scenario's; in the library an arm hangs
+    # the scenario has a pose; in the library an arm hangs down
     "ArmPose.abduction",
     "ArmPose.extension",
     "ArmPose.elbow_flexion",
-    # what `scenario_of_everything` says
+    # set by `scenario_of_everything`
     "Behaviour.kind",
     "Behaviour.motions",
     "Behaviour.tremor",
@@ -44,7 +44,7 @@ _MEANT = {
 
 
 def differing(value: Any, seen: set[int]) -> Iterator[tuple[str, Any, Any]]:
-    """Yields fields below `value` that are not their class's default: name, default, value."""
+    """Yields fields below `value` that differ from their default: name, default, value."""
     if id(value) in seen or isinstance(value, str | bytes | np.ndarray):
         return
     seen.add(id(value))
@@ -75,14 +75,14 @@ def default_of(entry: dataclasses.Field[Any]) -> Any:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Returns whether two values are alike, numbers but for what a division rounds."""
+    """Returns whether two values are equal, numbers up to rounding."""
     if isinstance(a, float) and isinstance(b, float):
         return a == pytest.approx(b, rel=1e-12)
     return np.array_equal(np.asarray(a, object), np.asarray(b, object))
 
 
 def scenario_of_everything() -> Scenario:
-    """Returns a scenario of defaults that has arms and a person who acts."""
+    """Returns a scenario of defaults with arms and an active person."""
     scenario = Scenario()
     scenario.station.arms.model = "panda"
     scenario.controller.method = "full"
@@ -126,7 +126,7 @@ def test_scenario_and_library_have_the_same_defaults() -> None:
 
 
 def test_every_setting_of_the_tasks_reaches_the_policy() -> None:
-    """Each number of `controller.tasks` and `controller.stages`, moved, is moved in the policy."""
+    """A change of any number of `controller.tasks` or `controller.stages` changes the policy."""
     mesh = make_coat(CoatParameters(), 0.06)
     station = station_parameters(Scenario(), mesh)
     plain = policy_of(Scenario(), station).parameters.tasks
@@ -151,7 +151,7 @@ def test_a_mirror_has_what_its_model_has_and_leads_back_to_it() -> None:
         """All tasks, with their approaches."""
 
     model = TaskParameters()
-    # its fields are those of the model, made by the decorator
+    # the decorator makes its fields from those of the model
     values: Any = Tasks()
     assert [a.tilt for a in values.approaches] == [a.tilt for a in model.approaches]
     assert model_of(values) == model
@@ -160,7 +160,7 @@ def test_a_mirror_has_what_its_model_has_and_leads_back_to_it() -> None:
     changed = model_of(values)
     assert changed.approaches[2].tilt == 0.7
     assert changed.flat == 0.6
-    # what a mirror begins with is its own
+    # each mirror has its own copy of the defaults
     assert Tasks().approaches[2].tilt == model.approaches[2].tilt
     with pytest.raises(TypeError, match="speed"):
         Tasks(speed=1.0)

@@ -1,4 +1,4 @@
-"""Effects in a scenario: read, refused, and at work in the station."""
+"""Effects in a scenario: reading, refusal, and action in the station."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,7 +92,7 @@ def test_effects_set_in_python_are_held_against_the_list() -> None:
 def pulled(
     settings: Sequence[str], seconds: float = 0.5, command: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns gripper forces (2,3), N, and the garment (n,3) after a while of hanging."""
+    """Returns gripper forces (2,3), N, and the garment (n,3), m, after hanging for a while."""
     scenario = load_scenario(SCENARIO, [*QUICK, *settings])
     mesh = build_garment(scenario.garment, scenario.plant.spacing, SCENARIO.parent)
     station = make_simulated_station(station_parameters(scenario, mesh))

@@ -1,4 +1,4 @@
-"""One word for how finely the garment is simulated."""
+"""The key `plant.fidelity`: one word for the resolution of the garment's simulation."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def test_a_word_gives_every_value_that_is_not_given(tmp_path: Path, name: str) -
     given = {k: v for k, v in FIDELITIES[name].items() if k != "tolerance"}
     assert {k: getattr(plant, k) for k in given} == given
     assert plant.tolerance == 0.003
-    # what is logged loads to the same, whatever the words mean by then
+    # a logged scenario loads to the same values, even if the word's meaning changes later
     again = scenario_file(tmp_path, resolved_yaml(load_scenario(path, [f"plant.fidelity={name}"])))
     assert load_scenario(again).plant == plant
 

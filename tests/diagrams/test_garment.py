@@ -27,7 +27,7 @@ def write(path: Path, y_up: bool = False) -> None:
 
 @pytest.fixture
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """Counts the files that are read."""
+    """Records the files that are read."""
     count = []
 
     def counted(*args: Any) -> WholeGarment:

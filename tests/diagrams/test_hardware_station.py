@@ -1,7 +1,7 @@
-"""The station behind messages: the same ports, and a stated reaction to each fault.
+"""The hardware station: the same ports as in simulation, and a defined reaction to each fault.
 
-Lab and run share one diagram and a bus in memory here; two processes are in
-`tests/benchmarks/test_hardware_bench.py`.
+Lab and run share one diagram and a bus in memory here; `tests/benchmarks/test_hardware_bench.py`
+runs two processes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from tests.drawing import drawn_seed
 
 SOURCE = Path(__file__).parents[2] / "scenarios" / "lab.yaml"
 COARSE = ("plant.spacing=0.06", "controller.spacing=0.06", "plant.iterations=5")
-# From a fault's start to rest: until it is seen, and by max_acceleration from the fastest.
+# Time until a fault is detected, and braking time from the largest speed by max_acceleration, s.
 SEEN = 0.05 + 0.005 + 0.005 + 0.01
 BRAKED = 0.12 / 2.0
 
@@ -87,17 +87,17 @@ class Pair:
         builder.AddNamedSystem("lab", self.lab.diagram)
         builder.AddNamedSystem("run", self.dressing.diagram)
         self.simulator = Simulator(builder.Build())
-        # as a run does: its process must be there and compiled before plans are waited for
+        # as in a run, everything must be compiled before plans are awaited
         self.dressing.rehearse(heard.garment, heard.person, lambda: False)
         self.simulator.Initialize()
         self.root = self.simulator.get_context()
 
     def read(self, system: Diagram, port: str) -> Any:
-        """Returns a vector, an image or whatever else the port holds."""
+        """Returns the value of a port: a vector, an image or another object."""
         return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self.root))
 
     def run(self, until: float) -> list[dict[str, np.ndarray]]:
-        """Returns what is so every 5 ms until a time of the diagram's, s."""
+        """Advances to simulated time `until`, s; returns a record every 5 ms."""
         rows = []
         now = self.root.get_time()
         inside = self.simulated.diagram
@@ -162,7 +162,7 @@ def test_images_arrive_as_they_were_taken() -> None:
         seen = pair.read(pair.station.diagram, f"front.{kind}_image").data
         taken = pair.read(pair.simulated.diagram, f"front.{kind}_image").data
         assert seen.shape == taken.shape == (60, 80, 4 if kind == "color" else 1)
-        # they hang still, but for the last millimetres since the image was sent
+        # garment and person are still, but for millimetres since the image was sent
         same = np.isclose(seen.astype(float), taken.astype(float), rtol=0.02, atol=3.0)
         assert (same | (np.isinf(seen) & np.isinf(taken))).mean() > 0.97
     depth = pair.read(pair.station.diagram, "front.depth_image").data
@@ -225,7 +225,7 @@ def test_at_a_fault_both_arms_hold_then_go_on_or_the_run_ends(
     pair = Pair(LabFault(kind, source, start, lasting), settings=(CAMERA,) if camera else ())
     rows = pair.run(start + lasting + 0.6)
     limits_are_kept(rows)
-    # an estimate, and more so an image, may be older than a status before it is stale
+    # an estimate, and even more an image, becomes stale later than a status
     seen = SEEN + (0.2 if kind == "stale" and source in ("garment", "person") else 0.0)
     seen += 0.5 + 0.1 if camera and kind == "stale" else 0.1 if camera else 0.0
     seen += 1.0 / pair.scenario.station.hardware.estimate_rate
@@ -267,7 +267,7 @@ def test_a_push_is_yielded_to() -> None:
 
 
 def test_arms_stop_by_themselves_when_commands_end() -> None:
-    """Their own drivers: here commands do not come through, whatever the run does."""
+    """Their own drivers stop them: here no commands get through, whatever the run sends."""
     pair = Pair(LabFault("bus_lost", "", 0.8, 1.0))
     rows = pair.run(1.9)
     limits_are_kept(rows)
@@ -281,7 +281,7 @@ def test_arms_stop_by_themselves_when_commands_end() -> None:
 
 
 def test_an_arm_whose_commands_went_astray_meanwhile_follows_again() -> None:
-    """A driver takes up only commands that begin where it holds."""
+    """A driver resumes only with commands that start at its held position."""
     pair = Pair(LabFault("bus_lost", "", 0.8, 0.6))
     pair.run(1.2)
     controller = pair.dressing.diagram.GetSubsystemByName("arm_controller")
@@ -344,7 +344,7 @@ def test_messages_out_of_order_hold_nothing_and_are_counted() -> None:
     assert dropped["left_arm"] > 20
     assert dropped["right_arm"] > 20
     assert dropped["person"] > 5
-    # of an estimate that comes every 20 ms, a clock set back by 8 ms makes none late
+    # with an estimate every 20 ms, a clock set back by 8 ms puts no message out of order
     assert dropped["garment"] == 0
 
 

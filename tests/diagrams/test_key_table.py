@@ -1,4 +1,4 @@
-"""The table of scenario keys: complete, and true of what the loader does."""
+"""The table of scenario keys is complete and agrees with the loader."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.effects.registry import EFFECTS
 
 KEYS = {key.name: key for key in scenario_keys()}
-# Each optional group, and one of each list.
+# A scenario with each optional group, and one entry in each list.
 EVERYTHING = f"""
 garment:
   mesh: {{file: a.obj, loops: {{left_cuff: [1, 2, 3]}}, grasp: {{left: [4]}}, leave_out: [Button]}}
@@ -45,8 +45,8 @@ def everything(tmp_path: Path) -> Path:
 
 
 def leaves(value: Any, name: str = "") -> Iterator[str]:
-    """Yields the dotted keys of all values of a scenario that was loaded."""
-    named = name.endswith((".loops", ".grasp", "controller.costs"))  # their own keys are the user's
+    """Yields the dotted keys of all values of a loaded scenario."""
+    named = name.endswith((".loops", ".grasp", "controller.costs"))  # the user chooses their keys
     if isinstance(value, dict) and not named:
         for key, item in value.items():
             yield from leaves(item, f"{name}.{key}" if name else key)
@@ -59,7 +59,7 @@ def leaves(value: Any, name: str = "") -> Iterator[str]:
 
 def test_every_key_that_a_scenario_holds_is_in_the_table(everything: Path) -> None:
     held = set(leaves(dataclasses.asdict(load_scenario(everything))))
-    # motions that are not given are empty in the others' entries
+    # each entry of the list has the other three motions as empty keys
     motions = {f"person.behaviour.motions[].{m}" for m in ("reach", "turn", "withdraw", "wave")}
     assert held - motions == set(KEYS)
 
@@ -133,5 +133,5 @@ def test_units_are_told_apart_from_words(name: str, unit: str) -> None:
 def test_the_table_is_markdown_with_a_row_for_each_key() -> None:
     rows = [line for line in markdown_table().splitlines() if line.startswith("| `")]
     assert len(rows) == len(KEYS)
-    # six cells, whatever the texts hold
+    # six cells, whatever the texts contain
     assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {7}

@@ -14,7 +14,7 @@ _PERIOD, _STALL = 0.01, 0.3
 
 
 class _Commands(LeafSystem):
-    """Stalls once, and keeps when each of its commands left."""
+    """Stalls once, and records the time of each command."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ def test_commands_after_a_stall_are_as_far_apart_as_before() -> None:
     simulator.Initialize()
     pace = SteadyPace(simulator)
     simulator.AdvanceTo(0.4)
-    # an average over what follows the stall: one command may come early or late on a busy machine
+    # averaged after the stall, because one command may be early or late on a busy machine
     after = commands.left[22:38]
     assert (after[-1] - after[0]) / (len(after) - 1) > 0.8 * _PERIOD
     assert pace.lost > _STALL - 0.1

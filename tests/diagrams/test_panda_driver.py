@@ -1,4 +1,4 @@
-"""The simulated driver: what it reports, what it feels, and when it stops by itself."""
+"""The simulated driver: its reports, its estimate of external torque, and its own stops."""
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ STILL = np.zeros(7)
 
 
 class Rig:
-    """One arm of two, its driver, and what is commanded."""
+    """One arm of two, its driver and its commands."""
 
     def __init__(self, mode: str = "position_velocity") -> None:
         builder = DiagramBuilder()
@@ -87,7 +87,7 @@ def test_it_follows_in_each_mode(mode: str) -> None:
     rate = np.array([0.3, 0.2, -0.2, 0.2, 0.3, -0.3, 0.3])
     for k in range(200):
         t = k * H
-        # from rest to rest: speed is rate · sin²
+        # motion from rest to rest with speed rate · sin²
         phase = np.pi * t / 0.8
         travelled = rate * (0.5 * t - 0.8 / (4.0 * np.pi) * np.sin(2.0 * phase))
         rig.command(HOME + travelled, rate * np.sin(phase) ** 2)

@@ -119,7 +119,7 @@ def test_without_tone_the_arms_sag() -> None:
 def balanced_hand(
     plant: MultibodyPlant, person: Person, force: FloatArray, newton_steps: int
 ) -> FloatArray:
-    """Returns where the left hand (3,), m, is when springs, tone, gravity and force balance.
+    """Returns the left hand (3,), m, where springs, tone, gravity and force are in balance.
 
     One Newton step from rest is the linear prediction Δq = (K − ∂g/∂q)⁻¹ Jᵀf.
     """

@@ -10,7 +10,7 @@ from tests.diagrams.test_agent_diagram import made_of
 
 
 def _kept(released: bool) -> list[bool]:
-    """Returns whether the garment's integrator and the plant are kept after their diagram."""
+    """Returns whether the garment's integrator and the plant outlive their diagram."""
     parts = made_of()
     agent = make_agent_diagram(parts)
     station = parts.station
@@ -29,5 +29,5 @@ def test_what_a_diagram_held_is_freed() -> None:
 
 
 def test_it_is_not_freed_by_itself() -> None:
-    # as soon as this fails, pydrake frees systems of Python, and `release` has no use any more
+    # once this fails, pydrake frees systems written in Python, and `release` is no longer needed
     assert _kept(released=False) == [True, True]

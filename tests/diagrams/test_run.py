@@ -73,7 +73,7 @@ def test_log_tells_what_safety_cut(run: tuple[int, Path]) -> None:
         safety = log["control/safety"]
         assert safety.shape == (len(log["time"]), 2)
         assert f"{Verdict.ACCELERATION.value} ACCELERATION" in list(safety.attrs["flags"])
-        # the first plan sets out at once, which grippers cannot
+        # the first plan starts at full speed, which grippers cannot do
         assert np.all(np.any(safety[()] & Verdict.ACCELERATION.value, axis=0))
         assert not np.any(safety[()] & (Verdict.INVALID | Verdict.STALE | Verdict.UNMEASURED).value)
 

@@ -112,7 +112,7 @@ def test_overrides_reach_every_depth(tmp_path: Path) -> None:
 
 
 def numbers_below(schema: Any, key: str = "") -> Iterator[str]:
-    """Yields the dotted key of every number that a type of the schema may hold."""
+    """Yields the dotted key of every number that a type of the schema may contain."""
     inner = [t for t in typing.get_args(schema) if t is not type(None)]
     if dataclasses.is_dataclass(schema):
         for name, hint in typing.get_type_hints(schema).items():
@@ -245,7 +245,7 @@ def test_variation_acts_on_every_measure_and_within_its_width(
             assert ratios[name] != 1.0
             assert (1 - scale) ** power * (1 - own) <= ratios[name] * (1 + 1e-12)
             assert ratios[name] <= (1 + scale) ** power * (1 + own) * (1 + 1e-12)
-        # each by itself
+        # each measure is drawn independently
         assert len(set(ratios.values())) == len(ratios)
     assert load_scenario_text(resolved_yaml(drawn)) == drawn
 

@@ -1,4 +1,4 @@
-"""Pictures taken elsewhere are those that the station's own cameras take."""
+"""Pictures rendered in another process equal those of the station's own cameras."""
 
 import pickle
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""The sections of a scenario as the values that the diagram's builders take: a module each."""
+"""Converts the sections of a scenario to the values that diagram builders take, a module each."""

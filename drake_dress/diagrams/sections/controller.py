@@ -37,7 +37,7 @@ def controller_policy(
         mesh: the controller's garment.
         person: as the controller models it.
         budget: of a plan.
-        costs: of a user's own, beside the registered ones that the section lists.
+        costs: the user's own, in addition to the registered ones that the section lists.
     """
     g = c.global_mpc
     parameters = PolicyParameters(

@@ -1,4 +1,4 @@
-"""The section `effects`: what the plant has beyond the ideal fabric."""
+"""The section `effects`: deviations of the plant from the ideal model."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ def effects(section: Mapping[str, Mapping[str, float]]) -> tuple[Effect, ...]:
 
     Raises:
         UserError: an effect or a parameter is unknown.
+        ValueError: a parameter is out of its range.
     """
     unknown = next((name for name in section if name not in EFFECTS), None)
     if unknown is not None:
@@ -26,7 +27,7 @@ def effects(section: Mapping[str, Mapping[str, float]]) -> tuple[Effect, ...]:
 
 
 def _effect(name: str, values: Mapping[str, float]) -> Effect:
-    """Returns an effect with its parameters, which no file check may have verified yet."""
+    """Returns an effect; checks its keys, because scenarios made in Python may be unchecked."""
     kind = EFFECTS[name]
     names = [p.name for p in kind.parameters()]
     for key in values:

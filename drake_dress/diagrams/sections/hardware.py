@@ -1,4 +1,4 @@
-"""The section `station.hardware`: channels, and what messages may say."""
+"""The section `station.hardware`: channels, and bounds of plausible messages."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def hardware_parameters(section: schema.Station, p: StationParameters) -> Hardwa
 
     Args:
         section: with channels, time limits and bounds.
-        p: the station as it would be simulated, with the garment that estimates describe.
+        p: parameters of the simulated twin, with the garment that estimates describe.
 
     Raises:
         ValueError: the grippers float.

@@ -21,7 +21,7 @@ def measures(person: schema.Person) -> BodyMeasures:
 
 
 def posture(person: schema.Person) -> Posture:
-    """Returns the posture, whose name the scenario's check has verified."""
+    """Returns the posture; the scenario's check has verified its name."""
     return "sitting" if person.posture == "sitting" else "standing"
 
 
@@ -45,7 +45,7 @@ def joints(person: schema.Person) -> JointParameters:
 
 
 def behaviour(b: schema.Behaviour, seed: int) -> Behaviour:
-    """Returns how the person moves by itself; `seed` draws its tremor."""
+    """Returns the person's behaviour; `seed` is that of its tremor."""
     kinds: dict[str, Kind] = {"passive": "passive", "active": "active"}
     return Behaviour(
         kind=kinds.get(b.kind, "dummy"),

@@ -9,7 +9,7 @@ from drake_dress.models.control.safety import SafetyLimits
 
 
 def safety_limits(s: schema.Safety) -> SafetyLimits:
-    """Returns the limits that the safety governor keeps."""
+    """Returns the limits that the safety governor enforces."""
     soft, largest, box = s.soft_force_limit, s.largest_distance, s.workspace
     return SafetyLimits(
         max_speed=s.max_speed,

@@ -1,4 +1,4 @@
-"""The section `station`: where arms and cameras stand."""
+"""The section `station`: placement of arms and cameras."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def cameras(section: Sequence[schema.Camera]) -> tuple[Camera, ...]:
 
 
 def placement(arms: schema.Arms, person: schema.Person) -> ArmPlacement | None:
-    """Returns where both arms stand behind the person; None where grippers float."""
+    """Returns the placement of both arms behind the person; None where grippers float."""
     if arms.model == "floating":
         return None
     shoulders = shoulder_height(measures(person), posture(person))
