@@ -12,14 +12,12 @@ KERNELS = ("njit", "vectorised", "intrinsic", "cfunc", "wp.")
 LONG = {
     "drake_dress/models/cloth/explicit/explicit_bias.py: step": "half of it is its docstring; "
     "the steps of the scheme share ten arrays",
-    "drake_dress/models/cloth/elements.py: make_elements": "one pass that fills one dataclass of "
-    "sixteen arrays",
 }
 MANY_ARGUMENTS = {
     "drake_dress/models/garment/load.py: load_garment": "the options of a mesh file as keywords, "
     "for Python users; they become one MeshOptions",
     "drake_dress/systems/run_recorder.py: __init__": "a Drake system: sizes of ports and rates",
-    "drake_dress/systems/outbox.py: __init__": "a Drake system: channel, message type, rate, faults",
+    "drake_dress/systems/outbox.py: __init__": "a Drake system: channel, message, rate, faults",
     "drake_dress/systems/active_person.py: __init__": "a Drake system: person, motions and rates",
 }
 

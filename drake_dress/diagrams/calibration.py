@@ -73,11 +73,7 @@ def calibrate_camera(
     names: list[str] = []
     size = (0, 0)
     for name, q in rows:
-        picture = directory / name
-        # OpenCV would block on a named pipe without a writer.
-        image = cv2.imread(str(picture)) if os.path.isfile(picture) else None
-        if image is None:
-            raise UserError(str(directory / name), "", "is no readable picture")
+        image = _picture(directory / name)
         if size != (0, 0) and (image.shape[1], image.shape[0]) != size:
             raise UserError(
                 str(directory / name),
@@ -86,7 +82,7 @@ def calibrate_camera(
                 "as the first",
             )
         size = (image.shape[1], image.shape[0])
-        corners = find_corners(np.asarray(image, dtype=np.uint8), board)
+        corners = find_corners(image, board)
         if corners is not None:
             seen.append(corners)
             tools.append(arm.links(q)[-1])
@@ -100,6 +96,14 @@ def calibrate_camera(
     write_text(out, json.dumps(_written(found, names, size), indent=2) + "\n")
     _tell(found, names, len(rows))
     print(f"calibration: {out}")
+
+
+def _picture(path: Path) -> np.ndarray:
+    # OpenCV would block on a named pipe without a writer.
+    image = cv2.imread(str(path)) if os.path.isfile(path) else None
+    if image is None:
+        raise UserError(str(path), "", "is no readable picture")
+    return np.asarray(image, dtype=np.uint8)
 
 
 def write_board(board: Board, path: Path) -> None:
