@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydrake.geometry import Cylinder
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -14,7 +15,7 @@ from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, PdControllerGa
 from drake_dress.models.arm.chain import SerialArm
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.description import panda_urdf
-from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
+from drake_dress.models.arm.panda import LIMITS, SHAPE, STAND_RADIUS, panda
 from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal, RateParameters
 from drake_dress.models.sides import SIDES, Side
 
@@ -29,6 +30,7 @@ HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 _SPEED_SHARE, _ROOM = 0.85, 0.02
 # Time step of a search for joint angles, s.
 _SEARCH_STEP = 0.01
+_STAND_COLOR = np.array([0.62, 0.64, 0.67, 1.0])
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,16 @@ class ArmSetup:
 
     pair: ArmPair
     start: np.ndarray
+
+
+def _add_stand(plant: MultibodyPlant, side: Side, X_WB: RigidTransform) -> None:
+    """Adds the column that an arm's base stands on, for pictures; nothing collides with it."""
+    height = float(X_WB.translation()[2])
+    if height <= 0.0 or not plant.geometry_source_is_registered():
+        return
+    middle = X_WB @ RigidTransform([0.0, 0.0, -0.5 * height])
+    shape, name = Cylinder(STAND_RADIUS, height), f"{side}_arm_stand"
+    plant.RegisterVisualGeometry(plant.world_body(), middle, shape, name, _STAND_COLOR)
 
 
 def arm_bases(setup: ArmSetup | None) -> dict[Side, np.ndarray] | None:
@@ -235,6 +247,7 @@ def add_arms(plant: MultibodyPlant, bases: Mapping[Side, np.ndarray]) -> dict[Si
             plant.GetFrameByName("panda_link0", model),
             RigidTransform(bases[side]),
         )
+        _add_stand(plant, side, RigidTransform(bases[side]))
         plant.set_gravity_enabled(model, False)
         for i in range(len(LIMITS.torque)):
             joint = plant.GetJointByName(f"panda_joint{i + 1}", model)

@@ -7,12 +7,14 @@ import time as clock
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Capsule, Mesh, Meshcat, Rgba, Sphere
+from pydrake.geometry import Capsule, Cylinder, Mesh, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.arm.description import link_meshes
+from drake_dress.models.arm.panda import STAND_RADIUS
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
@@ -21,6 +23,7 @@ from drake_dress.report.web_page import open_page
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
 _ARM = Rgba(0.90, 0.91, 0.92, 1.0)
+_STAND = Rgba(0.62, 0.64, 0.67, 1.0)
 _POLL_PERIOD = 0.03  # s
 _TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
 
@@ -123,12 +126,22 @@ class MeshcatReplay:
             length = float(np.linalg.norm(b[0, k] - a[0, k]))
             shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
             self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
-        for arm in range(arm_poses(self._log, np.array([0])).shape[1]):
+        poses = arm_poses(self._log, np.array([0]))[0]
+        for arm, base in enumerate(poses[:, 0]):
+            self._add_stand(f"dressing/arms/{arm}/stand", base)
             for k, meshes in enumerate(link_meshes()):
                 for j, (path, X_LM) in enumerate(meshes):
                     name = f"dressing/arms/{arm}/{k}/{j}"
                     self._meshcat.SetObject(name, Mesh(str(path)), _ARM)
                     self._meshcat.SetTransform(name, RigidTransform(X_LM))
+
+    def _add_stand(self, name: str, base: FloatArray) -> None:
+        """Adds the column from the floor, at z = 0, to an arm's base X_WB (4,4)."""
+        height = float(base[2, 3])
+        if height > 0.0:
+            self._meshcat.SetObject(name, Cylinder(STAND_RADIUS, height), _STAND)
+            middle = RigidTransform(base) @ RigidTransform([0.0, 0.0, -0.5 * height])
+            self._meshcat.SetTransform(name, middle)
 
     def _show(self, i: int) -> None:
         log = self._log

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from drake_dress.errors import UserError
 from drake_dress.file_output import write_bytes
-from drake_dress.models.arm.solids import panda_solids
+from drake_dress.models.arm.solids import joined, panda_solids, stand
 from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_poses
@@ -78,6 +78,10 @@ def _page(log: RunLog, fps: float) -> bytes:
     a, b, radius = log.capsules
     a, b = np.nan_to_num(a[frames]), np.nan_to_num(b[frames])
     arms = arm_poses(log, frames)
+    floor = min(
+        floor_height(position[0], a[0], b[0], radius),
+        float(arms[0, ..., 2, 3].min(initial=np.inf)),
+    )
     meta = {
         "frames": len(frames),
         "nodes": position.shape[1],
@@ -97,10 +101,7 @@ def _page(log: RunLog, fps: float) -> bytes:
         if all(np.isfinite(log.gripper_force[side][frames]).all() for side in SIDES)
         else None,
         "loops": {name: loop.tolist() for name, loop in log.loops.items()},
-        "floor": min(
-            floor_height(position[0], a[0], b[0], radius),
-            float(arms[0, ..., 2, 3].min(initial=np.inf)),
-        ),
+        "floor": floor,
         "center": log.joint_position[0].mean(axis=0).tolist(),
     }
     grippers = np.stack([log.gripper_position[side][frames] for side in SIDES], axis=1)
@@ -111,7 +112,7 @@ def _page(log: RunLog, fps: float) -> bytes:
         "capsuleB": _base64(b.astype("<f4").tobytes()),
         "radius": _base64(radius.astype("<f4").tobytes()),
         "grippers": _base64(np.nan_to_num(grippers).astype("<f4").tobytes()),
-        **_arm_blobs(arms),
+        **_arm_blobs(arms, floor),
     }
     template = resources.files("drake_dress.report").joinpath("viewer.html").read_text("utf-8")
     page = template.replace('"@META@"', json.dumps(meta, allow_nan=False))
@@ -120,11 +121,16 @@ def _page(log: RunLog, fps: float) -> bytes:
     return page.encode("utf-8")
 
 
-def _arm_blobs(poses: FloatArray) -> dict[str, str]:
-    """Returns the concatenated solids of the links, and their (k,a,8,4,4) poses packed."""
+def _arm_blobs(poses: FloatArray, floor: float) -> dict[str, str]:
+    """Returns the concatenated solids of the links, and their (k,a,8,4,4) poses packed.
+
+    The bases stand on columns that reach down to the floor, m.
+    """
     if not poses.shape[1]:
         return dict.fromkeys(("armSize", "armVertices", "armNormals", "armFaces", "armPoses"), "")
-    solids = panda_solids()
+    base, *moving = panda_solids()
+    height = float(poses[0, 0, 0, 2, 3]) - floor
+    solids = [base if height <= 0.0 else joined(base, stand(height)), *moving]
     # for each link its quaternion (x, y, z, w) and its position
     turn = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat()
     placed = np.hstack([turn, poses[..., :3, 3].reshape(-1, 3)])

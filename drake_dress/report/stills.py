@@ -31,6 +31,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
 from drake_dress.models.arm.description import link_meshes
+from drake_dress.models.arm.panda import STAND_RADIUS
 from drake_dress.models.arrays import FloatArray, IntArray
 
 _Color = tuple[float, float, float]
@@ -40,6 +41,7 @@ LINING_COLOR = (0.87, 0.62, 0.28)
 SKIN_COLOR = (0.87, 0.70, 0.58)
 GRIPPER_COLOR = (0.25, 0.26, 0.28)
 _FLOOR_COLOR = (0.76, 0.77, 0.79)
+_STAND_COLOR = (0.62, 0.64, 0.67)
 _BACKGROUND = (0.95, 0.96, 0.97)
 _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
@@ -89,14 +91,14 @@ def render_still(
     scene = _Scene(with_arms)
     scene.add_garment(faces, position)
     scene.add_capsules(*person, SKIN_COLOR)
-    if arms is not None:
-        scene.add_arms(arms)
     # with arms, the box is only the held cloth between the fingers
     gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
         floor = floor_height(position, *person)
+    if arms is not None:
+        scene.add_arms(arms, floor)
     middle = [camera.target[0], camera.target[1], floor - 0.01]
     scene.add(Cylinder(_FLOOR_RADIUS, 0.02), RigidTransform(middle), _FLOOR_COLOR)
     return scene.picture(camera, size)
@@ -151,9 +153,13 @@ class _Scene:
         lining = position - _LINING_OFFSET * normals
         self.add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
 
-    def add_arms(self, poses: FloatArray) -> None:
-        """Adds robot arms with their bases and links at `poses` (a,8,4,4)."""
+    def add_arms(self, poses: FloatArray, floor: float) -> None:
+        """Adds robot arms with bases and links at `poses` (a,8,4,4), on columns from the floor."""
         for arm in poses:
+            height = float(arm[0, 2, 3]) - floor
+            if height > 0.0:
+                middle = RigidTransform(arm[0]) @ RigidTransform([0.0, 0.0, -0.5 * height])
+                self.add(Cylinder(STAND_RADIUS, height), middle, _STAND_COLOR)
             for X_WL, meshes in zip(arm, link_meshes(), strict=True):
                 for path, X_LM in meshes:
                     self.add(Mesh(str(path)), RigidTransform(X_WL @ X_LM))

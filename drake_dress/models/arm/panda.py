@@ -12,6 +12,9 @@ from drake_dress.models.arm.chain import JointLimits, SerialArm
 from drake_dress.models.arm.clearance import ArmShape, Capsules
 from drake_dress.models.arrays import FloatArray
 
+# Radius of the column that an arm's base is drawn on, m.
+STAND_RADIUS = 0.08
+
 LIMITS = JointLimits(
     lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
     upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),

@@ -15,6 +15,7 @@ import numpy as np
 import trimesh
 
 from drake_dress.models.arm.description import HAND_PARTS, panda_source
+from drake_dress.models.arm.panda import STAND_RADIUS
 from drake_dress.models.arrays import FloatArray, IntArray
 
 # Triangles that meet at a smaller angle are shaded as one smooth surface, rad.
@@ -53,6 +54,21 @@ def panda_solids() -> tuple[LinkSolid, ...]:
     parts = [[read(f"link{i}", np.eye(4))] for i in range(_LINKS)]
     parts[-1] += [read(name, X_LM) for name, X_LM in HAND_PARTS]
     return tuple(_solid(meshes) for meshes in parts)
+
+
+def stand(height: float) -> LinkSolid:
+    """Returns the column of an arm's base, `height` m long, in the frame of the upright base."""
+    column = trimesh.creation.cylinder(STAND_RADIUS, height, sections=32)
+    return _solid([column.apply_translation([0.0, 0.0, -0.5 * height])])
+
+
+def joined(first: LinkSolid, second: LinkSolid) -> LinkSolid:
+    """Returns two solids of the same frame as one."""
+    return LinkSolid(
+        np.concatenate([first.vertices, second.vertices]),
+        np.concatenate([first.normals, second.normals]),
+        np.concatenate([first.faces, second.faces + len(first.vertices)]),
+    )
 
 
 def _solid(meshes: Sequence[trimesh.Trimesh]) -> LinkSolid:

@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 
 from drake_dress.models.arm.description import link_meshes
-from drake_dress.models.arm.panda import SHAPE, panda
-from drake_dress.models.arm.solids import panda_solids
+from drake_dress.models.arm.panda import SHAPE, STAND_RADIUS, panda
+from drake_dress.models.arm.solids import joined, panda_solids, stand
 
 FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 Q = np.array([0.3, -0.6, 0.2, -1.9, 0.4, 1.7, 0.6])
@@ -64,3 +64,16 @@ def test_real_meshes_are_about_the_same_size() -> None:
         real = np.concatenate(points)
         np.testing.assert_allclose(real.min(axis=0), solid.vertices.min(axis=0), atol=0.02)
         np.testing.assert_allclose(real.max(axis=0), solid.vertices.max(axis=0), atol=0.02)
+
+
+def test_a_stand_reaches_from_the_floor_to_the_base() -> None:
+    column = stand(0.9)
+    low, high = column.vertices.min(axis=0), column.vertices.max(axis=0)
+    np.testing.assert_allclose([low[2], high[2]], [-0.9, 0.0], atol=1e-9)
+    np.testing.assert_allclose(high[:2], STAND_RADIUS, rtol=0.01)
+    base = panda_solids()[0]
+    both = joined(base, column)
+    volumes = [
+        trimesh.Trimesh(s.vertices, s.faces, process=False).volume for s in (base, column, both)
+    ]
+    np.testing.assert_allclose(volumes[2], volumes[0] + volumes[1], rtol=1e-9)
