@@ -126,7 +126,7 @@ def carry_out(
         each = _Run(study.run, options.set, options.keep is not None, options.keep_failures)
         stopped = _run_all(each, missing, kept, options, study.tell)
     results = [kept[case.name] for case in cases if case.name in kept]
-    if options.json is not None:
+    if options.json is not None and not options.kept:
         _keep(options.json, kept, study.figures([r for r in results if "summary" in r]))
     shown = "\n\n".join(filter(None, (said, *(t.text() for t in study.tables(results) if t.rows))))
     print(f"\n{shown}", flush=True)

@@ -31,6 +31,7 @@ from drake_dress.diagrams.own_parts import NOTHING, OwnParts
 from drake_dress.diagrams.run import RunOptions, run_scenario
 from drake_dress.diagrams.scenario import Scenario, apply_variation, checked_scenario
 from drake_dress.diagrams.setup import read_setup
+from drake_dress.errors import FailedError
 from drake_dress.file_output import RUN_FILES, prove_directory
 from drake_dress.models.control.costs import GarmentCost, PlannedStep, Slope
 from drake_dress.models.control.local_control import GlobalPlan
@@ -168,12 +169,16 @@ def run(
     Raises:
         UserError: a value, a garment file or `out` cannot be used.
         ValueError: one of your own parts cannot be used.
+        FailedError: the run ended, but its summary could not be written; the log is there.
     """
     checked, source = checked_scenario(scenario), Path(base) / "scenario"
     to = prove_directory("out", out, RUN_FILES)
     options = RunOptions(meshcat, realtime_rate, report=report, told=told)
     run_scenario(checked, source, to, options, own)
-    summary = json.loads((to / RUN_FILES[1]).read_text(encoding="utf-8"))
+    log, summary_file = to / RUN_FILES[0], to / RUN_FILES[1]
+    if not summary_file.exists():
+        raise FailedError(f"{summary_file}: could not be written; the log is {log}")
+    summary = json.loads(summary_file.read_text(encoding="utf-8"))
     return RunResult(to, bool(summary["success"]), summary)
 
 

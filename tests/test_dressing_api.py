@@ -12,7 +12,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from drake_dress import dressing
-from drake_dress.errors import UserError
+from drake_dress.diagrams import run as run_module
+from drake_dress.errors import FailedError, UserError
 
 SHORT = ("plant.fidelity=quick", "plant.spacing=0.05", "duration=1.5", "log.rate=20")
 
@@ -88,6 +89,20 @@ def test_a_run_tells_what_came_of_it_and_prints_nothing(
     assert any(str(result.reason) in line for line in told)
     assert capsys.readouterr().out == ""
     assert len(heights(result)) > 20
+
+
+def test_a_run_whose_summary_cannot_be_written_is_told_with_its_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(run_module, "write_summary", full)
+    scenario = dressing.load_scenario("dummy_standing", [*SHORT, "duration=0.2"])
+    with pytest.raises(FailedError, match=r"summary\.json: could not be written; the log is"):
+        dressing.run(scenario, tmp_path / "out", report=False)
+    with dressing.open_log(tmp_path / "out" / "run.h5") as log:
+        assert len(log.time) > 1
 
 
 def test_a_cost_of_ones_own_moves_what_it_is_about(tmp_path: Path) -> None:

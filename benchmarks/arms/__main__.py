@@ -107,17 +107,17 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
                 "",
                 "speed, share of limit",
                 "torque, share of limit",
-                "to a joint's limit, rad",
-                "off, median, mm",
-                "off, 99 %, mm",
-                "arms apart, cm",
+                "margin to a joint limit, rad",
+                "tracking error, median, mm",
+                "tracking error, 99 %, mm",
+                "between arms, cm",
                 "arm to person, cm",
                 "real-time factor",
             ],
             arms,
         ),
         Table(
-            "Why not",
+            "Reasons of failure",
             ["", "reason"],
             [[c.name, done[c.name]["reason"]] for c in cases if not done[c.name]["success"]],
         ),
@@ -136,8 +136,18 @@ def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
             at_most(f"joint {what}, largest share of its limit", max(s[k] for s in mine), "", 1.0)
             for k, what in limits.items()
         ),
-        at_least("between the arms, least", min(s["min_arms_apart_m"] for s in mine), "m", 0.0),
-        at_least("arm to person, least", min(s["min_arm_to_person_m"] for s in mine), "m", 0.0),
+        at_least(
+            "distance between the arms, smallest",
+            min(s["min_arms_apart_m"] for s in mine),
+            "m",
+            0.0,
+        ),
+        at_least(
+            "distance from an arm to the person, smallest",
+            min(s["min_arm_to_person_m"] for s in mine),
+            "m",
+            0.0,
+        ),
     ]
 
 

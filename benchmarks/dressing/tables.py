@@ -31,15 +31,15 @@ _HEADER = [
     "runs with layers crossed at the end",
     "real-time factor",
 ]
-_BESIDE = ["pairs", "both dressed", "full alone", "it alone", "neither", "longer by, s"]
+_BESIDE = ["pairs", "both dressed", "only full", "only this", "neither", "longer by, s"]
 _STAGES = [
     "first hand in, runs",
-    "after, s",
+    "time, s",
     "second hand in, runs",
-    "after that, s",
+    "further time, s",
     "dressed, runs",
-    "after that, s",
-    "lost again, runs",
+    "further time, s",
+    "hand lost again, runs",
 ]
 MIN_S = SuccessRules().min_s
 # A hand counts as in once it stays in for this long, s.
@@ -66,10 +66,10 @@ def tables(results: Sequence[dict[str, Any]]) -> list[Table]:
     beside = [[m, *_beside(done, m)] for m in methods if m != "full" and "full" in methods]
     return [
         Table("Methods", ["", *_HEADER], by_method),
-        Table("Beside full, the same persons, coats and seeds", ["", *_BESIDE], beside),
-        Table("How far they came", ["", *_STAGES], stages),
+        Table("Compared with full: the same persons, coats and seeds", ["", *_BESIDE], beside),
+        Table("Stages reached", ["", *_STAGES], stages),
         Table("Persons and coats", ["", *_HEADER], by_group),
-        Table("Why not", ["method", "reason", "runs"], reasons),
+        Table("Reasons of failure", ["method", "reason", "runs"], reasons),
     ]
 
 
@@ -84,14 +84,17 @@ def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
         dressed = sum(bool(s["success"]) for s in mine)
         low, high = wilson(dressed, count)
         short = 100.0 * sum(map(_short_of_the_shoulder, mine)) / count
-        crossed = sum((s.get("layers_crossed_at_end") or 0) > 0 for s in mine)
+        layers = [s["layers_crossed_at_end"] for s in mine if _tells_layers(s)]
+        crossed = sum(count > 0 for count in layers)
         found += [
             Figure(f"{method}: runs dressed", dressed, f"of {count}"),
             Figure(f"{method}: dressed, lower end of the 90 % interval", 100.0 * low, "%"),
             Figure(f"{method}: dressed, upper end of the 90 % interval", 100.0 * high, "%"),
             at_most(f"{method}: both arms inside, a sleeve below s = {MIN_S:g}", short, "%", 1.0),
-            at_most(f"{method}: runs with layers crossed at the end", crossed, f"of {count}", 0),
         ]
+        if layers:
+            name = f"{method}: runs with layers crossed at the end"
+            found.append(at_most(name, crossed, f"of {len(layers)}", 0))
     return found
 
 
@@ -134,6 +137,8 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         values = [s[key] for s in among if s[key] is not None]
         return float(np.median(values)) if values else None
 
+    # summaries of earlier versions lack this key
+    layers = [s for s in summaries if _tells_layers(s)]
     penetration = [1e3 * s["max_penetration_m"] for s in summaries]
     return [
         len(summaries),
@@ -144,10 +149,13 @@ def _row(results: Sequence[dict[str, Any]]) -> list[Any]:
         max((s["max_gripper_force_N"] for s in summaries), default=None),
         max(penetration, default=None),
         sum(map(_short_of_the_shoulder, summaries)),
-        # summaries of earlier versions lack this key
-        sum((s.get("layers_crossed_at_end") or 0) > 0 for s in summaries),
+        sum(s["layers_crossed_at_end"] > 0 for s in layers) if layers else None,
         median("realtime_factor"),
     ]
+
+
+def _tells_layers(summary: dict[str, Any]) -> bool:
+    return summary.get("layers_crossed_at_end") is not None
 
 
 def _short_of_the_shoulder(summary: dict[str, Any]) -> bool:

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 write_results(options.json, kept)
             print(f"{number}/{len(new)} {_line(result)}", flush=True)
     results = [kept[case.name] for case in chosen if case.name in kept]
-    if options.json is not None:
+    if options.json is not None and not options.kept:
         write_results(options.json, kept, figures(results))
     shown = "\n\n".join(t.text() for t in tables(results) if t.rows)
     print(f"\n{shown}", flush=True)

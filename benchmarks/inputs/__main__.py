@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     failures = [r for r in results if r.problem is not None]
     for r in failures[:_SHOWN]:
         print(f"\n{r.index} {r.kind} {r.mutation} ({r.expect}): {r.problem}\n  {r.told.strip()}")
-    print(f"\n{shown}\n\n{len(results) - len(failures)} of {len(results)} as they have to be")
+    print(f"\n{shown}\n\n{len(results) - len(failures)} of {len(results)} handled correctly")
     if options.json is not None:
         _write_json(options.json, results, seed)
     if options.into is not None:
@@ -95,7 +95,7 @@ def _run(
             results.append(result)
             if len(results) % 100 == 0:
                 wrong = sum(r.problem is not None for r in results)
-                print(f"{len(results)}/{len(chosen)}, {wrong} not as they have to be", flush=True)
+                print(f"{len(results)}/{len(chosen)}, {wrong} handled wrongly", flush=True)
     for worker in workers:
         worker.close()
     return sorted(results, key=lambda r: r.index), stop.status if stop.is_set() else None
@@ -121,7 +121,7 @@ def table(results: Sequence[Result], seed: int) -> Table:
             ]
         )
     header = ["input", "cases", *(str(o) for o in Outcome), "accepted wrongly", "refused wrongly"]
-    return Table(f"Drawn inputs, seed {seed}", [*header, "longest, s", "as they have to be"], rows)
+    return Table(f"Drawn inputs, seed {seed}", [*header, "longest, s", "handled correctly"], rows)
 
 
 def _write_json(path: Path, results: Sequence[Result], seed: int) -> None:
@@ -131,7 +131,7 @@ def _write_json(path: Path, results: Sequence[Result], seed: int) -> None:
     right = len(results) - len(failures)
     write_figures(
         path,
-        [every("drawn inputs that end as they have to", right, len(results))],
+        [every("drawn inputs handled correctly", right, len(results))],
         [seed],
         cases=len(results),
         table=[dict(zip(shown.header, row, strict=True)) for row in shown.rows],

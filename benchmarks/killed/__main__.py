@@ -172,7 +172,7 @@ def _played(plan: Plan) -> Ended:
 
 def _tell(summary: dict[str, Any]) -> str:
     wrong = "; ".join(summary["wrong"])
-    return f"at {summary['moment']:.1f} s: {wrong or 'as it has to be'}, left {summary['left']}"
+    return f"at {summary['moment']:.1f} s: {wrong or 'correct'}, left {summary['left']}"
 
 
 def _tables(results: Sequence[dict[str, Any]]) -> list[Table]:
@@ -194,14 +194,14 @@ def _tables(results: Sequence[dict[str, Any]]) -> list[Table]:
         "runs",
         "ended before their end",
         "while simulating",
-        "as they have to be",
+        "files correct",
     ]
     return [Table("Runs that are ended at random moments", header, rows)]
 
 
 def _figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
     right = sum(not r["summary"]["wrong"] for r in results)
-    return [every("ended runs whose files are as they have to be", right, len(results))]
+    return [every("ended runs with correct files", right, len(results))]
 
 
 def _parser() -> argparse.ArgumentParser:

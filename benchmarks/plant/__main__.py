@@ -157,10 +157,10 @@ def _figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
     for name in dict.fromkeys(r["case"]["name"] for r in results):
         row = _row(results, name)
         found += [
-            Figure(f"{name}: nodes off, median", row[3], "mm"),
-            Figure(f"{name}: force on grippers off, median", row[6], "N"),
-            Figure(f"{name}: force on the person off, median", row[8], "N"),
-            Figure(f"{name}: a step", row[11], "ms"),
+            Figure(f"{name}: position error, median", row[3], "mm"),
+            Figure(f"{name}: error of the force on grippers, median", row[6], "N"),
+            Figure(f"{name}: error of the force on the person, median", row[8], "N"),
+            Figure(f"{name}: step time", row[11], "ms"),
         ]
     return found
 
@@ -175,18 +175,18 @@ def _table(results: Sequence[dict[str, Any]]) -> Table:
         "",
         "spacing, cm",
         "step, ms",
-        "nodes off, mm",
+        "position error, mm",
         "mean",
         "95 % of nodes",
-        "on grippers, N",
+        "force error, grippers, N",
         "mean",
-        "on person, N",
+        "force error, person, N",
         "mean",
         "iterations a step",
         "ms a step",
         "ms a second",
     ]
-    return Table("Beside a reference", header, [_row(results, name) for name in names])
+    return Table("Compared with a reference", header, [_row(results, name) for name in names])
 
 
 def _parser() -> argparse.ArgumentParser:
