@@ -1,6 +1,6 @@
 """Dresses one scenario with many seeds and prints the result of each run.
 
-    python benchmarks/dress_seeds.py scenarios/dummy_varied.yaml --seeds 0-9
+    python -m benchmarks.dress_seeds scenarios/dummy_varied.yaml --seeds 0-9
 
 Every run is a separate `drake-dress run`; its log, report and replay stay in OUT/seed_N. After
 Ctrl-C the table contains the finished runs. The exit status is 1 if a run gave no result.
@@ -15,10 +15,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from kept import seed_range
-from parser import output_file
-from scenario_run import run_scenario
-
+from benchmarks.kept import seed_range
+from benchmarks.parser import output_file
+from benchmarks.scenario_run import run_scenario
 from drake_dress.file_output import write_text
 from drake_dress.report.summary import read_summary
 

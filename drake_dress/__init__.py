@@ -7,4 +7,4 @@ from drake_dress.machine import limit_threads
 prepare_caches()
 limit_threads()
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

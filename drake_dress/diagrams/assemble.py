@@ -21,7 +21,7 @@ from drake_dress.diagrams.person import Person, add_person
 from drake_dress.diagrams.planning import ControlSetup
 from drake_dress.diagrams.sections.controller import local_setup, predictor
 from drake_dress.diagrams.sections.hardware import hardware_parameters
-from drake_dress.diagrams.setup import Setup
+from drake_dress.diagrams.setup import Garments, Setup
 from drake_dress.diagrams.station import (
     Sight,
     SimulatedStation,
@@ -55,6 +55,11 @@ class Parts:
     page: Meshcat | None = None
     in_worker: bool = False
     own: OwnParts = NOTHING
+
+    @property
+    def garments(self) -> Garments:
+        """The garments of plant and controller."""
+        return self.setup.garments
 
 
 def simulated_station(

@@ -101,12 +101,12 @@ class World:
     @property
     def truth(self) -> GarmentMesh:
         """The plant's garment at rest."""
-        return self.parts.setup.garments.plant
+        return self.parts.garments.plant
 
     @property
     def belief(self) -> GarmentMesh:
         """The controller's garment at rest."""
-        return self.parts.setup.garments.belief
+        return self.parts.garments.belief
 
     def value(self, port: str) -> FloatArray:
         """Returns a copy of the value of a vector port of the station, in rows of three."""

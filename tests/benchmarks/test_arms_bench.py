@@ -71,5 +71,5 @@ def test_runs_in_a_file_are_not_run_again(
     assert bench.main([*words, "--kept"]) == 0
     assert bench.main(words) == 0
     assert asked == ["lab-full-panda", "lab-full-floating"]
-    assert len(json.loads(file.read_text())) == 2
+    assert len(json.loads(file.read_text())["runs"]) == 2
     assert "2 runs, 1 of them not run yet" in capsys.readouterr().out

@@ -336,7 +336,8 @@ def test_command_writes_tables_json_and_plots(
     assert "processor:" in out
     assert "| nodes " in out
     document = json.loads(file.read_text())
-    assert set(document) == {"about", "quick", "wall_s", "scenes"}
+    heading = {"figures", "machine", "version", "seeds"}
+    assert set(document) == heading | {"about", "quick", "wall_s", "scenes"}
     assert set(document["scenes"]) == {"growth"}
     assert document["about"]["numba"]
     assert (folder / "cloth_growth.png").read_bytes()[:4] == b"\x89PNG"

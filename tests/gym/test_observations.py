@@ -17,7 +17,7 @@ def test_grippers_carry_the_weight_of_the_coat() -> None:
     env.reset(seed=0)
     for _ in range(25):
         seen, *_ = env.step(REST)
-    mesh, material = env.parts.setup.garments.plant, env.parts.setup.scenario.plant.material
+    mesh, material = env.parts.garments.plant, env.parts.setup.scenario.plant.material
     area = face_areas(mesh.rest_position, mesh.faces).sum()
     weight = GRAVITY * material.surface_density * area
     total = seen["gripper_force"].sum(axis=0)
@@ -40,7 +40,7 @@ def test_a_coat_that_is_drawn_against_the_back_presses_forward() -> None:
 def test_what_is_observed_fits_together() -> None:
     env = small_env()
     seen, _ = env.reset(seed=0)
-    mesh = env.parts.setup.garments.belief
+    mesh = env.parts.garments.belief
     x, joints = seen["garment_position"], seen["joint_position"]
     for i, side in enumerate(("left", "right")):
         held = x[mesh.grasp[side]].mean(axis=0)

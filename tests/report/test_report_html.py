@@ -44,7 +44,7 @@ def test_report_tells_what_safety_cut_and_only_then(tmp_path: Path) -> None:
     assert "safety governor" not in _run(tmp_path, samples)
     samples[3] = replace(samples[3], safety=[0, int(Verdict.FORCE | Verdict.STOPPED)])
     text = _run(tmp_path, samples)
-    assert "cut by the safety governor. right: force 0.5 s, stopped 0.5 s." in text
+    assert "limited the requested motion. right: force 0.5 s, stopped 0.5 s." in text
 
 
 def test_insertion_of_each_sleeve_is_pictured(tmp_path: Path) -> None:
