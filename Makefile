@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test lint format coverage docs docs-links clean
+.PHONY: setup demo test lint style duplicates format coverage docs docs-links clean
 
 setup: $(VENV)/.installed
 
@@ -13,7 +13,7 @@ demo: setup
 	    --set station.arms.model=panda --set controller.method=full
 
 # One thread for each of the processes side by side; what meets in real time runs by itself.
-test: $(VENV)/.installed-test lint
+test: $(VENV)/.installed-test style
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m 'not alone' \
 	    --numprocesses logical --maxprocesses 4 --dist worksteal
 	$(BIN)/python -m pytest -m alone
@@ -26,10 +26,16 @@ coverage: $(VENV)/.installed-test
 	    --cov drake_dress --cov benchmarks --cov-context test --cov-report=
 	$(BIN)/python -m tests.covered_by
 
-lint: $(VENV)/.installed-test
+lint: style duplicates
+
+style: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# Code that is written twice, six lines or more; takes two minutes.
+duplicates: $(VENV)/.installed-test
+	$(BIN)/pylint --jobs 2 --score n drake_dress
 
 format: $(VENV)/.installed-test
 	$(BIN)/ruff check --fix .

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.inputs.damage import KINDS, damage
 from benchmarks.inputs.trials import Expect, Trial, place
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario
@@ -448,25 +449,8 @@ def _write_csv(log: _Log, path: Path) -> None:
 
 
 def _damaged(rng: Rng, sound: bytes) -> tuple[str, bytes]:
-    data = bytearray(sound)
-    how = _pick(rng, ("flip", "drop", "insert", "cut", "zero", "nothing", "noise"))
-    for _ in range(int(rng.integers(1, 10))):
-        k = int(rng.integers(len(data)))
-        if how == "flip":
-            data[k] ^= 1 << int(rng.integers(8))
-        elif how == "drop":
-            del data[k : k + int(rng.integers(1, 60))]
-        elif how == "insert":
-            data[k:k] = rng.bytes(int(rng.integers(1, 5)))
-        elif how == "zero":
-            data[k : k + 64] = bytes(len(data[k : k + 64]))
-    if how == "cut":
-        del data[int(rng.integers(1, len(data))) :]
-    elif how == "nothing":
-        data.clear()
-    elif how == "noise":
-        data = bytearray(rng.bytes(int(rng.integers(1, 5000))))
-    return how, bytes(data)
+    how = _pick(rng, KINDS)
+    return how, bytes(damage(rng, bytearray(sound), how, most=10, zeroed=64))
 
 
 def _attribute(rng: Rng, log: _Log, path: Path) -> _Told:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.inputs.damage import KINDS, damage
 from benchmarks.inputs.trials import Expect, Trial, place
 from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.coat import COATS, make_coat
@@ -327,27 +328,9 @@ def _laid_out(lines: list[str], habits: set[str]) -> list[str]:
 
 
 def _damaged(rng: Rng, sound: bytes) -> tuple[str, bytes]:
-    data = bytearray(sound)
-    how = _pick(rng, ("flip", "drop", "insert", "cut", "lines", "zero", "nothing", "noise"))
-    for _ in range(int(rng.integers(1, 20))):
-        k = int(rng.integers(len(data)))
-        if how == "flip":
-            data[k] ^= 1 << int(rng.integers(8))
-        elif how == "drop":
-            del data[k : k + int(rng.integers(1, 60))]
-        elif how == "insert":
-            data[k:k] = rng.bytes(int(rng.integers(1, 5)))
-        elif how == "zero":
-            data[k : k + 4] = bytes(4)
-    if how == "cut":
-        del data[int(rng.integers(1, len(data))) :]
-    elif how == "nothing":
-        data.clear()
-    elif how == "noise":
-        data = bytearray(rng.bytes(int(rng.integers(1, 5000))))
-    elif how == "lines":
-        data = _other_lines(rng, data)
-    return how, bytes(data)
+    how = _pick(rng, (*KINDS, "lines"))
+    data = damage(rng, bytearray(sound), how, most=20, zeroed=4)
+    return how, bytes(_other_lines(rng, data) if how == "lines" else data)
 
 
 def _other_lines(rng: Rng, data: bytearray) -> bytearray:

@@ -13,6 +13,10 @@ with λ a number of spacings. On fine meshes compression never reaches e_c and t
 1986, "The relaxed energy density for isotropic elastic membranes", has e_c = 0.)
 """
 
+# The lanes of a vector register are written out, here as in the other law of stretch: a call
+# between them would keep the compiler from using the registers.
+# pylint: disable=duplicate-code
+
 from __future__ import annotations
 
 import numba as nb

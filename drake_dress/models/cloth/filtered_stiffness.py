@@ -6,6 +6,10 @@ by tension; treating that explicitly made a hanging coat flutter.) K₊ never ex
 bounds M + h² K₊ from above.
 """
 
+# The lanes of a vector register are written out, here as in the other law of stretch: a call
+# between them would keep the compiler from using the registers.
+# pylint: disable=duplicate-code
+
 from __future__ import annotations
 
 import numba as nb
