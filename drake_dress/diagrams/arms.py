@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.geometry import Cylinder
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,9 +14,10 @@ from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, PdControllerGa
 from drake_dress.models.arm.chain import SerialArm
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.description import panda_urdf
-from drake_dress.models.arm.panda import LIMITS, SHAPE, STAND_RADIUS, panda
+from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
 from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal, RateParameters
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
 
 # Gains of the joint drives, as stiff as the maker's position control, N·m/rad and N·m·s/rad.
 _STIFFNESS = np.array([6000.0, 6000.0, 5000.0, 5000.0, 3000.0, 2000.0, 1500.0])
@@ -30,7 +30,6 @@ HOME = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
 _SPEED_SHARE, _ROOM = 0.85, 0.02
 # Time step of a search for joint angles, s.
 _SEARCH_STEP = 0.01
-_STAND_COLOR = np.array([0.62, 0.64, 0.67, 1.0])
 
 
 @dataclass(frozen=True)
@@ -98,12 +97,12 @@ class ArmSetup:
 
 def _add_stand(plant: MultibodyPlant, side: Side, X_WB: RigidTransform) -> None:
     """Adds the column that an arm's base stands on, for pictures; nothing collides with it."""
-    height = float(X_WB.translation()[2])
-    if height <= 0.0 or not plant.geometry_source_is_registered():
+    stand = arm_stand(X_WB)
+    if stand is None or not plant.geometry_source_is_registered():
         return
-    middle = X_WB @ RigidTransform([0.0, 0.0, -0.5 * height])
-    shape, name = Cylinder(STAND_RADIUS, height), f"{side}_arm_stand"
-    plant.RegisterVisualGeometry(plant.world_body(), middle, shape, name, _STAND_COLOR)
+    shape, pose = stand
+    color = np.array([*STAND_COLOR, 1.0])
+    plant.RegisterVisualGeometry(plant.world_body(), pose, shape, f"{side}_arm_stand", color)
 
 
 def arm_bases(setup: ArmSetup | None) -> dict[Side, np.ndarray] | None:

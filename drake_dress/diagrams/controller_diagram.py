@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, InputPortIndex
 
-from drake_dress.diagrams.assemble import Parts, control_setup
-from drake_dress.diagrams.planning import add_planning
+from drake_dress.diagrams.planning import OBSERVATIONS, ControlSetup, add_planning
 from drake_dress.models.sides import SIDES
 
 # Inputs of the diagram that replace outputs of the station.
-_INPUTS = {
-    "estimate.joint_position": "joint_position",
-    "estimate.garment_position": "garment_position",
-    "estimate.garment_velocity": "garment_velocity",
-    **{f"{side}_gripper.position_measured": f"{side}_gripper_position" for side in SIDES},
-    **{f"{side}_gripper.force_measured": f"{side}_gripper_force" for side in SIDES},
+_INPUTS = {source: name for name, source in OBSERVATIONS.items()} | {
+    "estimate.garment_velocity": "garment_velocity"
 }
 
 
-def make_controller_diagram(p: Parts) -> Diagram:
+def make_controller_diagram(control: ControlSetup) -> Diagram:
     """Returns the diagram of prediction, global controller and, if in use, local controller.
 
     Inputs: `garment_position`, `garment_velocity` (3m,) of the controller's garment, m, m/s;
@@ -26,7 +21,7 @@ def make_controller_diagram(p: Parts) -> Diagram:
     Outputs: `{left,right}_velocity_request` (3,), m/s, which a run passes to its safety governor.
 
     Args:
-        p: parts of a run of the scenario; the station is not used.
+        control: the controllers of a run.
     """
     builder = DiagramBuilder()
     exported: dict[str, InputPortIndex] = {}
@@ -38,7 +33,7 @@ def make_controller_diagram(p: Parts) -> Diagram:
         else:
             exported[name] = builder.ExportInput(port, name)
 
-    planning = add_planning(builder, control_setup(p), feed)
+    planning = add_planning(builder, control, feed)
     for side in SIDES:
         request = f"{side}_velocity_request"
         builder.ExportOutput(planning.requests.GetOutputPort(request), request)

@@ -8,17 +8,12 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
+from drake_dress.diagrams.planning import OBSERVATIONS
 from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.human.prediction import MotionPredictor
-from drake_dress.models.sides import SIDES
 
 # Ports of a user's controller: inputs that it may have, and outputs that it must have, with sizes.
-INPUTS = (
-    "plan",
-    "garment_position",
-    "joint_position",
-    *(f"{side}_gripper_{quantity}" for side in SIDES for quantity in ("position", "force")),
-)
+INPUTS = ("plan", *OBSERVATIONS)
 OUTPUTS = {"left_velocity_request": 3, "right_velocity_request": 3, "request_time": 1}
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
+from drake_dress.diagrams.station import MOTION
 from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
@@ -19,6 +20,16 @@ from drake_dress.systems.human_predictor import HumanPredictor
 from drake_dress.systems.local_controller import LocalCompensation
 from drake_dress.systems.plan_follower import PlanFollower
 
+# What a controller may observe: input ports by name, and the station's outputs that they take.
+OBSERVATIONS = {
+    "garment_position": "estimate.garment_position",
+    "joint_position": "estimate.joint_position",
+    **{
+        f"{side}_gripper_{quantity}": f"{side}_gripper.{quantity}_measured"
+        for side in SIDES
+        for quantity in ("position", "force")
+    },
+}
 # Connects an output of the station, by its name, to an input port.
 Feed = Callable[[str, InputPort], None]
 
@@ -134,7 +145,7 @@ def add_planning(
         ),
     )
     feed("estimate.joint_position", predicted.get_input_port())
-    for quantity in ("position", "velocity"):
+    for quantity in MOTION:
         feed(f"estimate.garment_{quantity}", mpc.GetInputPort(f"garment_{quantity}"))
     builder.Connect(predicted.get_output_port(), mpc.GetInputPort("predicted_joint_position"))
     if control.own is not None:
@@ -160,11 +171,9 @@ def _add_local_controller(
     )
     builder.Connect(mpc.GetOutputPort("plan"), requests.GetInputPort("plan"))
     feed("estimate.joint_position", near.get_input_port())
-    feed("estimate.garment_position", requests.GetInputPort("garment_position"))
     builder.Connect(near.get_output_port(), requests.GetInputPort("predicted_joint_position"))
-    for side in SIDES:
-        port = requests.GetInputPort(f"{side}_gripper_position")
-        feed(f"{side}_gripper.position_measured", port)
+    for name in ("garment_position", *(f"{side}_gripper_position" for side in SIDES)):
+        feed(OBSERVATIONS[name], requests.GetInputPort(name))
     return requests
 
 
@@ -175,11 +184,7 @@ def _add_own_controller(
     builder.AddNamedSystem("own_controller", controller)
     if controller.HasInputPort("plan"):
         builder.Connect(mpc.GetOutputPort("plan"), controller.GetInputPort("plan"))
-    sources = {name: f"estimate.{name}" for name in ("garment_position", "joint_position")}
-    for side in SIDES:
-        for quantity in ("position", "force"):
-            sources[f"{side}_gripper_{quantity}"] = f"{side}_gripper.{quantity}_measured"
-    for name, source in sources.items():
+    for name, source in OBSERVATIONS.items():
         if controller.HasInputPort(name):
             feed(source, controller.GetInputPort(name))
     return controller

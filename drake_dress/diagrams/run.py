@@ -33,6 +33,7 @@ from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.machine import left_out_of_garbage
 from drake_dress.report.log import RunLog
+from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.replay_html import write_replay_html
 from drake_dress.report.summary import summarize, write_summary
@@ -209,7 +210,7 @@ def _simulate(
                 break
             fault = station.fault(simulator.get_context()) or dressing.mpc.failure(context)
             stage = stage_port.Eval(context)
-            names = [("prepare", "dress", "done")[int(s)] for s in stage]
+            names = [STAGE_NAMES[int(s)] for s in stage]
             progress.update(task, completed=now, description=f"L {names[0]}  R {names[1]}")
             if not terminal and now - told >= 5.0 - 1e-9:
                 told = now

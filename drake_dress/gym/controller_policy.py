@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.analysis import Simulator
 
+from drake_dress.diagrams.assemble import control_setup
 from drake_dress.diagrams.controller_diagram import make_controller_diagram
 from drake_dress.diagrams.release import release
-from drake_dress.diagrams.sections.controller import local_setup
 from drake_dress.gym.environment import DressingEnv
 from drake_dress.gym.observations import Observation
 from drake_dress.models.sides import SIDES
@@ -51,13 +51,13 @@ class ControllerPolicy:
 
     def reset(self) -> None:
         """Restarts the controllers with the person and garment of the environment's episode."""
-        parts = self._env.parts
         self.close()
-        local = local_setup(parts.setup.scenario.controller, parts.policy)
+        control = control_setup(self._env.parts)
+        local = control.local
         self._has_local = local is not None
         # requests take effect after the local controller's delay
         self._delay = 0.0 if local is None else local.delay
-        self._diagram = make_controller_diagram(parts)
+        self._diagram = make_controller_diagram(control)
         self._simulator = Simulator(self._diagram)
         self._root = self._simulator.get_mutable_context()
         self._begun = False

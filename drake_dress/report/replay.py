@@ -7,15 +7,15 @@ import time as clock
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Capsule, Cylinder, Mesh, Meshcat, Rgba, Sphere
+from pydrake.geometry import Capsule, Mesh, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
 from drake_dress.models.arm.description import link_meshes
-from drake_dress.models.arm.panda import STAND_RADIUS
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.sides import SIDES
+from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.scene import DressingScene
@@ -23,7 +23,6 @@ from drake_dress.report.web_page import open_page
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
 _ARM = Rgba(0.90, 0.91, 0.92, 1.0)
-_STAND = Rgba(0.62, 0.64, 0.67, 1.0)
 _POLL_PERIOD = 0.03  # s
 _TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
 
@@ -137,11 +136,11 @@ class MeshcatReplay:
 
     def _add_stand(self, name: str, base: FloatArray) -> None:
         """Adds the column from the floor, at z = 0, to an arm's base X_WB (4,4)."""
-        height = float(base[2, 3])
-        if height > 0.0:
-            self._meshcat.SetObject(name, Cylinder(STAND_RADIUS, height), _STAND)
-            middle = RigidTransform(base) @ RigidTransform([0.0, 0.0, -0.5 * height])
-            self._meshcat.SetTransform(name, middle)
+        stand = arm_stand(RigidTransform(base))
+        if stand is not None:
+            shape, pose = stand
+            self._meshcat.SetObject(name, shape, Rgba(*STAND_COLOR, 1.0))
+            self._meshcat.SetTransform(name, pose)
 
     def _show(self, i: int) -> None:
         log = self._log

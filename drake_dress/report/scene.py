@@ -10,8 +10,8 @@ from pydrake.math import RigidTransform
 from drake_dress.drawing import new_figure, pixels, plain_settings
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.sides import SIDES
+from drake_dress.report.log_schema import STAGE_NAMES
 
-STAGE_NAMES = ("prepare", "dress", "done")
 OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
 LINING = Rgba(0.87, 0.62, 0.28, 1.0)
 _GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)

@@ -31,8 +31,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
 from drake_dress.models.arm.description import link_meshes
-from drake_dress.models.arm.panda import STAND_RADIUS
 from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
 
 _Color = tuple[float, float, float]
 
@@ -41,7 +41,6 @@ LINING_COLOR = (0.87, 0.62, 0.28)
 SKIN_COLOR = (0.87, 0.70, 0.58)
 GRIPPER_COLOR = (0.25, 0.26, 0.28)
 _FLOOR_COLOR = (0.76, 0.77, 0.79)
-_STAND_COLOR = (0.62, 0.64, 0.67)
 _BACKGROUND = (0.95, 0.96, 0.97)
 _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
@@ -156,10 +155,9 @@ class _Scene:
     def add_arms(self, poses: FloatArray, floor: float) -> None:
         """Adds robot arms with bases and links at `poses` (a,8,4,4), on columns from the floor."""
         for arm in poses:
-            height = float(arm[0, 2, 3]) - floor
-            if height > 0.0:
-                middle = RigidTransform(arm[0]) @ RigidTransform([0.0, 0.0, -0.5 * height])
-                self.add(Cylinder(STAND_RADIUS, height), middle, _STAND_COLOR)
+            stand = arm_stand(RigidTransform(arm[0]), floor)
+            if stand is not None:
+                self.add(*stand, STAND_COLOR)
             for X_WL, meshes in zip(arm, link_meshes(), strict=True):
                 for path, X_LM in meshes:
                     self.add(Mesh(str(path)), RigidTransform(X_WL @ X_LM))
