@@ -2,6 +2,7 @@
 
     PassivePerson | ActivePerson ──set-point──▶ ArmMuscles ──┐
                        dummy: constant tone ────────────────┴▶ (+ HandTremor) ──▶ plant
+    ActivePerson | zeros ──intent──▶ log
 
 The controller receives none of this.
 """
@@ -22,6 +23,7 @@ from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.arm import Arms
 from drake_dress.models.human.motions import Motion, Turn
 from drake_dress.models.human.tremor import TremorParameters, tremor_torque
+from drake_dress.models.sides import SIDES
 from drake_dress.systems.active_person import ActivePerson
 from drake_dress.systems.arm_muscles import ArmMuscles
 from drake_dress.systems.hand_tremor import HandTremor
@@ -65,7 +67,7 @@ def add_behaviour(
     behaviour: Behaviour,
     mesh: GarmentMesh,
     garment_position: OutputPort,
-) -> None:
+) -> OutputPort:
     """Adds the systems that move the person, wired to the plant.
 
     Args:
@@ -76,15 +78,23 @@ def add_behaviour(
         behaviour: of the person.
         mesh: the true garment.
         garment_position: port (3n,) of the true garment, m.
+
+    Returns:
+        A port (2,): 1 if the left, the right arm moves by the person's own will, else 0.
     """
+    will: LeafSystem | None = None
     if behaviour.kind == "dummy":
         source: LeafSystem = ConstantVectorSource(person.tone_torque(plant))
         force = builder.AddSystem(source).get_output_port()
     else:
-        force = _muscles(builder, plant, person, arms, behaviour, mesh, garment_position)
+        force, will = _muscles(builder, plant, person, arms, behaviour, mesh, garment_position)
     if behaviour.tremor is not None and behaviour.tremor.amplitude > 0.0:
         force = _trembling(builder, plant, person, arms, behaviour, force)
     builder.Connect(force, plant.get_applied_generalized_force_input_port())
+    if will is not None and will.HasOutputPort("intent"):
+        return will.GetOutputPort("intent")
+    none = builder.AddNamedSystem("no_intent", ConstantVectorSource(np.zeros(len(SIDES))))
+    return none.get_output_port()
 
 
 def _muscles(
@@ -95,7 +105,8 @@ def _muscles(
     behaviour: Behaviour,
     mesh: GarmentMesh,
     garment_position: OutputPort,
-) -> OutputPort:
+) -> tuple[OutputPort, LeafSystem]:
+    """Returns the port of the muscles' forces, and the system that outputs their set-points."""
     own, dofs = person.own_dofs(plant), person.arm_dofs(plant)
     mine = np.array([int(np.flatnonzero(own == d)[0]) for d in dofs])
     muscles = builder.AddNamedSystem("arm_muscles", ArmMuscles(arms, plant.num_velocities(), dofs))
@@ -127,7 +138,7 @@ def _muscles(
         builder.Connect(
             will.GetOutputPort("stance"), plant.get_desired_state_input_port(person.model)
         )
-    return muscles.get_output_port()
+    return muscles.get_output_port(), will
 
 
 def _trembling(

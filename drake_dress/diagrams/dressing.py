@@ -236,7 +236,7 @@ def _add_recorder(
     if control.local is not None:
         w.connect(controllers.requests, "solve_time", recorder, "local_solve_time")
     if w.sees_truth:
-        for name in ("contact", "contact_force", "body_poses"):
+        for name in ("contact", "contact_force", "body_poses", "intent"):
             w.connect(w.station, f"cheat_{name}", recorder, name)
     for name in ("garment_position", "joint_position"):
         w.connect(w.station, w.true(name), recorder, name)

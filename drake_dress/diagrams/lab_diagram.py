@@ -242,7 +242,8 @@ class _LabMaker(Wiring):
             ),
         )
         to = {
-            f"cheat_{n}": n for n in ("garment_position", "contact", "contact_force", "body_poses")
+            f"cheat_{n}": n
+            for n in ("garment_position", "contact", "contact_force", "body_poses", "intent")
         }
         to |= {
             "cheat_joint_position": "joint_position",

@@ -20,6 +20,7 @@ Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always
              cheat_garment_position, cheat_garment_velocity  (3n,)
              cheat_contact (n,), cheat_contact_force (3n,)
              cheat_joint_position                            (18,) of the person's arms
+             cheat_intent                                    (2,) 1: the person moves that arm
              cheat_{left,right}_arm_stop                     (1,) why a driver ignores commands
     inputs   cheat_{left,right}_arm_fresh                    (1,) 0: its commands have ended
              cheat_push                                      (6,) force on the arms' tools, N
@@ -263,7 +264,7 @@ def make_simulated_station(
         motion, load = _wire_tools(builder, plant, cloth, arms)
         forces = _joined(builder, forces, load)
     builder.Connect(forces, plant.get_applied_spatial_force_input_port())
-    add_behaviour(
+    intent = add_behaviour(
         builder,
         plant,
         person,
@@ -279,7 +280,7 @@ def make_simulated_station(
         export_oracles(builder, cloth, plant, points, sight.transfer, p.effects, sight.period)
         permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
         builder.ExportOutput(permission.get_output_port(), "permission")
-    _export_truth(builder, cloth, plant)
+    _export_truth(builder, cloth, plant, intent)
     export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
@@ -360,11 +361,14 @@ def _export_measured(builder: DiagramBuilder, measured: _Ports) -> None:
         builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
 
 
-def _export_truth(builder: DiagramBuilder, cloth: ClothPlant, plant: MultibodyPlant) -> None:
+def _export_truth(
+    builder: DiagramBuilder, cloth: ClothPlant, plant: MultibodyPlant, intent: OutputPort
+) -> None:
     for name in ("garment_position", "garment_velocity", "contact", "contact_force"):
         builder.ExportOutput(cloth.GetOutputPort(name), f"cheat_{name}")
     builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
     builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
+    builder.ExportOutput(intent, "cheat_intent")
 
 
 def _wire_drivers(

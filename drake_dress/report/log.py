@@ -220,6 +220,16 @@ class RunLog:
         return self.joint_position[:, first], self.joint_position[:, second], radius
 
     @cached_property
+    def intent(self) -> IndexArray | None:
+        """(T,2) 0 the arm rests or follows the garment, 1 the person moves it; left, right.
+
+        None if not logged: in runs on hardware and in older logs.
+        """
+        if "/human/intent" not in self.file:
+            return None
+        return np.asarray(self.file["/human/intent"], dtype=np.int64)
+
+    @cached_property
     def gripper_position(self) -> dict[str, FloatArray]:
         """Side to (T,3), m."""
         return {side: self._read(f"/gripper/{side}/position") for side in SIDES}

@@ -17,6 +17,7 @@ from drake_dress.report.log_schema import (
     ARM_SERIES,
     CLEARANCES,
     COMPLETE,
+    INTENT_NAMES,
     JOINT_NAMES,
     LOOPS,
     SCHEMA,
@@ -42,7 +43,7 @@ class LogContent:
         estimate_garment: The controller's garment; None: its positions are not logged.
         bases: X_WB (4,4) of each arm, if samples have arms.
         estimated: Whether garment and person are estimates because the truth is not known; contact
-            is not logged then.
+            and the person's intent are not logged then.
     """
 
     garment: GarmentMesh
@@ -167,6 +168,9 @@ def _add_garment_and_person(layout: _Layout, content: LogContent) -> None:
     if not content.estimated:
         layout.add("/garment/contact", (n,), "1", dtype="i1")
         layout.add("/garment/contact_force", (n, 3), "N", "world")
+        intent = layout.add("/human/intent", (2,), "1", dtype="i1")
+        intent.attrs["names"] = list(SIDES)
+        intent.attrs["values"] = list(INTENT_NAMES)
     layout.joints("/human/joint_position", content.joint_names)
 
 

@@ -34,6 +34,11 @@ ARM_SERIES = (
     ("torque_peak", "N m"),
 )
 STAGE_NAMES = ("prepare", "dress", "done")
+INTENT_NAMES = (
+    "passive: the arm rests or follows the garment",
+    "active: it moves by the person's own will: it reaches, withdraws, returns, waves, "
+    "or the body turns",
+)
 
 # Name to shape (None: any length); a first axis "T" has one row per sample.
 _REQUIRED: dict[str, tuple[Any, ...]] = {
@@ -54,6 +59,7 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
     "/human/capsule_a": ("T", "c", 3),
     "/human/capsule_b": ("T", "c", 3),
     "/human/capsule_radius": ("c",),
+    "/human/intent": ("T", 2),
     "/control/safety": ("T", 2),
     "/control/global/solve_time": ("T",),
     "/control/local/solve_time": ("T",),

@@ -101,6 +101,8 @@ class Sample:
             and the right one to the person, m, if there are arms.
         safety: (2,) flags of `models.control.safety.Verdict` raised since the previous sample;
             left, right.
+        intent: (2,) 0 the arm rests or follows the garment, 1 it moves by the person's own will;
+            left, right; None if not known.
     """
 
     time: float
@@ -123,6 +125,7 @@ class Sample:
     safety: npt.ArrayLike = (0, 0)
     arms: Mapping[Side, ArmSample] | None = None
     clearance: npt.ArrayLike | None = None
+    intent: npt.ArrayLike | None = None
 
 
 class RunLogWriter:
@@ -328,6 +331,7 @@ class RunLogWriter:
             "/arm/clearance": sample.clearance,
             "/estimate/human/joint_position": sample.estimate_joint_position,
             "/estimate/garment/position": sample.estimate_garment_position,
+            "/human/intent": sample.intent,
             "/human/capsule_a": sample.capsule_a,
             "/human/capsule_b": sample.capsule_b,
         }

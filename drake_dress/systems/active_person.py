@@ -29,12 +29,14 @@ class ActivePerson(LeafSystem):
         - set_point
         - set_point_rate
         - stance
+        - intent
 
     person_state: (2k,) angles, rad, then rates, rad/s, of the person's k joints. garment_position:
     (3n,) of the true garment, m, world; the person knows where the armholes are. set_point,
     set_point_rate: (8,) abduction, extension, rotation, elbow of the left, then the right arm, rad,
     rad/s; they depend on state only. stance: (2,) yaw of the torso, rad, and its rate; it depends
-    on time only.
+    on time only. intent: (2,) 1 if the left, the right arm moves by the person's own will, 0 if it
+    rests or follows the garment; it depends on state and time.
 
     Args:
         arms: Kinematics, joints and rest pose; the set-point starts at the rest pose.
@@ -76,6 +78,9 @@ class ActivePerson(LeafSystem):
         for name, rows in (("set_point", slice(0, 4)), ("set_point_rate", slice(4, 8))):
             self.DeclareVectorOutputPort(name, 8, self._show(rows), {self.xd_ticket()})
         self.DeclareVectorOutputPort("stance", 2, self._calc_stance, {self.time_ticket()})
+        self.DeclareVectorOutputPort(
+            "intent", 2, self._calc_intent, {self.xd_ticket(), self.time_ticket()}
+        )
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
@@ -101,3 +106,8 @@ class ActivePerson(LeafSystem):
 
     def _calc_stance(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(stance(self._turns, context.get_time()))
+
+    def _calc_intent(self, context: Context, output: BasicVector) -> None:
+        for i, index in enumerate(self._states):
+            state = ArmState.of(context.get_discrete_state(index).value())
+            output[i] = float(self._arms[i].has_intent(state, context.get_time()))

@@ -35,6 +35,7 @@ class RunRecorder(LeafSystem):
         - contact
         - contact_force
         - body_poses
+        - intent
         - joint_position
         - left_gripper_position
         - left_gripper_force
@@ -61,8 +62,8 @@ class RunRecorder(LeafSystem):
     of all verdicts (2,) since the previous sample. local_solve_time exists only with a local
     controller; a sample holds its last solve time. The arm ports and clearance exist only with
     arms. A sample holds the least clearance since the previous sample, and the extremes of joint
-    positions, speeds and torques, observed every `arm_period`. contact, contact_force and
-    body_poses exist only if the truth is known; stage, solve_time, verdict and clearance only with
+    positions, speeds and torques, observed every `arm_period`. contact, contact_force, body_poses
+    and intent exist only if the truth is known; stage, solve_time, verdict and clearance only with
     controllers. If active (1,) is connected, samples are taken only while it is positive, and time
     counts from the first sample.
 
@@ -121,6 +122,7 @@ class RunRecorder(LeafSystem):
             self.DeclareVectorInputPort("contact", n)
             self.DeclareVectorInputPort("contact_force", 3 * n)
             self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+            self.DeclareVectorInputPort("intent", 2)
         self.DeclareVectorInputPort("joint_position", 18)
         for side in SIDES:
             self.DeclareVectorInputPort(f"{side}_gripper_position", 3)
@@ -215,6 +217,7 @@ class RunRecorder(LeafSystem):
             capsule_b=capsule_b,
             arms=self._arms(context),
             clearance=clearance if self._has_control else None,
+            intent=value("intent") if has_truth else None,
         )
 
     def _value(self, context: Context, name: str) -> np.ndarray:

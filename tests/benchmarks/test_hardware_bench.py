@@ -18,6 +18,7 @@ from drake_dress.models.supervision.injection import KINDS
 from drake_dress.models.supervision.wrong_points import WRONG_POINTS
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import summarize
+from tests.present import present
 
 SCENARIO = "scenarios/lab.yaml"
 pytestmark = pytest.mark.alone
@@ -39,6 +40,7 @@ def test_a_run_drives_a_lab_of_another_process(tmp_path: Path) -> None:
         assert f"heard: {name}" in done.run_words
     with RunLog.open(tmp_path / "run" / "run.h5") as log:
         assert log.estimated
+        assert log.intent is None
         assert log.ended_by is None
         assert log.time[-1] > 3.5
         summary = summarize(log, wall_time=0.0)
@@ -49,6 +51,7 @@ def test_a_run_drives_a_lab_of_another_process(tmp_path: Path) -> None:
         assert travelled.sum() > 0.05
     with RunLog.open(tmp_path / "lab" / "run.h5") as log:
         assert not log.estimated
+        np.testing.assert_array_equal(present(log.intent), 0)
         assert "holds, ended" in log.events[-1]
 
 

@@ -61,6 +61,10 @@ class Scene:
     def joints(self) -> np.ndarray:
         return joint_positions(self.plant, self.context, self.person)
 
+    def intent(self) -> list[float]:
+        port = self.diagram.GetOutputPort("intent")
+        return list(port.Eval(self.simulator.get_context()))
+
     def record(self, until: float, every: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
         """Returns times (n,), s, and joints (n,6,3), m, from now on."""
         now = self.simulator.get_context().get_time()
@@ -80,7 +84,8 @@ def scene(behaviour: Behaviour, garment: np.ndarray | None = None) -> Scene:
     x = MESH.rest_position + [-2.0, 0.0, 1.4] if garment is None else garment
     nodes = builder.AddSystem(ConstantVectorSource(x.ravel()))
     arms = person_arms(M, "standing", ARMS, JOINTS)
-    add_behaviour(builder, plant, person, arms, behaviour, MESH, nodes.get_output_port())
+    intent = add_behaviour(builder, plant, person, arms, behaviour, MESH, nodes.get_output_port())
+    builder.ExportOutput(intent, "intent")
     diagram = builder.Build()
     return Scene(diagram, plant, person, Simulator(diagram))
 
@@ -221,6 +226,25 @@ def test_turn_ends_at_its_angle_without_haste() -> None:
 def test_who_does_not_turn_is_welded_to_the_floor() -> None:
     assert scene(active(Wave())).plant.num_positions() == 8
     assert scene(Behaviour(kind="passive", motions=(Turn(),))).plant.num_positions() == 8
+
+
+@pytest.mark.parametrize("kind", ["dummy", "passive"])
+def test_who_has_no_will_has_no_intent(kind: Kind) -> None:
+    """Not even while an arm is led away, or if motions are given, which only active ones make."""
+    s = scene(Behaviour(kind=kind, motions=(Wave(start=0.0), Turn(angle=0.3))))
+    s.pull(2, np.array([0.0, 5.0, 0.0]))
+    for t in (0.0, 0.5, 1.0):
+        s.simulator.AdvanceTo(t)
+        assert s.intent() == [0.0, 0.0]
+
+
+def test_intent_of_a_person_is_that_of_each_arm() -> None:
+    s = scene(active(Wave(start=0.2, duration=0.6, sides=("right",)), Turn(start=3.0, angle=0.1)))
+    found = []
+    for t in (0.1, 0.5, 2.9, 3.5):
+        s.simulator.AdvanceTo(t)
+        found.append(s.intent())
+    assert found == [[0.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, 1.0]]
 
 
 def coat_near_the_hand(yaw: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

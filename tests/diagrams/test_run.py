@@ -12,11 +12,22 @@ import pytest
 
 from drake_dress.__main__ import main
 from drake_dress.models.control.safety import Verdict
+from drake_dress.report.log import RunLog
+from tests.present import present
 
 SCENARIO = """# a second of it, coarse
 duration: 1.0
 plant: {spacing: 0.05, time_step: 0.01}
 controller: {spacing: 0.06, global_mpc: {horizon: 3, max_iterations: 2}}
+"""
+# a wave of the right hand, then a turn, whose limits lie between samples
+MOTIONS = """
+person:
+  behaviour:
+    kind: active
+    motions:
+      - wave: {side: right, start: 0.115, duration: 0.3, amplitude: 0.01}
+      - turn: {angle_deg: 3.0, start: 0.715, duration: 0.2}
 """
 
 
@@ -76,6 +87,26 @@ def test_log_tells_what_safety_cut(run: tuple[int, Path]) -> None:
         # the first plan starts at full speed, which grippers cannot do
         assert np.all(np.any(safety[()] & Verdict.ACCELERATION.value, axis=0))
         assert not np.any(safety[()] & (Verdict.INVALID | Verdict.STALE | Verdict.UNMEASURED).value)
+
+
+def test_log_tells_when_the_person_moves_each_arm(run: tuple[int, Path], tmp_path: Path) -> None:
+    """A dummy never does."""
+    _, folder = run
+    with RunLog.open(folder / "out" / "run.h5") as log:
+        np.testing.assert_array_equal(present(log.intent), np.zeros((len(log), 2)))
+    path = tmp_path / "active.yaml"
+    path.write_text(SCENARIO + MOTIONS)
+    words = ["--out", str(tmp_path / "out"), "--no-meshcat", "--no-report"]
+    assert main(["run", str(path), *words]) == 1
+    with RunLog.open(tmp_path / "out" / "run.h5") as log:
+        time, intent = log.time, present(log.intent)
+    turning = (time > 0.715) & (time < 0.915)
+    np.testing.assert_array_equal(intent[:, 0], turning)
+    waving = (time > 0.115) & (time < 0.415)
+    assert intent[turning | waving, 1].all()
+    assert not intent[time < 0.115].any()
+    assert waving.sum() > 5
+    assert turning.sum() > 3
 
 
 def test_interrupt_leaves_a_log_of_what_had_run(tmp_path: Path) -> None:

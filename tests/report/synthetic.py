@@ -102,6 +102,7 @@ def dressing(
                 estimate_joint_position=joints,
                 capsule_a=a,
                 capsule_b=b,
+                intent=(on > [0.5, 1.5]).astype(np.int8),
             )
         )
     return samples

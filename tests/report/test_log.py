@@ -72,6 +72,7 @@ def test_what_is_read_is_what_was_written(
             np.testing.assert_array_equal(log.joint_position[i], s.joint_position)
             np.testing.assert_array_equal(log.capsules[0][i], s.capsule_a)
             np.testing.assert_array_equal(log.stage[i], s.stage)
+            np.testing.assert_array_equal(present(log.intent)[i], s.intent)
             for side in SIDES:
                 np.testing.assert_array_equal(
                     log.gripper_position[side][i], s.gripper_position[side]
@@ -85,6 +86,7 @@ def test_what_is_read_is_what_was_written(
             log.solves("global"), [np.isfinite(s.global_solve_time) for s in samples]
         )
         np.testing.assert_array_equal(log.solves("local"), [3 for _ in samples])
+        assert np.unique(present(log.intent)).tolist() == [0, 1]
 
 
 def test_layout_is_the_published_one(
@@ -100,6 +102,7 @@ def test_layout_is_the_published_one(
         "garment/contact_force": (count, n, 3),
         "human/joint_position": (count, 6, 3),
         "human/radius": (6,),
+        "human/intent": (count, 2),
         "control/stage": (count, 2),
         "control/safety": (count, 2),
         "control/global/solve_time": (count,),
@@ -121,6 +124,10 @@ def test_layout_is_the_published_one(
         assert {name: file[name].shape for name in expected} == expected
         assert file["time"].dtype == np.float64
         assert list(file["human/joint_position"].attrs["names"]) == list(JOINT_NAMES)
+        assert file["human/intent"].dtype == file["control/stage"].dtype
+        assert list(file["human/intent"].attrs["names"]) == list(SIDES)
+        values = file["human/intent"].attrs["values"]
+        assert [value.split(":")[0] for value in values] == ["passive", "active"]
         assert file["gripper/left/force"].attrs["unit"] == "N"
         assert file["garment/position"].attrs["frame"] == "world"
 
@@ -135,6 +142,28 @@ def test_log_without_verdicts_is_still_a_log(path: Path) -> None:
 
 def _delete_safety(file: h5py.File) -> None:
     del file["control/safety"]
+
+
+def test_log_from_before_intent_is_still_a_log(path: Path) -> None:
+    _edit(path, _delete_intent)
+    with RunLog.open(path) as log:
+        assert log.intent is None
+
+
+def _delete_intent(file: h5py.File) -> None:
+    del file["human/intent"]
+
+
+def test_estimated_log_has_no_truth(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample]
+) -> None:
+    """On hardware neither contact nor the person's intent is known."""
+    path = tmp_path / "run.h5"
+    with RunLogWriter(path, synthetic.content(garment, estimated=True)) as writer:
+        writer.append(replace(samples[0], contact=None, contact_force=None, intent=None))
+    with RunLog.open(path) as log:
+        assert log.estimated
+        assert (log.contact(0), log.contact_force(0), log.intent) == (None, None, None)
 
 
 def test_interrupt_leaves_whole_samples(
@@ -338,6 +367,11 @@ def _short_force(file: h5py.File) -> None:
     file["gripper/left/force"].resize(3, axis=0)
 
 
+def _one_intent(file: h5py.File) -> None:
+    del file["human/intent"]
+    file["human/intent"] = np.zeros(len(file["time"]))
+
+
 def _wild_face(file: h5py.File) -> None:
     file["garment/faces"][0, 0] = 10**6
 
@@ -351,6 +385,7 @@ def _wild_face(file: h5py.File) -> None:
         (_no_schema, "schema"),
         (_time_back, "/time"),
         (_short_force, "/gripper/left/force"),
+        (_one_intent, "/human/intent"),
         (_wild_face, "/garment/faces"),
     ],
 )

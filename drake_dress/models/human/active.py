@@ -29,7 +29,7 @@ from drake_dress.models.human.hand_tracking import (
     rate_bounds,
     tracking_rate,
 )
-from drake_dress.models.human.motions import Motion, Reach, Wave, Withdraw
+from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
 
 # A reach is given up once the armhole is farther from the hand's anchor than this times `within`.
 _LOST = 1.4
@@ -133,7 +133,7 @@ class ActiveArm:
         comfort: rest pose (4,), rad.
         limits: (2,4) lower and upper joint limits, rad.
         stiffness: stiffness of its joints (4,), N·m/rad.
-        motions: motions of the person; those of the other arm are ignored.
+        motions: motions of the person; those of the other arm are ignored. Turns move both arms.
         parameters: limits.
     """
 
@@ -152,6 +152,7 @@ class ActiveArm:
         self._reach = next((m for m in mine if isinstance(m, Reach)), None)
         self._withdrawals = [m for m in mine if isinstance(m, Withdraw)]
         self._waves = [m for m in mine if isinstance(m, Wave)]
+        self._turns = [m for m in motions if isinstance(m, Turn)]
 
     def initial_state(self) -> ArmState:
         """Returns the state at time 0: at rest in the comfortable pose."""
@@ -159,6 +160,19 @@ class ActiveArm:
         still = np.zeros(3)
         path = HandPath(hand, still, still)
         return ArmState(self._comfort, np.zeros(4), path, still, hand)
+
+    def has_intent(self, state: ArmState, time: float) -> bool:
+        """Returns whether the arm moves by the person's own will.
+
+        It does while it has a goal, while it waves, and while the body turns. Otherwise it rests or
+        follows the garment.
+
+        Args:
+            state: current state.
+            time: current time, s.
+        """
+        turning = any(t.is_on(time) for t in self._turns)
+        return state.want is not Want.FOLLOW or self._is_waving(time) or turning
 
     def step(
         self, state: ArmState, angles: FloatArray, armhole: Armhole, time: float, step: float
@@ -217,7 +231,7 @@ class ActiveArm:
             if not self._is_near(armhole, state.anchor, _LOST):
                 return self._begin(state, Want.RETURN)
             return state
-        waving = any(w.is_on(time) for w in self._waves)
+        waving = self._is_waving(time)
         reaches = self._reach is not None and not state.through and time >= self._reach.start
         place = state.anchor if want is Want.RETURN else armhole.joints[2]
         if reaches and self._is_near(armhole, place, 1.0):
@@ -268,6 +282,9 @@ class ActiveArm:
 
     def _withdrawal(self, time: float) -> Withdraw | None:
         return next((w for w in self._withdrawals if w.is_on(time)), None)
+
+    def _is_waving(self, time: float) -> bool:
+        return any(w.is_on(time) for w in self._waves)
 
     def _pushed_harder(self, state: ArmState, hand: FloatArray, step: float) -> FloatArray:
         if state.want is not Want.REACH:

@@ -142,6 +142,10 @@ class Turn(Motion):
         """Returns the highest rate, rad/s."""
         return PEAK_OF_MEAN_SPEED * abs(self.angle) / self.duration
 
+    def is_on(self, time: float) -> bool:
+        """Returns whether the body turns at `time`, s."""
+        return self.angle != 0.0 and self.start <= time < self.start + self.duration
+
 
 def stance(turns: tuple[Turn, ...], time: float) -> FloatArray:
     """Returns (2,) yaw of the torso, rad, and its rate, rad/s, at `time`, s."""

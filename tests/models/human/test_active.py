@@ -13,7 +13,7 @@ from drake_dress.models.human.active import ActiveArm, ActiveParameters, ArmStat
 from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.armhole import Armhole, find_armhole
 from drake_dress.models.human.body import BodyMeasures
-from drake_dress.models.human.motions import Motion, Reach, Wave, Withdraw
+from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
 
 ARM = Arm(BodyMeasures(), "standing", "left")
 REST = np.deg2rad([13.0, 46.0, 0.0, 10.0])
@@ -196,3 +196,59 @@ def test_motions_that_overlap_blend() -> None:
 def test_motions_of_the_other_hand_are_not_for_this_one() -> None:
     states, _hand = play([Wave(start=0.0, sides=("right",))], 1.0)
     np.testing.assert_array_equal(states[-1].set_point, REST)
+
+
+def intents(motions: list[Motion], states: list[ArmState]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns times (n,), s, and whether the arm moves by its own will (n,) at each of them."""
+    active = ActiveArm(ARM, REST, LIMITS, STIFFNESS, motions, P)
+    times = STEP * np.arange(len(states))
+    pairs = zip(states, times, strict=True)
+    return times, np.array([active.has_intent(state, t) for state, t in pairs])
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        Reach(start=0.5),
+        Withdraw(start=0.5, duration=1.0),
+        Wave(start=0.5, duration=1.0),
+    ],
+    ids=lambda motion: type(motion).__name__,
+)
+def test_hand_moves_only_by_intent_when_nothing_leads_it(motion: Motion) -> None:
+    center = ARM.hand(REST) + [0.05, 0.12, 0.08]
+    states, _ = play([motion], 6.0, lambda t: center)
+    times, intent = intents([motion], states)
+    speed = np.array([np.abs(s.rate).max() for s in states])
+    assert not intent[times < 0.5].any()
+    assert intent[(times >= 0.5) & (times < 1.0)].all()
+    assert not intent[-1]
+    # one interval; a hand at its end brakes within a tenth of a second
+    changes = np.flatnonzero(np.diff(intent.astype(int)))
+    assert len(changes) == 2
+    assert speed[intent].max() > 0.1
+    assert speed[times < 0.5].max() == 0.0
+    assert speed[times > times[changes[1]] + 0.1].max() < 0.02
+
+
+def test_arm_that_is_led_away_has_no_intent() -> None:
+    active = ActiveArm(ARM, REST, LIMITS, STIFFNESS, [], P)
+    state, led = active.initial_state(), REST + [0.6, -0.3, 0.0, 0.4]
+    for k in range(500):
+        state = active.step(state, led, hole(led, FAR, np.array([0.0, 1.0, 0.0])), k * STEP, STEP)
+        assert not active.has_intent(state, (k + 1) * STEP)
+    assert np.abs(state.set_point - REST).max() > 0.1
+
+
+def test_waving_and_turning_arm_has_intent_whatever_its_goal() -> None:
+    state = ActiveArm(ARM, REST, LIMITS, STIFFNESS, [], P).initial_state()
+    motions: list[Motion] = [
+        Wave(start=1.0, duration=1.0),
+        Wave(start=3.0, duration=1.0, sides=("right",)),
+        Turn(start=5.0, angle=-0.2, duration=1.0),
+    ]
+    active = ActiveArm(ARM, REST, LIMITS, STIFFNESS, motions, P)
+    assert state.want is Want.FOLLOW
+    times = (0.9, 1.0, 1.9, 2.0, 3.5, 4.9, 5.0, 5.9, 6.0)
+    found = [active.has_intent(state, t) for t in times]
+    assert found == [False, True, True, False, False, False, True, True, False]

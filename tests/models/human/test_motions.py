@@ -51,6 +51,14 @@ def test_withdrawal_is_on_in_its_time() -> None:
     assert [withdraw.is_on(t) for t in (2.9, 3.0, 4.9, 5.0)] == [False, True, True, False]
 
 
+def test_turn_is_on_while_the_body_turns() -> None:
+    turn = Turn(start=1.0, angle=-0.3, duration=2.0)
+    for t in np.linspace(0.05, 3.95, 40):
+        assert turn.is_on(t) == (stance((turn,), t)[1] != 0.0)
+    assert [turn.is_on(t) for t in (1.0, 3.0)] == [True, False]
+    assert not Turn(start=1.0, angle=0.0, duration=2.0).is_on(2.0)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
