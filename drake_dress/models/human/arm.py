@@ -68,6 +68,11 @@ class Arm:
         levers = np.stack([upper + fore] * 3 + [fore])
         return np.cross(axes, levers).T
 
+    def elbow_jacobian(self, angles: FloatArray) -> FloatArray:
+        """Returns the Jacobian (3,4) of the elbow, m/rad; its own hinge does not move it."""
+        axes, upper, _ = self._chain(angles)
+        return np.cross(axes, np.stack([upper] * 3 + [np.zeros(3)])).T
+
     def gravity_torque(self, angles: FloatArray) -> FloatArray:
         """Returns (4,) −∂U/∂q, the gravity torque on each hinge, N·m.
 

@@ -1,0 +1,1 @@
+"""Sequences of persons in moving garments, from which motion and intent are learned."""

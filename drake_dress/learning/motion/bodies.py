@@ -1,0 +1,103 @@
+"""Draws persons and coats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+
+from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.coat import COATS, make_coat
+from drake_dress.models.garment.geodesics import Reach, reach
+from drake_dress.models.human.arm import Arm
+from drake_dress.models.human.body import BodyMeasures, Posture
+from drake_dress.models.sides import SIDES
+
+# Stature of adults and of tall children over that of the preset, and each measure's own variation.
+_STATURE = 0.78, 1.18
+_MEASURE = 0.07
+# Comfortable poses, rad: abduction, extension, rotation, elbow; arms that hang, that are held back
+# or forward, or that lie in the lap.
+_LOW = np.array([-0.05, -0.7, -0.6, 0.0])
+_HIGH = np.array([0.7, 0.9, 0.6, 1.7])
+# Ranges of an adult's joints, rad, and how far a person's own limits lie inside, as a share.
+_LIMITS = np.array([[-0.6, -2.6, -1.4, 0.0], [2.6, 1.2, 1.4, 2.5]])
+_STIFFER = 0.15
+_COAT_SCALE, _COAT_MEASURE = (0.85, 1.15), 0.06
+# Spacing at which a drawn coat's reach is measured, m, and attempts to draw measures that fit.
+_SPACING, _ATTEMPTS = 0.06, 20
+# Standard deviation of differences between left and right in a comfortable pose, rad.
+_UNLIKE = 0.15
+
+
+@dataclass(frozen=True)
+class DrawnPerson:
+    """A person of the data.
+
+    Attributes:
+        measures: body sizes.
+        posture: standing or sitting.
+        comfort: (2,4) comfortable pose of both arms, rad.
+        limits: (2,2,4) lower and upper limits of each arm, rad.
+        effort: (4,) relative effort of moving each joint.
+    """
+
+    measures: BodyMeasures
+    posture: Posture
+    comfort: FloatArray
+    limits: FloatArray
+    effort: FloatArray
+
+    @cached_property
+    def arms(self) -> tuple[Arm, Arm]:
+        """Kinematics of left and right arm."""
+        left, right = (Arm(self.measures, self.posture, side) for side in SIDES)
+        return left, right
+
+
+def draw_person(rng: np.random.Generator) -> DrawnPerson:
+    """Returns a person with drawn measures, posture, pose and joints."""
+    posture: Posture = "sitting" if rng.random() < 0.35 else "standing"
+    low, high = _LIMITS
+    inside = _STIFFER * rng.random(4) * (high - low)
+    limits = np.stack([np.stack([low + 0.5 * inside, high - 0.5 * inside])] * 2)
+    limits[:, 0, 3] = 0.0
+    both = rng.uniform(_LOW, _HIGH)
+    comfort = np.clip(both + _UNLIKE * rng.normal(size=(2, 4)), limits[:, 0], limits[:, 1])
+    effort = np.array([1.0, 1.0, 0.6, 0.4]) * np.exp(0.4 * rng.normal(size=4))
+    return DrawnPerson(_draw_measures(rng), posture, comfort, limits, effort)
+
+
+def draw_reach(rng: np.random.Generator) -> Reach:
+    """Returns the reach of a coat with drawn measures."""
+    names = sorted(COATS)
+    for _ in range(_ATTEMPTS):
+        preset = COATS[names[rng.integers(len(names))]]
+        scale = rng.uniform(*_COAT_SCALE)
+        lengths = [f.name for f in fields(preset) if not f.name.startswith("grasp")]
+        drawn = {
+            name: getattr(preset, name) * scale * (1.0 + rng.uniform(-1, 1) * _COAT_MEASURE)
+            for name in lengths
+        }
+        try:
+            return reach(make_coat(replace(preset, **drawn), _SPACING))
+        except UserError:
+            continue
+    return reach(make_coat(COATS["jacket"], _SPACING))
+
+
+def _draw_measures(rng: np.random.Generator) -> BodyMeasures:
+    for _ in range(_ATTEMPTS):
+        scale = rng.uniform(*_STATURE)
+        values = {}
+        for entry in fields(BodyMeasures):
+            whole = scale**3 if entry.name.endswith("mass") else scale
+            own = 1.0 + _MEASURE * float(np.clip(rng.normal(), -2.5, 2.5))
+            values[entry.name] = float(getattr(BodyMeasures, entry.name)) * whole * own
+        try:
+            return BodyMeasures(**values)
+        except UserError:
+            continue
+    return BodyMeasures()

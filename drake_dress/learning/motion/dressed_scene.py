@@ -1,0 +1,127 @@
+"""A person and a garment, moved step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drake_dress.learning.motion.arms import INTO_SLEEVE
+from drake_dress.learning.motion.bodies import draw_reach
+from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axis_of
+from drake_dress.learning.motion.moving_person import MovingPerson
+from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
+from drake_dress.learning.motion.torso import draw_lean, draw_turn
+from drake_dress.models.arrays import FloatArray
+
+_SUBSTEPS = round(STEP / PERIOD)
+# A person's first movement by will begins within this time, s.
+_FIRST = 4.0
+# Share of active persons who reach for the armhole, and the distance at which they do, m.
+_HELPERS, _HELPS = 0.75, (0.15, 0.40)
+_TURNS_A_SECOND = 0.04
+_LEANS = 0.35  # share of movements that the torso goes along with
+_TOGETHER = 0.4  # share of movements that both arms make
+_TOUCH = 0.10  # distance at which an armhole that is not on the arm pushes the hand along, m
+_LOOSER = 0.02  # largest clearance of an arm beyond that at which its sleeve leads it, m
+
+
+class DressedScene:
+    """A person in a garment that two grippers move.
+
+    Args:
+        active: whether the person moves by will; else the arms only follow.
+        rng: draws.
+    """
+
+    def __init__(self, active: bool, rng: np.random.Generator) -> None:
+        self._rng, self._active = rng, active
+        of = GarmentDraw.drawn(rng, draw_reach(rng))
+        self._mover = MovingPerson(rng, of.beside + rng.uniform(0.0, _LOOSER))
+        if active:
+            for arm in self._mover.arms:
+                arm.next_at = float(rng.uniform(0.0, _FIRST))
+                arm.helps_within = float(rng.uniform(*_HELPS)) if rng.random() < _HELPERS else 0.0
+        self._before, self._way = self._mover.joints(0.0), np.zeros((2, 3))
+        self._sleeves = Sleeves.drawn(rng, of, self._before)
+
+    def run(self) -> Sequence:
+        """Moves for the whole duration; returns the samples."""
+        made, sleeves = Sequence.empty(), self._sleeves
+        for k in range(COUNT):
+            time = k * PERIOD
+            made.joints[k] = self._mover.trembling(time)
+            made.sleeves[k] = np.hstack([sleeves.center, sleeves.direction])
+            made.intent[k], made.on[k] = self._mover.is_willed(time), sleeves.on
+            self._advance(k, time)
+        _interpolate(made.sleeves)
+        return made
+
+    def _advance(self, k: int, time: float) -> None:
+        """Moves the person by one `PERIOD`, and the garment every `STEP`."""
+        mover = self._mover
+        if k % _SUBSTEPS == 0:
+            self._decide(time)
+            self._before = mover.joints(time)
+            self._way = self._sleeves.advance(self._before, mover.is_willed(time), time)
+        for i, arm in enumerate(mover.arms):
+            if arm.is_willed(time):
+                arm.move_by_will(time, PERIOD)
+            else:
+                self._follow(i, self._way[i], time)
+        if k % _SUBSTEPS == _SUBSTEPS - 1:
+            self._sleeves.meet(mover.joints(time + PERIOD), self._before)
+
+    def _follow(self, i: int, way: FloatArray, time: float) -> None:
+        """Lets an arm go along with its sleeve, whose motion in this step is `way` (3,), m."""
+        arm, sleeves = self._mover.arms[i], self._sleeves
+        rotation, _ = self._mover.torso.pose(time)
+        axis = axis_of(self._mover.joints(time), i)
+        led, progress = None, 0.0
+        if sleeves.on[i]:
+            progress = float(sleeves.progress[i])
+            along = axis.D(progress)
+            off = sleeves.center[i] - axis.G(progress)
+            off = off - (off @ along) * along
+            size = float(np.linalg.norm(off))
+            excess = max(0.0, size - arm.following.clearance)
+            led = off * (excess / max(size, 1e-9)) + arm.following.drag * (way @ along) * along
+        elif np.linalg.norm(axis.G(0.0) - sleeves.center[i]) < _TOUCH:
+            led = arm.following.drag * way
+        arm.follow(None if led is None else led @ rotation, progress, PERIOD)
+
+    def _decide(self, time: float) -> None:
+        """Begins the movements whose time has come."""
+        if not self._active:
+            return
+        rng, torso, arms = self._rng, self._mover.torso, self._mover.arms
+        if not torso.is_moving(time) and rng.random() < _TURNS_A_SECOND * STEP:
+            torso.strokes.append(draw_turn(rng, time))
+        for i, arm in enumerate(arms):
+            armhole = self._armhole(i, time)
+            kind = arm.due(time, armhole)
+            if kind is None or not arm.begin(time, kind, armhole):
+                continue
+            other, both = arms[1 - i], kind != INTO_SLEEVE and rng.random() < _TOGETHER
+            if both and not other.is_willed(time):
+                other.begin(time, kind, self._armhole(1 - i, time))
+            if arm.strokes and not torso.is_moving(time) and rng.random() < _LEANS:
+                end = max(s.end for s in arm.strokes)
+                way = sum((s.way for s in arm.strokes), np.zeros(3))
+                torso.strokes.append(draw_lean(rng, time, end - time, way))
+
+    def _armhole(self, i: int, time: float) -> tuple[FloatArray, FloatArray] | None:
+        if self._sleeves.on[i]:
+            return None
+        rotation, origin = self._mover.torso.pose(time)
+        center = (self._sleeves.center[i] - origin) @ rotation
+        return center, -self._sleeves.direction[i] @ rotation
+
+
+def _interpolate(rows: FloatArray) -> None:
+    """Interpolates rows (T,2,6) between the garment's steps in place; directions stay units."""
+    kept = rows[::_SUBSTEPS].copy()
+    for n in range(1, _SUBSTEPS):
+        share = n / _SUBSTEPS
+        between = (1.0 - share) * kept[:-1] + share * kept[1:]
+        rows[n::_SUBSTEPS][: len(between)] = between
+    length = np.linalg.norm(rows[..., 3:], axis=-1, keepdims=True)
+    rows[..., 3:] /= np.maximum(length, 1e-9)

@@ -1,0 +1,46 @@
+"""One sequence: a person who moves for some seconds, in a garment or without one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from drake_dress.models.arrays import FloatArray, IndexArray
+
+# Kinds of sequences: the person follows the garment; moves by will in it; moves without a garment,
+# and with the whole body.
+Kind = Literal["passive", "active", "free"]
+KINDS: tuple[Kind, ...] = ("passive", "active", "free")
+DURATION = 10.0  # s
+PERIOD = 0.05  # s, between samples
+COUNT = round(DURATION / PERIOD) + 1
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A sequence of T samples, `PERIOD` apart.
+
+    Attributes:
+        joints: (T,6,3) shoulder, elbow, hand of left, then right arm, m, world.
+        sleeves: (T,2,6) centre, m, and unit direction from cuff to armhole of left and right
+            armhole; NaN without a garment.
+        intent: (T,2) 1 where the arm moves by will, else 0.
+        on: (T,2) 1 where the arm is in its sleeve.
+    """
+
+    joints: FloatArray
+    sleeves: FloatArray
+    intent: IndexArray
+    on: IndexArray
+
+    @classmethod
+    def empty(cls) -> Sequence:
+        """Returns a sequence of `COUNT` samples to be filled in."""
+        return cls(
+            np.empty((COUNT, 6, 3)),
+            np.full((COUNT, 2, 6), np.nan),
+            np.zeros((COUNT, 2), dtype=np.int64),
+            np.zeros((COUNT, 2), dtype=np.int64),
+        )

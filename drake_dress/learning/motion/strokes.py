@@ -1,0 +1,97 @@
+"""Strokes: voluntary movements from one place to another, as people make them.
+
+The speed of a stroke is bell-shaped: that of the beta distribution with exponents a and b, in which
+a = b = 2 is the minimum-jerk profile (Flash and Hogan 1985) and a < b rises faster than it falls,
+as fast movements do. Strokes that overlap in time add up: a change of mind in the middle of a
+movement is a second stroke superposed on the first (Flash and Henis 1991).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import betainc
+
+from drake_dress.models.arrays import FloatArray
+
+# Exponents of a stroke's profile are drawn from this range.
+_SHAPES = 1.6, 3.2
+# Standard deviation of a path's bow, as a share of its length, and mean speeds, m/s.
+_BOW = 0.06
+_MEAN_SPEED, _SPEED_SPREAD = 0.22, 0.5
+_SHORTEST, _LONGEST = 0.35, 3.5  # s
+_FASTEST = 0.9  # mean, m/s
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A movement by `way`, from `start` to `start + duration`, s.
+
+    Attributes:
+        start: s. duration: s.
+        way: (k,) displacement, in any unit.
+        bow: (k,) largest deviation from the straight line.
+        shape: exponents a, b of its profile.
+    """
+
+    start: float
+    duration: float
+    way: FloatArray
+    bow: FloatArray
+    shape: tuple[float, float] = (2.0, 2.0)
+
+    @property
+    def end(self) -> float:
+        """Time at which it ends, s."""
+        return self.start + self.duration
+
+    def is_on(self, time: float) -> bool:
+        """Returns whether the movement is in progress at `time`, s."""
+        return self.start <= time < self.end
+
+    def position(self, time: float) -> FloatArray:
+        """Returns the displacement (k,) since the start, at `time`, s."""
+        u = (time - self.start) / self.duration
+        if u <= 0.0:
+            return np.zeros_like(self.way)
+        if u >= 1.0:
+            return self.way
+        done = float(betainc(self.shape[0] + 1.0, self.shape[1] + 1.0, u))
+        placed: FloatArray = done * self.way + 4.0 * done * (1.0 - done) * self.bow
+        return placed
+
+
+def draw_stroke(
+    rng: np.random.Generator, start: float, way: FloatArray, slower: float = 1.0
+) -> Stroke:
+    """Returns a stroke by `way` (k,), m, of drawn duration, shape and bow.
+
+    Args:
+        rng: draws.
+        start: time of its start, s.
+        way: displacement, m.
+        slower: factor on its duration.
+    """
+    length = float(np.linalg.norm(way))
+    speed = _MEAN_SPEED * float(np.exp(_SPEED_SPREAD * rng.normal()))
+    # longer movements are faster: duration grows with the root of the length beyond 0.3 m
+    duration = slower * max(np.sqrt(length * max(length, 0.3)) / speed, length / _FASTEST)
+    bow = _BOW * length * rng.normal(size=len(way))
+    if length > 0.0:
+        bow = bow - way * float(bow @ way) / length**2
+    a, b = rng.uniform(*_SHAPES, 2)
+    return Stroke(start, float(np.clip(duration, _SHORTEST, _LONGEST)), way, bow, (a, b))
+
+
+def draw_strokes(
+    rng: np.random.Generator, start: float, way: FloatArray, slower: float = 1.0
+) -> list[Stroke]:
+    """Returns strokes that together move by `way` (k,), m: one, or two with a pause between."""
+    if rng.random() < 0.75:
+        return [draw_stroke(rng, start, way, slower)]
+    # hesitation: it stops on the way, and goes on
+    share = rng.uniform(0.25, 0.75)
+    first = draw_stroke(rng, start, share * way, slower)
+    pause = rng.uniform(0.0, 0.8)
+    return [first, draw_stroke(rng, first.end + pause, (1.0 - share) * way, slower)]

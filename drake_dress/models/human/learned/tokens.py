@@ -1,0 +1,135 @@
+"""What the networks see of each step of the history of an arm: motion, pose, sleeves, what is seen.
+
+All lengths are brought to about 1 by fixed scales, so that no scale depends on the data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.human.learned.arm_frame import ArmFrames, swapped_sides
+
+# Scales, 1/m: of limbs, of motion within the history, of the other arm, of sleeves; s/m of speeds.
+_LIMB, _MOTION, _OTHER, _SLEEVE = 3.0, 3.0, 1.5, 3.0
+_JOINT_SPEED, _SLEEVE_SPEED = 2.0, 5.0
+# What is farther or faster than this, in scaled units, tells nothing more.
+_MOST = 3.0
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Histories of B persons, T samples one period apart, the last one now.
+
+    Attributes:
+        joints: (B,T,6,3) shoulder, elbow, hand of left, then right arm, m, without gaps.
+        seen: (B,T,6) whether each joint was observed; else it is filled in.
+        sleeves: (B,T,2,6) armhole centre, m, and unit direction from cuff to armhole; any finite
+            numbers where it is not known.
+        sleeves_seen: (B,T,2) whether they are known.
+        period: s.
+    """
+
+    joints: FloatArray
+    seen: BoolArray
+    sleeves: FloatArray
+    sleeves_seen: BoolArray
+    period: float
+
+
+@dataclass(frozen=True)
+class ArmTokens:
+    """The tokens of 2B arms, and the frames that they are in.
+
+    Attributes:
+        frames: of the arms.
+        joints: (2B,T,6,3) in the frames, m, the arm's own joints first.
+        tokens: (2B,T,`TOKEN_SIZE`) single precision.
+    """
+
+    frames: ArmFrames
+    joints: FloatArray
+    tokens: FloatArray
+
+
+def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
+    """Returns the tokens of all arms, left arms first.
+
+    Args:
+        windows: histories.
+        turned: (B,) angles by which the frames are turned, rad.
+    """
+    frames = ArmFrames.of(windows.joints[:, -1], turned)
+    joints = frames.joints(windows.joints)
+    known = swapped_sides(windows.sleeves_seen).astype(np.float64)
+    center = swapped_sides_of_frames(frames.points(windows.sleeves[..., :3]))
+    direction = swapped_sides_of_frames(frames.directions(windows.sleeves[..., 3:]))
+    seen = np.concatenate([windows.seen, windows.seen[:, :, [3, 4, 5, 0, 1, 2]]])
+    shoulder, elbow, hand, other_shoulder, _, other_hand = np.moveaxis(joints, 2, 0)
+    own, other = center[:, :, 0], center[:, :, 1]
+    period = windows.period
+    progress, distance = place_on_arm(own, shoulder, elbow, hand)
+    on_own, on_other = known[:, :, :1], known[:, :, 1:]
+    parts = [
+        _MOTION * shoulder,
+        _LIMB * (elbow - shoulder),
+        _LIMB * (hand - elbow),
+        _OTHER * (other_shoulder - shoulder),
+        _OTHER * (other_hand - shoulder),
+        _JOINT_SPEED * rates(shoulder, period),
+        _JOINT_SPEED * rates(elbow, period),
+        _JOINT_SPEED * rates(hand, period),
+        0.5 * _JOINT_SPEED * rates(other_hand, period),
+        _MOTION * (hand - hand[:, -1:]),
+        _MOTION * (elbow - elbow[:, -1:]),
+        seen[:, :, [0, 1, 2, 5]].astype(np.float64),
+        on_own * np.clip(_SLEEVE * (own - hand), -_MOST, _MOST),
+        on_own * direction[:, :, 0],
+        on_own * np.clip(_SLEEVE_SPEED * rates(own, period), -_MOST, _MOST),
+        on_own * np.stack([progress, np.minimum(5.0 * distance, _MOST)], axis=2),
+        on_own,
+        on_other * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
+        on_other * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
+        on_other,
+    ]
+    tokens = np.concatenate(parts, axis=2).astype(np.float32)
+    return ArmTokens(frames, joints, np.clip(tokens, -2.0 * _MOST, 2.0 * _MOST))
+
+
+TOKEN_SIZE = 56
+# Columns that tell of sleeves.
+SLEEVE_COLUMNS = slice(37, 56)
+
+
+def swapped_sides_of_frames(pairs: FloatArray) -> FloatArray:
+    """Returns (2B,T,2,…) of left and right in frames as each arm's own and the other's."""
+    half = len(pairs) // 2
+    return np.concatenate([pairs[:half], pairs[half:, :, ::-1]])
+
+
+def rates(points: FloatArray, period: float) -> FloatArray:
+    """Returns the velocities (N,T,3), m/s, between samples; 0 at the first."""
+    moved = np.zeros_like(points)
+    moved[:, 1:] = np.diff(points, axis=1) / period
+    return moved
+
+
+def place_on_arm(
+    points: FloatArray, shoulder: FloatArray, elbow: FloatArray, hand: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Returns progress, 0 hand to 2 shoulder, and distance, m, of points (…,3) on arms (…,3)."""
+    lower, off_lower = _on_limb(points, hand, elbow)
+    upper, off_upper = _on_limb(points, elbow, shoulder)
+    nearer = off_lower <= off_upper
+    return np.where(nearer, lower, 1.0 + upper), np.where(nearer, off_lower, off_upper)
+
+
+def _on_limb(
+    points: FloatArray, start: FloatArray, end: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    way = end - start
+    length2 = np.maximum((way * way).sum(axis=-1), 1e-9)
+    share = np.clip(((points - start) * way).sum(axis=-1) / length2, 0.0, 1.0)
+    return share, np.linalg.norm(points - start - share[..., None] * way, axis=-1)
