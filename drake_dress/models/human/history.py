@@ -41,7 +41,8 @@ class Sampling:
 
     def times(self, now: float) -> FloatArray:
         """Returns the times (T,) of the samples, s."""
-        return now - self.period * np.arange(self.length - 1, -1, -1)
+        back = np.arange(self.length - 1, -1, -1, dtype=np.float64)
+        return now - self.period * back
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Observations(Immutable):
         found = np.full((sampling.length, points, size), np.nan)
         if not len(self.time):
             return found
-        seen = np.isfinite(self.value).all(axis=2)
+        seen = np.all(np.isfinite(self.value), axis=2)
         alike: dict[bytes, list[int]] = {}
         for k in range(points):
             alike.setdefault(seen[:, k].tobytes(), []).append(k)

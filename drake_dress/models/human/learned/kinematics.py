@@ -1,7 +1,7 @@
 """Makes predicted joints a person's: limbs keep their lengths, joints their limits.
 
-Angles are those of `body.py`, with the trunk upright and facing across the shoulders. A pose that is
-beyond a limit already may stay there, but goes no further.
+Angles are those of `body.py`, with the trunk upright and facing across the shoulders. A pose that
+is beyond a limit already may stay there, but goes no further.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     """
     frames = ArmFrames.of(windows.joints[:, -1], turned)
     joints = frames.joints(windows.joints)
-    known = swapped_sides(windows.sleeves_seen).astype(np.float64)
+    known = swapped_sides(windows.sleeves_seen.astype(np.float64))
     center = swapped_sides_of_frames(frames.points(windows.sleeves[..., :3]))
     direction = swapped_sides_of_frames(frames.directions(windows.sleeves[..., 3:]))
     seen = np.concatenate([windows.seen, windows.seen[:, :, [3, 4, 5, 0, 1, 2]]])
