@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
@@ -30,9 +31,14 @@ class Sequences(Protocol):
         intent: (n,S,2) 0 or 1.
     """
 
-    joint_position: FloatArray
-    sleeve: FloatArray
-    intent: IndexArray
+    @property
+    def joint_position(self) -> npt.NDArray[np.floating]: ...  # noqa: D102
+
+    @property
+    def sleeve(self) -> npt.NDArray[np.floating]: ...  # noqa: D102
+
+    @property
+    def intent(self) -> npt.NDArray[np.integer]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -175,7 +181,7 @@ class WindowSource:
         share = (at - low)[:, :, None, None]
         rows = number[:, None]
 
-        def between(values: FloatArray) -> FloatArray:
+        def between(values: npt.NDArray[np.floating]) -> FloatArray:
             mixed: FloatArray = (1.0 - share) * values[rows, low] + share * values[rows, low + 1]
             return mixed
 
