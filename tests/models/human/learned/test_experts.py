@@ -82,6 +82,11 @@ def test_weights_go_to_the_expert_that_is_better_and_back(first: int, then: int)
     assert weights(memory)[then].min() > 0.9
 
 
+def test_an_expert_that_is_a_little_better_wins_in_time() -> None:
+    memory = following(ExpertMemory(), np.array([0.02, 0.025, 0.025, 0.025]), 150)
+    assert weights(memory)[0].min() > 0.5
+
+
 def test_experts_that_do_equally_well_stay_as_trusted() -> None:
     memory = following(ExpertMemory(), np.full(4, 0.05), 100)
     np.testing.assert_allclose(weights(memory)[:, 0, 0], SETTINGS.trust, rtol=1e-9)

@@ -120,13 +120,17 @@ def test_hand_farther_than_the_arm_reaches_straightens_it() -> None:
     np.testing.assert_allclose(elbow, shoulder + upper * way, atol=1e-4)
 
 
-def test_elbow_of_an_arm_that_was_straight_bends_down() -> None:
-    before = np.array([[[0.0, 0.2, 1.4], [0.3, 0.2, 1.4], [0.6, 0.2, 1.4]] * 2])
-    before[:, 3:, 1] = -0.2
+@pytest.mark.parametrize("rising", [-0.6, 0.0, 0.9])
+def test_elbow_of_an_arm_that_was_straight_bends_down(rising: float) -> None:
+    """Across the arm, which may rise."""
+    along = np.array([np.cos(rising), 0.0, np.sin(rising)])
+    left = np.array([0.0, 0.2, 1.4]) + np.array([0.0, 0.3, 0.6])[:, None] * along
+    before = np.concatenate([left, left * [1.0, -1.0, 1.0]])[None]
     now, seen = before.copy(), np.ones((1, 6), dtype=bool)
-    now[0, 2, 0], seen[0, 1] = 0.4, False
+    now[0, 2], seen[0, 1] = left[0] + 0.4 * along, False
     elbow = filled_pose(now, seen, before)[0, 1]
-    np.testing.assert_allclose(elbow, [0.2, 0.2, 1.4 - np.sqrt(0.05)], atol=1e-9)
+    down = np.array([np.sin(rising), 0.0, -np.cos(rising)])
+    np.testing.assert_allclose(elbow, left[0] + 0.2 * along + np.sqrt(0.05) * down, atol=1e-6)
 
 
 @given(seeds, st.booleans())

@@ -214,16 +214,40 @@ def test_memory_of_the_pose_tells_where_a_joint_hidden_all_along_was() -> None:
     scene = drawn_scene(5, HISTORY + 25)
     joints = scene.joints.copy()
     joints[HISTORY:, [1, 2]] = np.nan
-    found, memory = followed(PREDICTOR, Scene(joints, scene.sleeves), 24)
-    alone = PREDICTOR.forecast(
-        PersonHistory(2.3, joints[23 : 23 + HISTORY], scene.sleeves[23 : 23 + HISTORY]),
-        PREDICTOR.begin(),
-    )[0]
-    true = lengths(scene.joints[0])
-    np.testing.assert_allclose(lengths(found.mean[0]), true, atol=0.01)
-    # without memory the arm has a usual length
-    assert np.abs(lengths(alone.mean[0]) - true)[1:3].max() > 0.01
+    true, memory = lengths(scene.joints[0]), PREDICTOR.begin()
+    for k in range(25):
+        rows = slice(k, k + HISTORY)
+        history = PersonHistory(k * PERIOD, joints[rows], scene.sleeves[rows])
+        found, memory = PREDICTOR.forecast(history, memory)
+        np.testing.assert_allclose(lengths(found.mean[0]), true, atol=0.01)
     assert len(memory.poses) == FUTURE + 1
+    # without memory the arm has a usual length
+    alone, _ = PREDICTOR.forecast(history, PREDICTOR.begin())
+    assert np.abs(lengths(alone.mean[0]) - true)[1:3].max() > 0.01
+
+
+def test_samples_are_about_the_mean_and_off_as_their_latents_say() -> None:
+    """The latent that is set is the height of the hand in the next step."""
+    networks = drawn_networks(0)
+    motion = dict(networks.motion)
+    for name in ("start.mean.weight", "start.spread.weight", "denoise.noise.weight"):
+        motion[name] = 0.0 * motion[name]
+    motion["start.spread.bias"] = np.full(24, -3.0, dtype=np.float32)
+    motion["start.mean.bias"] = np.zeros(24, dtype=np.float32)
+    scene, hands = drawn_scene(2), [2, 5]
+
+    def sampled() -> tuple[np.ndarray, np.ndarray]:
+        predictor = LearnedPredictor(replace(networks, motion=motion))
+        found, _ = predictor.forecast(scene.history(), predictor.begin())
+        return found.samples.mean(axis=0)[:, hands, 2], found.mean[:, hands, 2]
+
+    about, mean = sampled()
+    np.testing.assert_allclose(about, mean, atol=2e-3)
+    for size in (-4.0, 4.0):
+        motion["start.mean.bias"][8] = size
+        about, mean = sampled()
+        assert (np.sign(size) * (about - mean)[1] > 0.01).all()
+        np.testing.assert_allclose(np.delete(about - mean, 1, axis=0), 0.0, atol=2e-3)
 
 
 @given(seeds)
