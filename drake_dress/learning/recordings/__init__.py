@@ -1,4 +1,4 @@
-"""Reads recordings of people: positions of shoulder, elbow and hand over time, from other programs."""
+"""Reads recordings of people: positions of shoulder, elbow and hand over time."""
 
 from drake_dress.learning.recordings.reading import RecordingOptions, read_recording
 
