@@ -9,7 +9,7 @@ import drake_dress
 
 PACKAGE = Path(drake_dress.__file__).parent
 # From below to above: each part imports from itself and from parts before it.
-LAYERS = ("models", "solvers", "report", "systems", "diagrams", "discrepancy", "gym")
+LAYERS = ("models", "solvers", "report", "systems", "diagrams", "discrepancy", "learning", "gym")
 
 
 def imported(path: Path) -> set[str]:
