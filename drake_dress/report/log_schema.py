@@ -37,7 +37,7 @@ STAGE_NAMES = ("prepare", "dress", "done")
 # How far ahead of a sample the logged forecast of the person is, s.
 FORECAST_AHEAD = 1.0
 INTENT_NAMES = (
-    "passive: the arm rests or follows the garment",
+    "passive: the arm rests, is held, or follows the garment",
     "active: it moves by the person's own will: it reaches, withdraws, returns, waves, "
     "or the body turns",
 )

@@ -31,11 +31,11 @@ from drake_dress.models.human.learned.network import FUTURE, HISTORY
 
 RESIDUAL = Schedule(steps=30000, rate=2e-3, every=1000, patience=8)
 DENOISER = Schedule(steps=6000, rate=2e-3, every=500, patience=6)
-INITIALISER = Schedule(steps=5000, rate=1e-3, every=500, patience=6)
+INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
 COVERED = 0.9
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
-_BATCH, _SMALLER_BATCH, _CHUNK = 256, 128, 1500
+_BATCH, _SMALLER_BATCH, _CHUNK = 256, 64, 1500
 _LINEAR_BATCHES, _LINEAR_BATCH = 60, 1024
 # Windows of which contexts are kept for the diffusion.
 _CONTEXT_BATCHES = 240
