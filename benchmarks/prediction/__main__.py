@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from drake_dress.learning.motion.dataset import MotionData, read_dressings, read_motion
 
 from benchmarks.cloth.table import Table
 from benchmarks.figures import Figure, at_least, at_most, write_figures
@@ -35,14 +34,17 @@ from drake_dress.learning.evaluation.held_out import (
     intent_score,
 )
 from drake_dress.learning.evaluation.stream import followed
+from drake_dress.learning.motion.dataset import MotionData, read_dressings, read_motion
+from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
 from drake_dress.learning.motion.sequence import Kind
+from drake_dress.learning.motion.windows import Sequences
 from drake_dress.learning.recordings import RecordingOptions, read_recording
 from drake_dress.learning.recordings.reading import UPS
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.models.human.learned.forecast import PersonHistory
 from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
 from drake_dress.models.human.learned.ridge import RidgePredictor
-from drake_dress.models.human.learned.weights import SHIPPED, networks
+from drake_dress.models.human.learned.weights import networks
 
 _NAME = "prediction"
 SECTIONS = ("held_out", "intent", "hidden", "dressings", "recordings", "speed")
@@ -241,7 +243,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--up", choices=UPS, help="axis of the recordings that points up")
     parser.add_argument("--unit", type=number_between(1e-6, 10.0), metavar="M", help="in metres")
     parser.add_argument(
-        "--weights", type=Path, default=SHIPPED, metavar="DIR", help="default: the shipped ones"
+        "--weights",
+        type=Path,
+        default=Path("out/train"),
+        metavar="DIR",
+        help="of drake-dress train; default: %(default)s",
     )
     parser.add_argument(
         "--only", type=some_of(SECTIONS), metavar="NAME,…", help=", ".join(SECTIONS)
@@ -251,12 +257,13 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _motions(data: MotionData, name: str = "sequence") -> list[TimedMotion]:
-    time_ = 0.05 * np.arange(data.joint_position.shape[1])
+def _motions(data: Sequences, name: str = "sequence") -> list[TimedMotion]:
+    """Returns sequences of a sample each `SAMPLED` s as motions over time."""
+    stamps = SAMPLED * np.arange(data.joint_position.shape[1], dtype=np.float64)
     return [
         TimedMotion(
             f"{name} {k}",
-            time_,
+            stamps,
             data.joint_position[k].astype(np.float64),
             data.sleeve[k].astype(np.float64),
             data.intent[k].astype(np.int64),

@@ -8,9 +8,10 @@ sleeves missing, or only since a moment ago.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
@@ -30,9 +31,14 @@ class Sequences(Protocol):
         intent: (n,S,2) 0 or 1.
     """
 
-    joint_position: FloatArray
-    sleeve: FloatArray
-    intent: IndexArray
+    @property
+    def joint_position(self) -> npt.NDArray[np.floating[Any]]: ...  # noqa: D102
+
+    @property
+    def sleeve(self) -> npt.NDArray[np.floating[Any]]: ...  # noqa: D102
+
+    @property
+    def intent(self) -> npt.NDArray[np.integer[Any]]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -175,7 +181,7 @@ class WindowSource:
         share = (at - low)[:, :, None, None]
         rows = number[:, None]
 
-        def between(values: FloatArray) -> FloatArray:
+        def between(values: npt.NDArray[np.floating[Any]]) -> FloatArray:
             mixed: FloatArray = (1.0 - share) * values[rows, low] + share * values[rows, low + 1]
             return mixed
 

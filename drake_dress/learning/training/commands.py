@@ -19,7 +19,7 @@ from drake_dress.errors import UserError
 from drake_dress.file_output import claimed, write_text
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.learning.evaluation.held_out import compared, held_out_batches, intent_score
-from drake_dress.learning.motion.dataset import MotionData, read_motion
+from drake_dress.learning.motion.dataset import MotionData, Part, read_motion
 from drake_dress.learning.motion.sequence import Kind
 from drake_dress.learning.training.intent import IntentTraining
 from drake_dress.learning.training.loop import Report, Schedule
@@ -130,7 +130,7 @@ def _motion(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
     return weights, motion_figures(test, Networks(intent, weights), options.with_sleeves)
 
 
-_PARTS = ("training", "validation", "test")
+_PARTS: tuple[Part, ...] = ("training", "validation", "test")
 _STAGES = ("residual", "denoiser", "initialiser")
 
 
