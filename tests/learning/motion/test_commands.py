@@ -82,7 +82,7 @@ def test_a_resumed_run_gives_the_files_of_an_uninterrupted_one(
     assert content(tmp_path) == content(whole)
     assert (tmp_path / "motion-free-00000.h5").stat().st_mtime_ns == kept
     told = capsys.readouterr()
-    assert "2 files are there, 2 are missing" in told.out
+    assert "files: 2 kept, 2 missing" in told.out
     assert "motion-active-00000.h5: 1 of 4 sequences" in told.err
 
 
@@ -154,7 +154,7 @@ def test_what_is_done_before_a_signal_is_kept(
     assert write_motion_set(out, WANTED, HERE) == 130
     told = capsys.readouterr().out
     assert "interrupted" in told
-    assert "the same command goes on" in told
+    assert "the same command makes them" in told
     done = content(out)
     assert 0 < len(done) < 4
     assert CARD not in done

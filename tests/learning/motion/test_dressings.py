@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from drake_dress.learning.motion.dressings import (
     sequence_of,
 )
 from drake_dress.learning.motion.making import Workplace
+from drake_dress.learning.motion.motion_file import MotionFile
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.report.log import RunLog
 from tests.report.synthetic import coat, dressing, write
@@ -130,6 +132,7 @@ def fake(monkeypatch: pytest.MonkeyPatch, status: int, errors: str = "") -> list
         commands.append(command)
         out = Path(command[command.index("--out") + 1])
         if status in (0, 1):
+            out.mkdir(exist_ok=True)
             write_run(out / "run.h5")
             summary = {"success": status == 0, "reason": "it slipped" if status else None}
             (out / "summary.json").write_text(json.dumps(summary))
@@ -169,6 +172,26 @@ def test_each_dressing_is_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
     done = dict(run_all(wanted, 0, Workplace(2), Interrupt()))
     assert set(done) == set(wanted)
     assert len(commands) == 5
+
+
+def test_a_cluster_runs_each_dressing_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    commands = fake(monkeypatch, 0)
+
+    def cluster(
+        address: str,
+        run: Callable[[Dressing, Path], MotionFile],
+        cases: Sequence[Dressing],
+        stop: Interrupt,
+        command: str,
+    ) -> Iterator[tuple[Dressing, MotionFile]]:
+        for case in cases:
+            yield case, run(case, tmp_path / case.name)
+
+    monkeypatch.setattr(dressings, "completed_on", cluster)
+    wanted = drawn_dressings(2, 0)
+    done = dict(run_all(wanted, 0, Workplace(2, "auto"), Interrupt()))
+    assert [done[w].origin.first for w in wanted] == [0, 1]
+    assert len(commands) == 2
 
 
 def test_a_signal_ends_runs_that_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from drake_dress.interrupt import Interrupt
 from drake_dress.learning.motion import making
 from drake_dress.learning.motion.making import Block, Workplace, made, make_block
+from drake_dress.learning.motion.motion_file import MotionArrays
 
 BLOCKS = [Block("free", 1, 0, 6), Block("free", 1, 6, 2)]
 
@@ -33,6 +37,28 @@ def test_sequences_are_counted_as_they_are_made() -> None:
     counted: list[int] = []
     list(made(BLOCKS, Workplace(1), Interrupt(), counted.append))
     assert sorted(counted) == [1, 2, 5]
+
+
+def test_a_cluster_makes_the_same_sequences(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def cluster(
+        address: str,
+        run: Callable[[Block, Path], MotionArrays],
+        cases: Sequence[Block],
+        stop: Interrupt,
+        command: str,
+    ) -> Iterator[tuple[Block, MotionArrays]]:
+        asked.append(f"{command} {address}")
+        # nodes are done in any order
+        for case in reversed(cases):
+            yield case, run(case, Path())
+
+    monkeypatch.setattr(making, "completed_on", cluster)
+    there = dict(made(BLOCKS, Workplace(1, "auto"), Interrupt()))
+    assert asked == ["dataset auto"]
+    for block, arrays in made(BLOCKS, Workplace(1), Interrupt()):
+        np.testing.assert_array_equal(there[block].joint_position, arrays.joint_position)
 
 
 def test_after_a_signal_no_more_work_begins(monkeypatch: pytest.MonkeyPatch) -> None:
