@@ -38,7 +38,7 @@ def read_weights(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> Arrays:
     try:
         with safe_open(path, framework="numpy") as file:
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError, ValueError, TypeError) as error:
+    except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
         raise UserError(str(path), "", f"cannot be read as safetensors, {expected}") from error
     for name, shape in shapes.items():
         if name not in arrays:
