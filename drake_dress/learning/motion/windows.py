@@ -8,7 +8,7 @@ sleeves missing, or only since a moment ago.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -32,13 +32,13 @@ class Sequences(Protocol):
     """
 
     @property
-    def joint_position(self) -> npt.NDArray[np.floating[Any]]: ...  # noqa: D102
+    def joint_position(self) -> npt.NDArray[np.floating]: ...  # noqa: D102
 
     @property
-    def sleeve(self) -> npt.NDArray[np.floating[Any]]: ...  # noqa: D102
+    def sleeve(self) -> npt.NDArray[np.floating]: ...  # noqa: D102
 
     @property
-    def intent(self) -> npt.NDArray[np.integer[Any]]: ...  # noqa: D102
+    def intent(self) -> npt.NDArray[np.integer]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class WindowSource:
         share = (at - low)[:, :, None, None]
         rows = number[:, None]
 
-        def between(values: npt.NDArray[np.floating[Any]]) -> FloatArray:
+        def between(values: npt.NDArray[np.floating]) -> FloatArray:
             mixed: FloatArray = (1.0 - share) * values[rows, low] + share * values[rows, low + 1]
             return mixed
 

@@ -16,6 +16,8 @@ from drake_dress.errors import UserError
 from drake_dress.file_output import replacing
 
 _MOMENTS = ("exp_avg", "exp_avg_sq")
+# What reading raises for files of other contents, and for kinds of numbers that NumPy has not.
+_DAMAGE = (SafetensorError, OSError, KeyError, ValueError, TypeError, AttributeError)
 
 
 @dataclass
@@ -98,17 +100,23 @@ class Checkpoint:
             arrays = load_file(path)
             told = _metadata(path)
             step, error, misses = int(told["step"]), float(told["error"]), int(told["misses"])
-        except (SafetensorError, OSError, KeyError, ValueError) as problem:
+        except _DAMAGE as problem:
             raise UserError(str(path), "", f"cannot be read, {expected}") from problem
         parts: dict[str, dict[str, np.ndarray]] = {"weights": {}, "best": {}, "moments": {}}
         for name, array in arrays.items():
             part, _, rest = name.partition("/")
             parts.get(part, {})[rest] = array
-        for part in ("weights", "best"):
-            shapes = {k: v.shape for k, v in parts[part].items()}
-            if shapes != {k: v.shape for k, v in like.items()}:
+        moments = {f"{m}/{k}": v for k, v in like.items() for m in _MOMENTS} if step else {}
+        for part, wanted in (("weights", like), ("best", like), ("moments", moments)):
+            if _kinds(parts[part]) != _kinds(wanted):
                 raise UserError(str(path), part, f"is of another network, {expected}")
+            # the order of the weights is that in which their gradients are added up
+            parts[part] = {name: parts[part][name] for name in wanted}
         return cls(step, parts["weights"], parts["moments"], parts["best"], error, misses)
+
+
+def _kinds(arrays: Mapping[str, np.ndarray]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+    return {name: (array.shape, array.dtype) for name, array in arrays.items()}
 
 
 def _metadata(path: Path) -> dict[str, str]:

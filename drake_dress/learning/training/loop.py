@@ -55,7 +55,7 @@ class Schedule:
         """Returns the learning rate of a step."""
         warm = max(1.0, self.warm_up * self.steps)
         if step < warm:
-            return self.rate * (step + 1) / warm
+            return self.rate * min(1.0, (step + 1) / warm)
         along = (step - warm) / max(1.0, self.steps - warm)
         return 0.5 * self.rate * (1.0 + math.cos(math.pi * min(1.0, along)))
 
