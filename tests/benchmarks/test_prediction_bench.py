@@ -20,7 +20,7 @@ from drake_dress.models.human.learned.predictor import LearnedPredictor
 from drake_dress.models.human.learned.ridge import RidgePredictor
 from drake_dress.models.human.learned.weights import networks
 
-TIME = 0.05 * np.arange(160)
+TIME = 0.05 * np.arange(160, dtype=np.float64)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def motion(speed: float = 0.1) -> TimedMotion:
 
 
 def test_delay_of_a_switch_is_the_time_until_it_is_told() -> None:
-    times = 0.1 * np.arange(60)
+    times = 0.1 * np.arange(60, dtype=np.float64)
     truth = ((times >= 2.0) & (times < 4.0)).astype(int)
     for late in (0.0, 0.3, 1.0):
         told = np.where((times >= 2.0 + late - 1e-9) & (times < 4.0), 0.9, 0.1)

@@ -14,7 +14,7 @@ from drake_dress.learning.recordings.reading import UPS, turned_up
 from drake_dress.models.arrays import FloatArray
 
 COUNT = 30
-TIME = 0.05 * np.arange(COUNT)
+TIME = 0.05 * np.arange(COUNT, dtype=np.float64)
 
 
 def hanging() -> FloatArray:
@@ -28,8 +28,10 @@ def hanging() -> FloatArray:
 
 
 def write_npz(path: Path, joints: FloatArray, time: FloatArray | None = TIME) -> None:
-    arrays = {"joint_position": joints} | ({} if time is None else {"time": time})
-    np.savez(path, **arrays)
+    if time is None:
+        np.savez(path, joint_position=joints)
+    else:
+        np.savez(path, joint_position=joints, time=time)
 
 
 @given(st.sampled_from(UPS))
