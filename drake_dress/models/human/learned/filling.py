@@ -143,6 +143,7 @@ def _first_poses(joints: FloatArray, seen: BoolArray, known: FloatArray | None) 
     if known is not None:
         told = np.all(np.isfinite(known), axis=2)
         result[told], ever = known[told], ever | told
+    result[~ever] = np.nan
     _place_unseen_shoulders(result, ever)
     front = facing(result)
     left = np.stack([-front[:, 1], front[:, 0]], axis=1)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drake_dress.models.human.learned.diffusion import SAMPLES
+from drake_dress.models.human.learned.experts import ExpertSettings
 from drake_dress.models.human.learned.forecast import Forecast, PersonHistory
 from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.predictor import (
@@ -84,20 +85,32 @@ def test_limbs_are_as_long_as_the_persons(seed: int) -> None:
     np.testing.assert_allclose(lengths(found.mean), expected, atol=1e-9)
 
 
-@given(seeds, st.floats(-3.0, 3.0), st.floats(0.6, 1.0))
-@settings(max_examples=20)
-def test_moved_and_turned_scene_has_the_moved_and_turned_forecast(
-    seed: int, yaw: float, share: float
-) -> None:
-    scene = partly_seen(seed, share, HISTORY + 2)
-    shift = np.random.default_rng(seed).normal(size=3)
-    found, _ = followed(PREDICTOR, scene)
-    moved, _ = followed(PREDICTOR, scene.moved(yaw, shift))
+def check_turned(predictor: LearnedPredictor, scene: Scene, yaw: float, count: int) -> None:
+    """Checks that a turned and shifted scene has the turned and shifted forecast."""
+    shift = np.array([1.3, -0.4, 0.2])
+    found, _ = followed(predictor, scene, count)
+    moved, _ = followed(predictor, scene.moved(yaw, shift), count)
     turn = about_vertical(yaw).T
     np.testing.assert_allclose(moved.mean, found.mean @ turn + shift, atol=1e-3)
     np.testing.assert_allclose(moved.samples, found.samples @ turn + shift, atol=2e-3)
     np.testing.assert_allclose(moved.radius, found.radius, rtol=1e-3)
     np.testing.assert_allclose(moved.intent, found.intent, atol=1e-4)
+
+
+@given(seeds, st.integers(0, 3), st.floats(0.6, 1.0))
+@settings(max_examples=20)
+def test_moved_and_turned_scene_has_the_moved_and_turned_forecast(
+    seed: int, quarters: int, share: float
+) -> None:
+    """By quarter turns: the damped velocity is a median of each coordinate."""
+    check_turned(PREDICTOR, partly_seen(seed, share, HISTORY + 2), 0.5 * np.pi * quarters, 3)
+
+
+@given(seeds, st.floats(-3.0, 3.0), st.floats(0.6, 1.0))
+@settings(max_examples=20)
+def test_what_is_learned_is_turned_by_any_angle(seed: int, yaw: float, share: float) -> None:
+    learned = replace(PREDICTOR, experts=ExpertSettings(trust=(0.1, 0.0, 0.4, 0.5)))
+    check_turned(learned, partly_seen(seed, share), yaw, 1)
 
 
 @given(seeds, st.floats(0.6, 1.0))
