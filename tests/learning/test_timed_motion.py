@@ -88,13 +88,17 @@ def test_joint_is_known_as_long_as_it_is_seen() -> None:
     joints[: len(joints) // 2, 4] = np.nan
     joints[:, 5] = np.nan
     joints[3, 5] = 0.0  # once is not enough
+    joints[:, 3] = np.nan
+    joints[[0, -1], 3] = motion.joints[[0, -1], 3]
     since = motion.time[len(joints) // 2]
     other = TimedMotion("some", motion.time, joints, motion.sleeves)
-    found = other.joints_at(np.array([since - 0.02, since + 0.02]))
+    at = np.array([since - 0.02, since + 0.02])
+    found = other.joints_at(at)
     assert np.isnan(found[0, 4]).all()
     assert np.isfinite(found[1, 4]).all()
     assert np.isnan(found[:, 5]).all()
     assert np.isfinite(found[:, :4]).all()
+    np.testing.assert_allclose(found[:, 3], motion.joints_at(at)[:, 3], atol=1e-9)
 
 
 def test_intent_is_that_of_the_time_if_anyone_knows() -> None:

@@ -94,6 +94,14 @@ def test_best_sample_is_the_nearest_on_average() -> None:
         assert not found.moves.any()
 
 
+def test_best_samples_are_of_each_arm_on_its_own() -> None:
+    motion = carried(velocity=0.0)
+    motion.joints[:, 3, 2] += 0.1 * motion.time
+    for found in compared(motion):
+        assert found.best[0] == pytest.approx(0.01 * np.sqrt(3.0))
+        assert found.best[1] > 0.03
+
+
 def test_arms_move_that_go_far_enough_before_or_after() -> None:
     # within two seconds before and two after
     for speed, moves in ((0.9 * MOVES / 2.0, False), (1.1 * MOVES / 1.0, True)):

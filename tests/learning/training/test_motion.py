@@ -177,6 +177,23 @@ def test_samples_of_the_trained_diffusion_spread() -> None:
     assert latent.std(axis=1).min() > 0.01
 
 
+def test_diffusion_learns_what_the_mean_leaves_in_units_of_the_scale() -> None:
+    some = training()
+    contexts = some._contexts(trained(), made("free", 4), 1, "contexts")
+    batch = some._source(made("free", 4), (some.seed, 3, 0)).drawn(16)
+    z, mean, scale = predicted(trained(), INTENT, batch)
+    np.testing.assert_array_equal(contexts.z, z)
+    again = mean[:, 1:] + contexts.motion * scale[:, 1:, :, None]
+    np.testing.assert_allclose(again, batch.displacement[:, 1:], atol=1e-5)
+    assert contexts.motion.dtype == np.float32
+
+
+def test_training_sees_persons_as_cameras_do_and_validation_all_of_them() -> None:
+    batch = training()._source(made("free", 4), (1, 2)).drawn(64)
+    assert 0.05 < (~batch.seen).mean() < 0.5
+    assert all(b.seen.all() for b in validation_windows(made("free", 2)))
+
+
 def test_without_sleeves_none_is_seen() -> None:
     for batch in validation_windows(made("active", 1), with_sleeves=False):
         assert not batch.arms.tokens[:, :, SLEEVE_COLUMNS].any()

@@ -106,15 +106,18 @@ def test_each_arm_and_each_range_of_horizons_has_weights_of_its_own() -> None:
     assert GROUPS[1] == 10
 
 
-def test_what_is_not_seen_is_not_compared() -> None:
+@pytest.mark.parametrize("seen", [0, 1])
+def test_what_is_not_seen_is_not_compared(seen: int) -> None:
     off = np.array([0.1, 0.1, 0.02, 0.1])
     hidden = np.zeros((6, 3))
-    hidden[3:] = np.nan
+    of_seen, of_other = slice(3 * seen, 3 * seen + 3), slice(3 - 3 * seen, 6 - 3 * seen)
+    hidden[of_other] = np.nan
     memory = following(ExpertMemory(), off, 60, joints=hidden)
     found = weights(memory)
-    assert found[2, :, :3].min() > 0.9
-    np.testing.assert_allclose(found[:, :, 3:], weights(ExpertMemory())[:, :, 3:])
-    assert memory.size[1] == 1.0
+    assert found[2, :, of_seen].min() > 0.9
+    np.testing.assert_allclose(found[:, :, of_other], weights(ExpertMemory())[:, :, of_other])
+    assert memory.size[1 - seen] == 1.0
+    assert memory.size[seen] < 1.0
     blind = following(ExpertMemory(), off, 60, joints=np.full((6, 3), np.nan))
     assert (blind.loss == 0.0).all()
 

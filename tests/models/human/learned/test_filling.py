@@ -201,6 +201,24 @@ def test_only_one_arm_seen_tells_where_the_other_shoulder_is() -> None:
         np.testing.assert_allclose(result[0, :, other], np.tile(bent[other], (2, 1)), atol=1e-9)
 
 
+@pytest.mark.parametrize(("joint", "height"), [(1, 0.28), (2, 0.54)])
+@pytest.mark.parametrize("right", [False, True])
+def test_shoulder_of_an_arm_of_which_little_is_seen_is_above_it(
+    joint: int, height: float, right: bool
+) -> None:
+    """The other is as far beside it as usual. A person of whom no more is known faces x."""
+    place = np.array([0.3, -0.2, 1.0])
+    joints = np.full((1, 2, 6, 3), np.nan)
+    arm = 3 if right else 0
+    joints[:, :, arm + joint] = place
+    result, _ = filled(joints)
+    np.testing.assert_allclose(result[0, :, arm], np.tile(place + [0.0, 0.0, height], (2, 1)))
+    across = result[0, :, 0] - result[0, :, 3]
+    assert np.linalg.norm(across, axis=1) == pytest.approx(0.36)
+    if joint == 1:
+        np.testing.assert_allclose(across, np.tile([0.0, 0.36, 0.0], (2, 1)), atol=1e-12)
+
+
 @given(seeds)
 def test_least_rotation_takes_start_to_end_and_keeps_lengths_and_angles(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -52,6 +52,15 @@ def test_numpy_and_torch_agree(name: str, seed: int) -> None:
     np.testing.assert_allclose(found, other.numpy(), rtol=1e-4, atol=1e-5)
 
 
+@given(seeds)
+@settings(max_examples=10)
+def test_dense_layer_is_a_product_and_a_shift(seed: int) -> None:
+    weights, x, _ = drawn(seed)
+    w, b = weights["some.wide.weight"], weights["some.wide.bias"]
+    expected = np.einsum("bti,io->bto", x, w) + b
+    np.testing.assert_allclose(LAYERS["dense"](weights, x, None), expected, rtol=1e-4, atol=1e-5)
+
+
 @pytest.mark.parametrize("x", [-1e4, -100.0, -1.0, 0.0, 2.0, 100.0, 1e4])
 def test_activations_are_what_they_are_called_and_do_not_overflow(x: float) -> None:
     single = np.array([x], dtype=np.float32)

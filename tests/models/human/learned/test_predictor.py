@@ -141,6 +141,25 @@ def test_hidden_joints_are_where_the_person_can_have_them(
     assert np.linalg.norm(found.mean[0] - scene.joints[-1], axis=1).max() < 0.5
 
 
+@pytest.mark.parametrize(("limit", "moves"), [(1e3, True), (1e-6, False)])
+def test_hidden_joints_follow_the_network_if_the_input_is_familiar(
+    limit: float, moves: bool
+) -> None:
+    """Other experts cannot be compared with what they will do; here, all trust is in rest."""
+    networks = drawn_networks(0, limit)
+    motion = dict(networks.motion)
+    motion["displacement.bias"] = motion["displacement.bias"] + np.float32(0.1)
+    trust = ExpertSettings(trust=(1.0, 0.0, 0.0, 0.0))
+    predictor = LearnedPredictor(replace(networks, motion=motion), trust)
+    scene = drawn_scene(9)
+    joints = scene.joints.copy()
+    joints[-3:, [1, 2]] = np.nan
+    found, _ = predictor.forecast(Scene(joints, scene.sleeves).history(), predictor.begin())
+    way = np.linalg.norm(found.mean[-1] - found.mean[0], axis=1)
+    assert way[[0, 3, 4, 5]].max() < 1e-6
+    assert (way[[1, 2]].min() > 0.02) == moves
+
+
 @given(seeds)
 @settings(max_examples=10)
 def test_unfamiliar_input_is_left_to_the_linear_predictor(seed: int) -> None:

@@ -110,6 +110,45 @@ def test_columns_of_visibility_tell_which_joints_are_seen(seed: int) -> None:
     np.testing.assert_array_equal(some[1][:, columns], seen[:, [3, 4, 5, 2]])
 
 
+def test_frames_are_those_of_now() -> None:
+    found = tokens_of(drawn_scene(7)).tokens
+    np.testing.assert_allclose(found[:, -1, :3], 0.0, atol=1e-6)
+    assert np.abs(found[:, 0, :3]).max(axis=1).min() > 0.01
+    # the other shoulder is to the right
+    np.testing.assert_allclose(found[:, -1, 9], 0.0, atol=1e-6)
+    assert (found[:, -1, 10] < -0.4).all()
+
+
+def test_columns_have_their_scales() -> None:
+    """Lengths of vectors do not depend on the frame."""
+    scene = drawn_scene(8)
+    found = np.linalg.norm(
+        tokens_of(scene).tokens[:, :, :36].reshape(2, 20, 12, 3), axis=3
+    )  # no columns of visibility
+    sleeve = np.linalg.norm(tokens_of(scene).tokens[:, :, 37:40], axis=2)
+    for side, own in enumerate((0, 3)):
+        shoulder, elbow, hand = np.moveaxis(scene.joints[:, own : own + 3], 1, 0)
+        other_hand = scene.joints[:, 5 - own]
+        center = scene.sleeves[:, side, :3]
+        vectors = {
+            1: 3.0 * (elbow - shoulder),
+            2: 3.0 * (hand - elbow),
+            3: 1.5 * (scene.joints[:, 3 - own] - shoulder),
+            4: 1.5 * (other_hand - shoulder),
+        }
+        for column, vector in vectors.items():
+            np.testing.assert_allclose(
+                found[side, :, column], np.linalg.norm(vector, axis=1), rtol=1e-4, atol=1e-5
+            )
+        for column, point, scale in ((6, elbow, 2.0), (7, hand, 2.0), (8, other_hand, 1.0)):
+            speed = np.linalg.norm(np.diff(point, axis=0), axis=1) / PERIOD
+            np.testing.assert_allclose(found[side, 1:, column], scale * speed, rtol=1e-3, atol=1e-5)
+        away = np.linalg.norm(hand - hand[-1], axis=1)
+        np.testing.assert_allclose(found[side, :, 9], 3.0 * away, rtol=1e-3, atol=1e-5)
+        near = 3.0 * np.linalg.norm(center - hand, axis=1)
+        np.testing.assert_allclose(sleeve[side], near, rtol=1e-3, atol=1e-5)
+
+
 def test_person_at_rest_differs_from_one_who_moves_in_the_columns_of_motion_alone() -> None:
     scene = drawn_scene(3)
     rest = Scene(np.tile(scene.joints[-1], (20, 1, 1)), np.tile(scene.sleeves[-1], (20, 1, 1)))
