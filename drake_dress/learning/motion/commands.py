@@ -107,20 +107,20 @@ def write_motion_set(out: Path, wanted: Wanted, place: Workplace) -> int:
         blocks = {n: b for n, b in wanted.blocks().items() if n not in kept}
         runs = [d for d in drawn_dressings(wanted.dressings, wanted.seed) if d.name not in kept]
         if kept:
-            print(f"{len(kept)} files are there, {len(blocks) + len(runs)} are missing", flush=True)
+            print(f"files: {len(kept)} kept, {len(blocks) + len(runs)} missing", flush=True)
         if blocks or runs:
             remove_results(out, (INDEX, CARD))
         lost = _make_sequences(out, blocks, place, stop) + _run_dressings(
             out, runs, wanted.seed, place, stop
         )
         if lost:
-            print(f"{stop.word}: {lost} files are missing; the same command goes on", flush=True)
+            print(f"{stop.word}: missing files: {lost}; the same command makes them", flush=True)
             return stop.status
         known = wanted.known()
         write_text(out / CARD, _card(out, known, wanted.command))
         known.write(out)
-    total = sum(wanted.counts.values())
-    print(f"{total} sequences and {wanted.dressings} dressings, described in {out / CARD}")
+    print(f"sequences: {sum(wanted.counts.values())}, dressings: {wanted.dressings}")
+    print(f"description: {out / CARD}")
     return 0
 
 
