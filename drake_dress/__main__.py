@@ -50,6 +50,7 @@ BENCHMARKS = {
     "killed": "files left by runs that are killed, terminated or out of disk space",
     "local": "constrained DDP compared with the exact optimum",
     "delay": "solve time of the global controller on this machine",
+    "prediction": "prediction of a person's arms and intent, beside simple predictors",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
     "repeat": "whether the same seed gives the same log bit for bit under any load",
     "mutation": "share of mutants of central modules that the tests detect",
@@ -62,6 +63,8 @@ _EXAMPLES = """examples:
   drake-dress run my_scenario.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress dataset measured --hide random --seed 1 --out out/lab
   drake-dress dataset motion --out out/motion --dressings 8
+  drake-dress dataset motion --out out/motion
+  drake-dress train intent --data out/motion --out out/train
   drake-dress explain out/lab/measured.h5 --scenario measured
   drake-dress explain out/lab/measured.h5 --scenario measured --plugin my_effects.py
   drake-dress sim-station lab
@@ -155,6 +158,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_replay(verbs)
     _add_explain(verbs)
     _add_dataset(verbs)
+    _add_train(verbs)
     shipped = verbs.add_parser(
         "scenarios", help="list the built-in scenarios, which all commands accept by name"
     )
@@ -328,7 +332,7 @@ def _add_dataset_motion(kinds: _Verbs) -> None:
     motion = kinds.add_parser(
         "motion",
         help="sequences of persons in moving garments, to learn motion and intent from",
-        description="Makes sequences of 10 s of persons in moving garments, and their description, "
+        description="Makes sequences of 20 s of persons in moving garments, and their description, "
         "card.md. Files of the set that are there are kept, so the same command goes on after an "
         "interruption. The result depends only on the seed and the numbers of sequences.",
     )
@@ -364,6 +368,30 @@ def _add_dataset_motion(kinds: _Verbs) -> None:
         help="run on a Ray cluster: auto, its address, or local to start one here",
     )
     motion.set_defaults(command=_dataset_motion)
+
+
+def _add_train(verbs: _Verbs) -> None:
+    train = verbs.add_parser(
+        "train",
+        help="train the networks that predict a person",
+        description="Trains on a set of drake-dress dataset motion and writes weights and figures. "
+        "`motion` needs the weights of `intent` in the same folder. The same command goes on after "
+        "an interruption, with the same result. Uses a CUDA device if there is one.",
+    )
+    train.add_argument("network", choices=("intent", "motion"))
+    train.add_argument("--data", metavar="DIR", default="out/motion", help="default: %(default)s")
+    train.add_argument("--out", metavar="DIR", default="out/train", help="default: %(default)s")
+    train.add_argument("--seed", type=_seed, default=0, metavar="N")
+    train.add_argument(
+        "--steps", type=_count, metavar="N", help="at most so many steps of each part; for a try"
+    )
+    train.add_argument(
+        "--sleeves",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="whether the networks see the sleeves",
+    )
+    train.set_defaults(command=_train)
 
 
 def _add_plugin(verb: argparse.ArgumentParser) -> None:
@@ -492,10 +520,22 @@ def _dataset_motion(options: argparse.Namespace) -> int:
     return write_motion_set(out, wanted, place)
 
 
+def _train(options: argparse.Namespace) -> int:
+    from drake_dress.learning.training.commands import FIGURES, TrainOptions, train_command
+    from drake_dress.models.human.learned.weights import INTENT, MOTION
+
+    results = (FIGURES, INTENT if options.network == "intent" else MOTION)
+    out = _directory(options.out, Path(), results, [])
+    return train_command(
+        options.network,
+        TrainOptions(Path(options.data), out, options.seed, options.steps, options.sleeves),
+    )
+
+
 def _bench(words: list[str]) -> int:
     name, arguments = next(iter(BENCHMARKS)), list(words)
     if arguments[:1] in (["-h"], ["--help"]):
-        told = "".join(f"  {each:<10}{text}\n" for each, text in BENCHMARKS.items())
+        told = "".join(f"  {each:<11}{text}\n" for each, text in BENCHMARKS.items())
         print("usage: drake-dress bench [NAME] [OPTION …]\n\nnames:\n" + told)
         print(f"{name} where none is given; the options of each: drake-dress bench NAME --help")
         print("each takes --plugin FILE.py|MODULE, too")

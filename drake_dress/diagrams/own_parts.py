@@ -10,6 +10,7 @@ from pydrake.systems.framework import LeafSystem
 
 from drake_dress.diagrams.planning import OBSERVATIONS
 from drake_dress.models.control.costs import GarmentCost
+from drake_dress.models.human.learned.forecast import PersonPredictor
 from drake_dress.models.human.prediction import MotionPredictor
 
 # Ports of a user's controller: inputs that it may have, and outputs that it must have, with sizes.
@@ -33,7 +34,7 @@ class OwnParts:
             safety governor between it and the grippers stops on old requests.
     """
 
-    predictor: MotionPredictor | None = None
+    predictor: MotionPredictor | PersonPredictor | None = None
     costs: tuple[GarmentCost, ...] = ()
     controller: Callable[[], LeafSystem] | None = None
 

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydrake.systems.framework import DiagramBuilder, InputPort
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
+from drake_dress.diagrams.prediction import Prediction, Predictor
 from drake_dress.diagrams.station import MOTION
 from drake_dress.models.control.local_control import LocalController
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
-from drake_dress.models.human.prediction import MotionPredictor, StillPredictor
+from drake_dress.models.human.prediction import StillPredictor
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.global_mpc import GlobalMpc
-from drake_dress.systems.human_predictor import HumanPredictor
 from drake_dress.systems.local_controller import LocalCompensation
 from drake_dress.systems.plan_follower import PlanFollower
 
@@ -100,7 +100,7 @@ class ControlSetup:
     policy: DressingPolicy
     rates: Rates
     limits: SafetyLimits
-    predictor: MotionPredictor = field(default_factory=StillPredictor)
+    predictor: Predictor = field(default_factory=StillPredictor)
     local: LocalSetup | None = None
     in_worker: bool = False
     own: Any = None
@@ -113,10 +113,12 @@ class Planning:
     Attributes:
         mpc: the global controller.
         requests: the system with outputs `{left,right}_velocity_request` and `request_time`.
+        forecast: port of the forecasts of the person; None where the predictor makes none.
     """
 
     mpc: GlobalMpc
     requests: Any
+    forecast: OutputPort | None = None
 
 
 def add_planning(
@@ -131,9 +133,10 @@ def add_planning(
         waits: whether simulated time stands still while the global controller solves.
     """
     rates, p = control.rates, control.policy.parameters
-    predicted = builder.AddNamedSystem(
-        "human_predictor", HumanPredictor(control.predictor, p.time_step, p.horizon)
+    person = Prediction(
+        builder, feed, control.predictor, control.policy.mesh, control.policy.person.shoulders
     )
+    predicted = person.view("human_predictor", p.time_step, p.horizon)
     mpc = builder.AddNamedSystem(
         "global_mpc",
         GlobalMpc(
@@ -144,34 +147,36 @@ def add_planning(
             in_worker=control.in_worker,
         ),
     )
-    feed("estimate.joint_position", predicted.get_input_port())
     for quantity in MOTION:
         feed(f"estimate.garment_{quantity}", mpc.GetInputPort(f"garment_{quantity}"))
-    builder.Connect(predicted.get_output_port(), mpc.GetInputPort("predicted_joint_position"))
+    builder.Connect(predicted.joints, mpc.GetInputPort("predicted_joint_position"))
+    if predicted.radius is not None:
+        builder.Connect(predicted.radius, mpc.GetInputPort("predicted_radius"))
     if control.own is not None:
         requests = _add_own_controller(builder, mpc, control.own, feed)
     elif control.local is not None:
-        requests = _add_local_controller(builder, mpc, control, control.local, feed)
+        requests = _add_local_controller(builder, mpc, control, control.local, feed, person)
     else:
         requests = builder.AddNamedSystem("plan_follower", PlanFollower())
         builder.Connect(mpc.GetOutputPort("plan"), requests.GetInputPort("plan"))
-    return Planning(mpc, requests)
+    return Planning(mpc, requests, person.forecast)
 
 
 def _add_local_controller(
-    builder: DiagramBuilder, mpc: GlobalMpc, control: ControlSetup, local: LocalSetup, feed: Feed
+    builder: DiagramBuilder,
+    mpc: GlobalMpc,
+    control: ControlSetup,
+    local: LocalSetup,
+    feed: Feed,
+    person: Prediction,
 ) -> LocalCompensation:
     """Adds the local controller, with a prediction at its own time step."""
     requests: LocalCompensation = builder.AddNamedSystem(
         "local_controller", local.system(control.in_worker)
     )
-    near = builder.AddNamedSystem(
-        "near_human_predictor",
-        HumanPredictor(control.predictor, local.joints_step, local.joints_count),
-    )
+    near = person.view("near_human_predictor", local.joints_step, local.joints_count)
     builder.Connect(mpc.GetOutputPort("plan"), requests.GetInputPort("plan"))
-    feed("estimate.joint_position", near.get_input_port())
-    builder.Connect(near.get_output_port(), requests.GetInputPort("predicted_joint_position"))
+    builder.Connect(near.joints, requests.GetInputPort("predicted_joint_position"))
     for name in ("garment_position", *(f"{side}_gripper_position" for side in SIDES)):
         feed(OBSERVATIONS[name], requests.GetInputPort(name))
     return requests

@@ -65,9 +65,12 @@ class _Solve:
         joints: np.ndarray,
         now: float,
         steps: float,
+        radius: np.ndarray | None = None,
     ) -> _Finished:
         begin = clock.perf_counter()
-        state, decision = self.policy.decide(memory, x, v, joints, now, steps)
+        # a policy from before there were radii takes none
+        more = () if radius is None else (radius,)
+        state, decision = self.policy.decide(memory, x, v, joints, now, steps, *more)
         return _Finished(decision, state, joints, clock.perf_counter() - begin)
 
 
@@ -85,6 +88,7 @@ class GlobalMpc(LeafSystem):
         - garment_position
         - garment_velocity
         - predicted_joint_position
+        - predicted_radius (optional)
         output_ports:
         - plan
         - stage
@@ -92,7 +96,8 @@ class GlobalMpc(LeafSystem):
         - solve_time
         - age
 
-    garment_*: (3m,) of the controller's garment, m, m/s. plan: GlobalPlan. stage: (2,) 0 prepare,
+    garment_*: (3m,) of the controller's garment, m, m/s. predicted_radius: ((N+1)·6,) of the balls
+    that hold the predicted joints with probability 0.9, m. plan: GlobalPlan. stage: (2,) 0 prepare,
     1 dress, 2 done. target: (6,) target positions of left and right armhole, m. solve_time: (2,)
     wall time of the last finished solve, s, and the number of finished solves. age: (1,) time since
     the observation that the plan in use is based on, s.
@@ -158,6 +163,7 @@ class GlobalMpc(LeafSystem):
         self.DeclareVectorInputPort("garment_position", 3 * m)
         self.DeclareVectorInputPort("garment_velocity", 3 * m)
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (n + 1))
+        self.DeclareVectorInputPort("predicted_radius", 6 * (n + 1))
         self._declare_outputs()
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
         if waits:
@@ -251,11 +257,14 @@ class GlobalMpc(LeafSystem):
         x = self.get_input_port(0).Eval(context).reshape(-1, 3).copy()
         v = self.get_input_port(1).Eval(context).reshape(-1, 3).copy()
         joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3).copy()
+        radius = None
+        if self.get_input_port(3).HasValue(context):
+            radius = self.get_input_port(3).Eval(context).reshape(-1, 6).copy()
         memory = context.get_abstract_state(self._memory).get_value()
         # count missed periods as elapsed
         periods = max(1, round((now - progress.begun_at) / self._period))
         steps = periods * self._period / self._policy.parameters.time_step
-        pending = self._submit(memory, x, v, joints, now, steps)
+        pending = self._submit(memory, x, v, joints, now, steps, radius)
         self._set_progress(state, _Progress(pending, now))
 
     def _set_progress(self, state: State, progress: _Progress) -> None:

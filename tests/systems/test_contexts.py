@@ -14,7 +14,10 @@ from pydrake.systems.framework import Context, System
 
 from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
+from drake_dress.models.human.learned.predictor import LearnedPredictor
 from drake_dress.systems.global_mpc import GlobalMpc
+from drake_dress.systems.human_forecast import HumanForecast
+from tests.models.human.learned.drawn import drawn_networks, drawn_scene
 from tests.systems.draped import H, draped_station
 
 Begin = Callable[[Context, int], None]
@@ -103,19 +106,27 @@ class _Policy(DressingPolicy):
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)), before=0.0)
 
     def decide(
-        self, state: Any, x: Any, v: Any, joints: Any, time: float, elapsed_steps: float = 5.0
+        self,
+        state: Any,
+        x: Any,
+        v: Any,
+        joints: Any,
+        time: float,
+        elapsed_steps: float = 5.0,
+        radius: Any = None,
     ) -> Any:
         n = self.parameters.horizon
         if x[0, 0] < 0.0:
             raise ValueError("the garment is gone")
         asked = 0.5 * state.before + x[0, 0] + 10.0 * time + 100.0 * elapsed_steps
+        asked += 0.0 if radius is None else 1e3 * radius[0, 0]
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), asked), armhole=np.zeros((n, 2, 3)))
         after = SimpleNamespace(stages=state.stages, before=asked)
         return after, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
 
 
-def _fix(mpc: GlobalMpc, context: Context, x: float) -> None:
-    for i in range(3):
+def _fix(mpc: GlobalMpc, context: Context, x: float, ports: int = 3) -> None:
+    for i in range(ports):
         port = mpc.get_input_port(i)
         port.FixValue(context, np.full(port.size(), x))
 
@@ -130,6 +141,35 @@ def test_global_solves_in_two_contexts_do_not_know_of_each_other() -> None:
 
     # a step ends while solves are under way
     _check(mpc, lambda context, which: _fix(mpc, context, 1.0 + which), see, np.arange(1, 30) * 0.1)
+
+
+def test_radii_of_the_prediction_reach_the_policy_if_there_are_any() -> None:
+    mpc = GlobalMpc(_Policy(), period=0.5, delay=0.2)
+    asked = []
+    for ports in (3, 4):
+        simulator = Simulator(mpc)
+        _fix(mpc, simulator.get_mutable_context(), 2.0, ports)
+        simulator.AdvanceTo(0.3)
+        plan = mpc.GetOutputPort("plan").Eval(simulator.get_context())
+        asked.append(plan.velocity[0, 0, 0])
+    assert asked[1] - asked[0] == pytest.approx(1e3 * 2.0)
+
+
+def test_forecasts_of_two_contexts_do_not_know_of_each_other() -> None:
+    """Observations, and how well predictions did, are in the context."""
+    predictor = LearnedPredictor(drawn_networks(0))
+    system = HumanForecast(predictor, 0.05, 0.1, drawn_scene(0, 1).joints[0])
+
+    def begin(context: Context, which: int) -> None:
+        scene = drawn_scene(which, 1)
+        system.GetInputPort("joint_position").FixValue(context, scene.joints.ravel())
+        system.GetInputPort("sleeve_state").FixValue(context, scene.sleeves.ravel())
+
+    def see(context: Context) -> np.ndarray:
+        names = ("mean", "radius", "samples", "intent")
+        return np.concatenate([system.GetOutputPort(name).Eval(context) for name in names])
+
+    _check(system, begin, see, np.arange(1, 25) * 0.1 + 1e-6)
 
 
 def test_a_failure_is_that_of_its_context() -> None:

@@ -35,7 +35,14 @@ class _Policy(DressingPolicy):
         return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
 
     def decide(
-        self, state: Any, x: Any, v: Any, joints: Any, time: float, elapsed_steps: float = 5.0
+        self,
+        state: Any,
+        x: Any,
+        v: Any,
+        joints: Any,
+        time: float,
+        elapsed_steps: float = 5.0,
+        radius: Any = None,
     ) -> Any:
         n = self.parameters.horizon
         if time > _FAILS:

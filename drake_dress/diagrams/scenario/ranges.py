@@ -164,6 +164,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "global_mpc.max_iterations": (1, 1000),
     "global_mpc.budget": (1, 10**9),
     "global_mpc.delay_share": (0.05, 1.0),
+    "global_mpc.spread_share": (0.0, 3.0),
     "global_mpc.inner_iterations": (1, 1000),
     "global_mpc.max_speed": (0.001, 1.0),
     "global_mpc.progress_step": (0.001, 1.0),

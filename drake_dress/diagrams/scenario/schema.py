@@ -403,6 +403,9 @@ class GlobalMpc:
         approach_distance: upper bound of l_h, the distance before the hand at which a sleeve is
             prepared, m.
         waiting_progress: lowest s at which a sleeve waits for the other one.
+        spread_share: share of the radius about a predicted joint, in which it is with probability
+            0.9, by which the grippers keep further away from that limb. Only the predictor
+            `learned` tells radii.
         force_limit: old name of `safety.force_limit`, N. Deprecated.
     """
 
@@ -419,6 +422,7 @@ class GlobalMpc:
     progress_step: float = round(_POLICY.tasks.progress_rate * _POLICY.time_step, 9)
     approach_distance: float = _POLICY.tasks.approach_distance
     waiting_progress: float = _POLICY.tasks.stages.waiting_progress
+    spread_share: float = _POLICY.spread_share
     force_limit: float | None = None
 
 

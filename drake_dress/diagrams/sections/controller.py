@@ -19,6 +19,7 @@ from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.learned.forecast import PersonPredictor
 from drake_dress.models.human.prediction import PREDICTORS, MotionPredictor
 from drake_dress.solvers.cone_programme import cone_programme
 
@@ -48,6 +49,7 @@ def controller_policy(
         committed_steps=round(g.delay / g.time_step),
         max_speed=g.max_speed,
         plans=c.method != "local",
+        spread_share=g.spread_share,
         budget=budget,
         weights=model_of(g.weights),
         tasks=model_of(
@@ -91,7 +93,7 @@ def local_setup(c: schema.Controller, policy: DressingPolicy) -> LocalSetup | No
     )
 
 
-def predictor(c: schema.Controller) -> MotionPredictor:
+def predictor(c: schema.Controller) -> MotionPredictor | PersonPredictor:
     """Returns the predictor of the person's arms."""
     if c.predictor == "constant_velocity":
         own: MotionPredictor = model_of(c.constant_velocity)

@@ -90,6 +90,10 @@ class MovingArm:
         """Returns whether a movement by will is in progress."""
         return self.movement is not None and time < self.movement.end
 
+    def is_moved(self, time: float) -> bool:
+        """Returns whether a movement by will moves the hand to speak of now."""
+        return self.movement is not None and self.movement.is_seen(time)
+
     def move_by_will(self, time: float, step: float) -> None:
         """Moves the arm by one step along its movement."""
         if self.movement is None:

@@ -53,8 +53,8 @@ _CONTENT = f"""\
 | `time` | ({COUNT},) | s |
 
 The direction of an armhole is that from the cuff to it. Without a garment, `sleeve` is NaN.
-`intent` is 1 from the beginning to the end of a movement, also while the hand pauses in it; and for
-both arms while the body turns, leans, steps or walks.
+`intent` is 1 while will moves the arm, not while the hand pauses in a movement or is held where it
+was drawn; and for both arms while the body turns, leans, steps or walks.
 """
 
 _LIMITS = """\

@@ -48,7 +48,7 @@ class DressedScene:
             time = k * PERIOD
             made.joints[k] = self._mover.trembling(time)
             made.sleeves[k] = np.hstack([sleeves.center, sleeves.direction])
-            made.intent[k], made.on[k] = self._mover.is_willed(time), sleeves.on
+            made.intent[k], made.on[k] = self._mover.intent(time), sleeves.on
             self._advance(k, time)
         _interpolate(made.sleeves)
         return made

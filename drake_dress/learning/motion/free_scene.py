@@ -59,7 +59,7 @@ class FreeScene:
             gait = self._gait
             swing = None if gait is None else gait.arm_angles(time)
             made.joints[k] = self._walked(mover.trembling(time, swing), time)
-            made.intent[k] = mover.is_willed(time) | (gait is not None and gait.share(time) > 0.0)
+            made.intent[k] = mover.intent(time) | (gait is not None and gait.share(time) > 0.0)
             if k % round(_DECIDES / PERIOD) == 0:
                 self._decide(time)
             for arm in mover.arms:

@@ -73,6 +73,12 @@ class Movement:
         """Time at which it ends, s."""
         return self.wave.end if self.wave is not None else max(s.end for s in self.strokes)
 
+    def is_seen(self, time: float) -> bool:
+        """Returns whether it moves the hand to speak of at `time`, s: not while it pauses."""
+        if self.wave is not None:
+            return self.wave.start < time < self.wave.end
+        return any(stroke.is_seen(time) for stroke in self.strokes)
+
     def position(self, time: float) -> FloatArray:
         """Returns the hand's place (3,) at `time`, s, in the torso's frame, m."""
         place = self.base.copy()
@@ -92,12 +98,14 @@ class Movements:
         home: (4,) comfortable pose, rad.
         limits: (2,4) of the joints, rad.
         rng: draws.
+        pace: factor on the duration of the person's movements.
     """
 
     arm: Arm
     home: FloatArray
     limits: FloatArray
     rng: np.random.Generator
+    pace: float = 1.0
 
     def draw(
         self,
@@ -121,6 +129,7 @@ class Movements:
         way = self._way(kind, hand, armhole)
         if way is None:
             return None
+        slower = slower * self.pace
         strokes = draw_strokes(self.rng, time, way, slower)
         if kind == "reach" and self.rng.random() < _CHANGES:
             other = self._target() - hand - way

@@ -7,6 +7,7 @@ import numpy as np
 from drake_dress.learning.motion.arms import Following, MovingArm
 from drake_dress.learning.motion.bodies import DrawnPerson, draw_person
 from drake_dress.learning.motion.movements import Movements
+from drake_dress.learning.motion.strokes import PACES
 from drake_dress.learning.motion.torso import Torso, draw_lean
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.body import shoulder_joint
@@ -47,16 +48,22 @@ class MovingPerson:
         self._girdle_share = _GIRDLE_SHARE * rng.random()
         self._shifted = (-1.0, np.zeros((2, 3)))
         self._tremor = self._drawn_tremor()
+        self._pace = float(np.exp(PACES * rng.normal()))
 
     def movements(self, i: int) -> Movements:
         """Returns what draws the movements of left (0) or right (1) arm."""
         arm = self.arms[i]
-        return Movements(arm.arm, arm.home, arm.limits, self._rng)
+        return Movements(arm.arm, arm.home, arm.limits, self._rng, self._pace)
 
     def is_willed(self, time: float) -> BoolArray:
         """Returns (2,) whether each arm moves by will; while the torso does, both do."""
         moving = self.torso.is_moving(time)
         return np.array([moving or arm.is_willed(time) for arm in self.arms])
+
+    def intent(self, time: float) -> BoolArray:
+        """Returns (2,) whether will moves each arm to speak of now, by itself or with the torso."""
+        moved = self.torso.is_moved(time)
+        return np.array([moved or arm.is_moved(time) for arm in self.arms])
 
     def lean_with(self, arm: MovingArm, time: float, share: float) -> None:
         """Lets the torso go along with an arm's movement from `time`, s, in a `share` of cases."""

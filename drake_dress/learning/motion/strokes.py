@@ -19,14 +19,17 @@ from drake_dress.models.arrays import FloatArray
 _EXPONENTS = 1.6, 3.2
 # Standard deviation of a path's bow, as a share of its length: hand paths are nearly straight.
 _BOW = 0.06
-# Median over strokes of the mean speed, m/s, and the standard deviation of its logarithm: calm
-# movements, as in a dressing.
-_MEAN_SPEED, _SPEED_SPREAD = 0.22, 0.5
+# Duration of a stroke: s, at a length, m; it grows with this power of the length, since longer
+# movements are faster (isochrony: Viviani and McCollum 1983), and spreads from one movement of a
+# person to the next by this standard deviation of its logarithm. Calm movements, as in a dressing.
+_TYPICAL_TIME, _TYPICAL_LENGTH, _GROWTH, _SPREAD = 1.4, 0.3, 0.4, 0.12
 _FASTEST = 0.9  # m/s, largest mean speed
-_SHORTEST, _LONGEST = 0.35, 3.5  # s, duration of a stroke
-# Length, m, beyond which the duration grows with the root of the length only: longer movements are
-# faster.
-_LONG = 0.3
+_SHORTEST, _LONGEST = 0.35, 4.0  # s, duration of a stroke
+# Persons differ more from each other: standard deviation of the logarithm of their pace.
+PACES = 0.3
+# Share of its way before which a stroke has hardly begun, and that is left where it has nearly
+# ended.
+_UNSEEN = 0.02
 # Share of movements made of one stroke. Others hesitate: they stop after a share of the way, for up
 # to this time, s.
 _WITHOUT_PAUSE, _FIRST_SHARE, _LONGEST_PAUSE = 0.75, (0.25, 0.75), 0.8
@@ -58,14 +61,22 @@ class Stroke:
         """Returns whether the movement is in progress at `time`, s."""
         return self.start <= time < self.end
 
+    def done(self, time: float) -> float:
+        """Returns the share of its way that is done at `time`, s."""
+        u = min(1.0, max(0.0, (time - self.start) / self.duration))
+        return float(betainc(self.exponents[0] + 1.0, self.exponents[1] + 1.0, u))
+
+    def is_seen(self, time: float) -> bool:
+        """Returns whether it moves anything to speak of at `time`, s."""
+        return _UNSEEN < self.done(time) < 1.0 - _UNSEEN
+
     def position(self, time: float) -> FloatArray:
         """Returns the displacement (k,) since the start, at `time`, s."""
-        u = (time - self.start) / self.duration
-        if u <= 0.0:
+        done = self.done(time)
+        if done <= 0.0:
             return np.zeros_like(self.way)
-        if u >= 1.0:
+        if done >= 1.0:
             return self.way
-        done = float(betainc(self.exponents[0] + 1.0, self.exponents[1] + 1.0, u))
         placed: FloatArray = done * self.way + 4.0 * done * (1.0 - done) * self.bow
         return placed
 
@@ -82,8 +93,8 @@ def draw_stroke(
         slower: factor on its duration.
     """
     length = float(np.linalg.norm(way))
-    speed = _MEAN_SPEED * float(np.exp(_SPEED_SPREAD * rng.normal()))
-    duration = slower * max(np.sqrt(length * max(length, _LONG)) / speed, length / _FASTEST)
+    time = _TYPICAL_TIME * (length / _TYPICAL_LENGTH) ** _GROWTH * np.exp(_SPREAD * rng.normal())
+    duration = max(slower * time, length / _FASTEST)
     bow = _BOW * length * rng.normal(size=len(way))
     if length > 0.0:
         # across the way

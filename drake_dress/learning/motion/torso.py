@@ -68,6 +68,10 @@ class Torso:
         """Returns whether the person moves the torso by will at `time`, s."""
         return any(s.is_on(time) for s in self.strokes)
 
+    def is_moved(self, time: float) -> bool:
+        """Returns whether a movement by will moves the torso to speak of at `time`, s."""
+        return any(s.is_seen(time) for s in self.strokes)
+
     def pose(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Returns rotation (3,3) and origin (3,), m, of the torso's frame in the world."""
         if self._last is not None and self._last[0] == time:

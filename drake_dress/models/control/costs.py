@@ -397,7 +397,9 @@ class PersonClearance:
 
     def _found(self, step: PlannedStep) -> tuple[float, FloatArray]:
         """Returns the cost, and its gradient with respect to the held nodes (k,3)."""
-        grip, obstacles = step.grip, step.situation.obstacles[step.index]
+        grip, situation = step.grip, step.situation
+        person = situation.obstacles if situation.kept_away is None else situation.kept_away
+        obstacles = person[step.index]
         if not obstacles.count:
             return 0.0, np.zeros((len(grip.nodes), 3))
         count = np.empty(len(grip.nodes))

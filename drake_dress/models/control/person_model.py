@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba as nb
@@ -70,6 +71,24 @@ def person_obstacles(person: PersonModel, joints: FloatArray, time_step: float) 
         omega = np.cross(axis, vb - va) / length2
         predicted.append(Obstacles(rows_a[j], rows_b[j], radius, va, omega))
     return predicted
+
+
+def kept_away(obstacles: Sequence[Obstacles], radius: FloatArray, share: float) -> list[Obstacles]:
+    """Returns the predicted person as grippers keep away from it: wider where it is less certain.
+
+    Args:
+        obstacles: the person at the start of each of N steps, as from `person_obstacles`.
+        radius: (N+1,6) of the balls that hold the joints with probability 0.9, m.
+        share: of these radii that the capsules are widened by.
+    """
+    result = []
+    for obstacle, r in zip(obstacles, radius, strict=False):
+        left, right = r[:3], r[3:]
+        torso = np.full(obstacle.count - 6, 0.5 * (left[0] + right[0]))
+        arms = [np.array([max(a[0], a[1]), max(a[1], a[2]), a[2]]) for a in (left, right)]
+        wider = obstacle.radius + share * np.concatenate([torso, *arms])
+        result.append(replace(obstacle, radius=wider))
+    return result
 
 
 def person_capsules(

@@ -14,7 +14,7 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.costs import GarmentCost, Weights
 from drake_dress.models.control.global_mpc import GlobalController, Plan
-from drake_dress.models.control.person_model import PersonModel, person_obstacles
+from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
 from drake_dress.models.control.situation import HeldGarment, Situation
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
@@ -38,6 +38,8 @@ class PolicyParameters:
         max_speed: speed limit of a gripper, m/s.
         weights: weights of the costs.
         tasks: settings of the sleeve targets.
+        spread_share: share of the predicted joints' 90 % radii by which the grippers keep further
+            away from the person.
         plans: whether to plan with the garment model. If not, plans are to rest, and the local
             controller works alone.
         budget: limits of a solve.
@@ -51,6 +53,7 @@ class PolicyParameters:
     max_speed: float = 0.12
     weights: Weights = field(default_factory=Weights)
     tasks: TaskParameters = field(default_factory=TaskParameters)
+    spread_share: float = 0.5
     plans: bool = True
     budget: Budget = Budget(iterations=3200)
 
@@ -136,6 +139,7 @@ class DressingPolicy:
         joints: FloatArray,
         time: float,
         elapsed_steps: float = 5.0,
+        radius: FloatArray | None = None,
     ) -> tuple[PolicyState, Decision]:
         """Returns the next state and the decision.
 
@@ -148,6 +152,8 @@ class DressingPolicy:
             time: current time, s.
             elapsed_steps: prediction steps since the last decision, possibly fractional. The rest
                 of its plan is being executed, and is the initial guess of the descent.
+            radius: (N+1,6) of the balls about `joints` that hold the person's with probability 0.9,
+                m; None: the prediction tells none.
         """
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
@@ -160,8 +166,9 @@ class DressingPolicy:
         leftward = headings(joints[1:]).leftward
         least = p.tasks.stages.creeping_progress
         settling = all(fact.linked and fact.s >= least for fact in assignment.facts)
+        away = None if radius is None else kept_away(obstacles, radius, p.spread_share)
         plan = self.controller.solve(
-            Situation(x, v, targets, obstacles, leftward),
+            Situation(x, v, targets, obstacles, leftward, away),
             guess,
             p.committed_steps,
             p.budget,

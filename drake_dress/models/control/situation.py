@@ -42,6 +42,8 @@ class Situation:
         v: (n,3) their velocities, m/s.
         targets: of left and right sleeve.
         obstacles: the predicted person at the start of each of the N steps.
+        kept_away: the person as grippers keep away from it, wider where it is uncertain; None: as
+            in `obstacles`.
         leftward: (N,3) horizontal unit vectors to the person's left. None disables the cost of the
             grippers' level.
     """
@@ -51,6 +53,7 @@ class Situation:
     targets: tuple[SleeveTarget, SleeveTarget]
     obstacles: Sequence[Obstacles]
     leftward: FloatArray | None = None
+    kept_away: Sequence[Obstacles] | None = None
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ class Sampling:
         length: number of samples T, the last one now.
         period: time between samples, s.
         width: half width of the weights about a sample's time, s; observations further away count
-            only where none is nearer.
-        gap: largest time between the two observations around a sample, and largest age of the
-            newest one, s; beyond, the sample is missing.
+            only where none is nearer. Beyond the newest observation it is counted from there.
+        gap: largest time between the two observations around a sample, s, and twice the largest age
+            of the newest one; beyond, the sample is missing.
     """
 
     length: int = 20
@@ -41,7 +41,8 @@ class Sampling:
 
     def times(self, now: float) -> FloatArray:
         """Returns the times (T,) of the samples, s."""
-        return now - self.period * np.arange(self.length - 1, -1, -1)
+        back = np.arange(self.length - 1, -1, -1, dtype=np.float64)
+        return now - self.period * back
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Observations(Immutable):
         found = np.full((sampling.length, points, size), np.nan)
         if not len(self.time):
             return found
-        seen = np.isfinite(self.value).all(axis=2)
+        seen = np.all(np.isfinite(self.value), axis=2)
         alike: dict[bytes, list[int]] = {}
         for k in range(points):
             alike.setdefault(seen[:, k].tobytes(), []).append(k)
@@ -122,10 +123,12 @@ def line_weights(
     gap = np.where(after > last, times - stamps[last], stamps[next_] - stamps[before])
     gap = np.where(after == 0, stamps[0] - times, gap)
     known = gap <= np.where((after > last) | (after == 0), 0.5, 1.0) * sampling.gap + 1e-9
-    # the triangle reaches at least past both neighbours
+    # the triangle reaches at least past both neighbours; beyond the ends it holds a whole width of
+    # observations, since a line through a few close ones would be continued with their noise
     reach = np.maximum(np.abs(times - stamps[next_]), np.abs(times - stamps[before]))
-    width = np.maximum(sampling.width, 1.05 * reach)[:, None]
-    weight = np.maximum(0.0, 1.0 - np.abs(apart) / width)
+    beyond = next_ == before
+    width = np.where(beyond, reach + sampling.width, np.maximum(sampling.width, 1.05 * reach))
+    weight = np.maximum(0.0, 1.0 - np.abs(apart) / width[:, None])
     total = weight.sum(axis=1)
     mean = (weight * apart).sum(axis=1) / total
     off = apart - mean[:, None]

@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.register import is_name
+
+if TYPE_CHECKING:
+    from drake_dress.models.human.learned.forecast import PersonPredictor
 
 # Rows of the two joints of each limb, parent first; a limb has a fixed length.
 _LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))
@@ -177,15 +180,18 @@ def resampled(samples: FloatArray, newest: FloatArray, age: float) -> FloatArray
     return np.concatenate([past, newest[None]])
 
 
-_predictors: dict[str, Callable[[], MotionPredictor]] = {
+_OWN: dict[str, Callable[[], MotionPredictor | PersonPredictor]] = {
     "still": StillPredictor,
     "constant_velocity": ConstantVelocityPredictor,
 }
-PREDICTORS: Mapping[str, Callable[[], MotionPredictor]] = MappingProxyType(_predictors)
+_predictors = dict(_OWN)
+PREDICTORS: Mapping[str, Callable[[], MotionPredictor | PersonPredictor]] = MappingProxyType(
+    _predictors
+)
 """What `controller.predictor` may name; a live view, which grows with `register_predictor`."""
 
 
-def register_predictor(name: str, make: Callable[[], MotionPredictor]) -> None:
+def register_predictor(name: str, make: Callable[[], MotionPredictor | PersonPredictor]) -> None:
     """Registers a predictor, so that `controller.predictor` may name it.
 
     Args:
@@ -197,6 +203,6 @@ def register_predictor(name: str, make: Callable[[], MotionPredictor]) -> None:
     """
     if not is_name(name):
         raise ValueError(f"the name is {name!r}, expected lower-case letters, digits and _")
-    if _predictors.get(name) in (StillPredictor, ConstantVelocityPredictor):
+    if name in _OWN:
         raise ValueError(f"the name {name} is one of the package's, expected another")
     _predictors[name] = make

@@ -3,6 +3,7 @@
 import numpy as np
 
 from drake_dress.learning.motion.gait import Gait
+from drake_dress.learning.motion.sequence import DURATION
 
 GAIT = Gait(
     start=0.0,
@@ -49,4 +50,4 @@ def test_drawn_gaits_are_those_of_people() -> None:
         assert 0.3 <= gait.speed <= 1.5
         assert 1.4 <= gait.cadence <= 2.1
         assert 2.0 <= gait.end - gait.start <= 12.0
-        assert gait.start <= 6.0
+        assert gait.start <= 0.6 * DURATION

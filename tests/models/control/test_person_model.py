@@ -6,8 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from drake_dress.models.control.person_model import PersonModel, person_obstacles
+from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
 from drake_dress.models.human.body import (
     ArmPose,
     BodyMeasures,
@@ -68,3 +70,30 @@ def test_torso_that_is_predicted_to_turn_moves_as_it_does() -> None:
     assert np.linalg.norm(predicted[0].velocity[knee]) == pytest.approx(
         0.5 * np.linalg.norm(predicted[0].a[knee, :2]), rel=0.01
     )
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 3.0))
+def test_person_is_kept_away_from_by_a_share_of_the_radii(seed: int, share: float) -> None:
+    """A limb is as uncertain as the less certain of its ends, the torso as the shoulders."""
+    radius = np.random.default_rng(seed).uniform(0.0, 0.2, (HORIZON + 1, 6))
+    seen = person_obstacles(PERSON, np.stack([joints(0.1 * j) for j in range(HORIZON + 1)]), STEP)
+    wider = kept_away(seen, radius, share)
+    assert len(wider) == HORIZON
+    for before, after, r in zip(seen, wider, radius, strict=False):
+        grown = (after.radius - before.radius) / max(share, 1e-9)
+        if share > 1e-6:
+            torso, left, right = grown[:-6], grown[-6:-3], grown[-3:]
+            np.testing.assert_allclose(torso, 0.5 * (r[0] + r[3]), rtol=1e-6, atol=1e-9)
+            for arm, (shoulder, elbow, hand) in ((left, r[:3]), (right, r[3:])):
+                limbs = [max(shoulder, elbow), max(elbow, hand), hand]
+                np.testing.assert_allclose(arm, limbs, rtol=1e-6, atol=1e-9)
+        for name in ("a", "b", "velocity", "angular_velocity"):
+            np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+
+
+def test_person_who_is_certain_or_a_share_of_zero_changes_nothing() -> None:
+    seen = person_obstacles(PERSON, np.stack([joints()] * (HORIZON + 1)), STEP)
+    for radius, share in ((0.0, 1.0), (0.3, 0.0)):
+        same = kept_away(seen, np.full((HORIZON + 1, 6), radius), share)
+        for before, after in zip(seen, same, strict=True):
+            np.testing.assert_array_equal(after.radius, before.radius)

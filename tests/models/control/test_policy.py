@@ -7,7 +7,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drake_dress.models.control.policy import later
+from drake_dress.models.cloth.material import Material
+from drake_dress.models.control.person_model import PersonModel
+from drake_dress.models.control.policy import DressingPolicy, PolicyParameters, later
+from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    arm_points,
+    body_capsules,
+    shoulder_joint,
+)
+from drake_dress.models.sides import SIDES
+
+M = BodyMeasures()
+PERSON = PersonModel(
+    body_capsules(M, "standing"),
+    np.stack([shoulder_joint(M, "standing", side) for side in SIDES]),
+    (M.upper_arm_radius, M.forearm_radius, M.hand_radius),
+)
+POSE = ArmPose(0.25, 0.8, 0.0, 0.2)
+JOINTS = np.vstack([arm_points(M, "standing", side, POSE) for side in SIDES])
 
 
 @given(st.integers(1, 8), st.floats(0.0, 12.0), st.integers(0, 2**32 - 1))
@@ -33,3 +53,34 @@ def test_whole_steps_are_taken_as_they_are() -> None:
     velocity = np.arange(5.0)[:, None]
     for steps in (2.0, 0.6 / 0.3, 2.0 - 1e-12, 2.0 + 1e-16):
         assert np.array_equal(later(velocity, steps)[:, 0], [2.0, 3.0, 4.0, 4.0, 4.0])
+
+
+def distance_after_a_step(share: float, radius: float | None) -> tuple[float, np.ndarray]:
+    """Returns the left gripper's distance from the hand after a step of a plan, m, and the plan.
+
+    It begins beside the hand, and its sleeve is to come nearer.
+    """
+    mesh = make_coat(CoatParameters(), 0.06)
+    parameters = PolicyParameters(
+        horizon=3, max_iterations=6, committed_steps=0, spread_share=share
+    )
+    policy = DressingPolicy(mesh, Material(), PERSON, parameters)
+    held = mesh.rest_position[mesh.grasp["left"]].mean(axis=0)
+    begin = JOINTS[2] + [0.0, 0.15, 0.0]
+    x = mesh.rest_position + begin - held
+    rows = np.tile(JOINTS, (4, 1, 1))
+    spread = None if radius is None else np.full((4, 6), radius)
+    _, decision = policy.decide(
+        policy.initial_state(), x, np.zeros_like(x), rows, 0.0, radius=spread
+    )
+    velocity = decision.plan.velocity
+    after = begin + parameters.time_step * velocity[0, 0]
+    return float(np.linalg.norm(after - JOINTS[2])), velocity
+
+
+def test_grippers_keep_further_away_from_a_person_who_is_less_certain() -> None:
+    certain, plan = distance_after_a_step(0.5, None)
+    for share, radius in ((0.5, 0.0), (0.0, 0.1)):
+        np.testing.assert_array_equal(distance_after_a_step(share, radius)[1], plan)
+    less, least = (distance_after_a_step(0.5, radius)[0] for radius in (0.1, 0.2))
+    assert certain + 0.005 < less < least - 0.01

@@ -46,6 +46,14 @@ def test_jacobian_is_the_derivative_of_the_hand(side: Side) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
+def test_jacobian_of_the_elbow_is_its_derivative(side: Side) -> None:
+    arm = Arm(M, "sitting", side)
+    for q in some_angles():
+        expected = slope(lambda a: arm.points(a)[1], q).T
+        np.testing.assert_allclose(arm.elbow_jacobian(q), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("side", SIDES)
 def test_gravity_torque_is_minus_the_slope_of_the_potential(side: Side) -> None:
     arm = Arm(M, "standing", side)
     for q in some_angles():

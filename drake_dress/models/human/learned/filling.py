@@ -1,8 +1,9 @@
 """Fills in joints that were not observed, from those that were and from how the arm was held.
 
-A joint that cloth hides keeps its angles relative to the limb before it: the forearm turns with the
-upper arm, and the arm with the trunk. A hidden elbow between a visible shoulder and hand lies on the
-circle that the lengths of both limbs leave, as near as possible to where it would be otherwise.
+A joint that cloth hides keeps its angles relative to the limb before it: the forearm turns with
+the upper arm, and the arm with the trunk. A hidden elbow between a visible shoulder and hand lies
+on the circle that the lengths of both limbs leave, as near as possible to where it would be
+otherwise.
 """
 
 from __future__ import annotations
@@ -19,20 +20,20 @@ _HALF_SHOULDERS = 0.18
 _SIDES = (1.0, -1.0)
 
 
-def filled(joints: FloatArray) -> tuple[FloatArray, BoolArray]:
+def filled(joints: FloatArray, first: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
     """Returns joints (B,T,6,3), m, without gaps, and which of them were observed (B,T,6).
 
-    Before its first observation a joint is filled backward in time.
+    Before its first observation a joint is filled backward in time, unless `first` tells of it.
 
     Args:
         joints: (B,T,6,3) shoulder, elbow, hand of left, then right arm, NaN where not observed.
+        first: (B,6,3) what is known of joints before the history, m, NaN where nothing is.
     """
-    seen = np.isfinite(joints).all(axis=3)
+    seen: BoolArray = np.all(np.isfinite(joints), axis=3)
     if seen.all():
         return joints, seen
-    first = _first_poses(joints, seen)
+    before = _first_poses(joints, seen, first)
     result = np.empty_like(joints)
-    before = first
     for t in range(joints.shape[1]):
         before = result[:, t] = filled_pose(joints[:, t], seen[:, t], before)
     return result, seen
@@ -111,7 +112,7 @@ def _elbow_between(
 
 
 def rotated_between(start: FloatArray, end: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Returns vectors (N,3) turned by the least rotations from directions `start` to `end` (N,3)."""
+    """Returns vectors (N,3) turned by the least rotations that take `start` to `end`, (N,3)."""
     a = start / np.maximum(_length(start), 1e-9)
     b = end / np.maximum(_length(end), 1e-9)
     axis = np.cross(a, b)
@@ -134,12 +135,15 @@ def _turn_between(before: FloatArray, now: FloatArray) -> FloatArray:
     return result
 
 
-def _first_poses(joints: FloatArray, seen: BoolArray) -> FloatArray:
-    """Returns poses (B,6,3), m, of each joint's first observation, or as arms usually hang."""
+def _first_poses(joints: FloatArray, seen: BoolArray, known: FloatArray | None) -> FloatArray:
+    """Returns poses (B,6,3), m: what is known, each joint's first observation, or a usual pose."""
     index = np.argmax(seen, axis=1)
-    first = np.take_along_axis(joints, index[:, None, :, None], axis=1)[:, 0]
-    ever = seen.any(axis=1)
-    result = first.copy()
+    result = np.take_along_axis(joints, index[:, None, :, None], axis=1)[:, 0].copy()
+    ever: BoolArray = np.any(seen, axis=1)
+    if known is not None:
+        told = np.all(np.isfinite(known), axis=2)
+        result[told], ever = known[told], ever | told
+    result[~ever] = np.nan
     _place_unseen_shoulders(result, ever)
     front = facing(result)
     left = np.stack([-front[:, 1], front[:, 0]], axis=1)

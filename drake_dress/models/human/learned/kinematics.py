@@ -1,7 +1,7 @@
 """Makes predicted joints a person's: limbs keep their lengths, joints their limits.
 
-Angles are those of `body.py`, with the trunk upright and facing across the shoulders. A pose that is
-beyond a limit already may stay there, but goes no further.
+Angles are those of `body.py`, with the trunk upright and facing across the shoulders. A pose that
+is beyond a limit already may stay there, but goes no further.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from drake_dress.models.human.learned.arm_frame import facing
 # Lower and upper limits of abduction, extension, rotation, elbow flexion, rad: the ranges of mobile
 # adults, since nobody knows the person's own.
 LIMITS = np.array([[-1.0, -3.2, -1.9, 0.0], [3.2, 1.4, 1.9, 2.7]])
+_MIDDLE = LIMITS.mean(axis=0)
 _PAIRS = ((0, 3), (0, 1), (1, 2), (3, 4), (4, 5))
 _MIRROR = np.array([1.0, -1.0, 1.0])
 # A limit is passed by more than this before a pose is changed, rad: rounding is left alone.
@@ -105,7 +106,7 @@ def _limited(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns directions (B,M,3) within the limits `allowed` (B,2,4), rad."""
     u, f = _to_torso(upper, front, side), _to_torso(fore, front, side)
-    angles = arm_angles_of(u, f)
+    angles = _near_limits(arm_angles_of(u, f))
     low, high = allowed[:, None, 0], allowed[:, None, 1]
     bounded = np.clip(angles, low, high)
     off = np.abs(bounded - angles).sum(axis=-1)
@@ -128,12 +129,21 @@ def _allowed(now: FloatArray) -> FloatArray:
     for side, shoulder in enumerate((0, 3)):
         upper = _to_torso(_direction(now[:, shoulder + 1] - now[:, shoulder]), front, side)
         fore = _to_torso(_direction(now[:, shoulder + 2] - now[:, shoulder + 1]), front, side)
-        angles = arm_angles_of(upper, fore)
+        angles = _near_limits(arm_angles_of(upper, fore))
         off = np.abs(np.clip(angles, *LIMITS) - angles).sum(axis=-1)
         nearer = np.where((off[0] <= off[1])[:, None], angles[0], angles[1])
         result[:, side, 0] = np.minimum(LIMITS[0], nearer)
         result[:, side, 1] = np.maximum(LIMITS[1], nearer)
     return result
+
+
+def _near_limits(angles: FloatArray) -> FloatArray:
+    """Returns the same angles (…,4), rad, within half a turn of the middle of their limits.
+
+    The limits of abduction and extension go beyond ±π.
+    """
+    near: FloatArray = _MIDDLE + np.mod(angles - _MIDDLE + np.pi, 2.0 * np.pi) - np.pi
+    return near
 
 
 def _shoulders(joints: FloatArray, width: FloatArray) -> FloatArray:

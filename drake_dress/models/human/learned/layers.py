@@ -61,7 +61,8 @@ def attention(weights: Weights, name: str, x: Array, heads: int, hidden: Array) 
     Args:
         weights: query, key, value and output.
         name: of the layer.
-        x: (B,T,c). heads: number of heads, a divisor of c.
+        x: (B,T,c).
+        heads: number of heads, a divisor of c.
         hidden: (B,T) 1 where a step is to be left out, else 0.
     """
     xp = namespace(x)

@@ -63,7 +63,7 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     """
     frames = ArmFrames.of(windows.joints[:, -1], turned)
     joints = frames.joints(windows.joints)
-    known = swapped_sides(windows.sleeves_seen).astype(np.float64)
+    known = swapped_sides(windows.sleeves_seen.astype(np.float64))
     center = swapped_sides_of_frames(frames.points(windows.sleeves[..., :3]))
     direction = swapped_sides_of_frames(frames.directions(windows.sleeves[..., 3:]))
     seen = np.concatenate([windows.seen, windows.seen[:, :, [3, 4, 5, 0, 1, 2]]])
@@ -72,6 +72,7 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     period = windows.period
     progress, distance = place_on_arm(own, shoulder, elbow, hand)
     on_own, on_other = known[:, :, :1], known[:, :, 1:]
+    lasting = known * np.concatenate([known[:, :1], known[:, :-1]], axis=1)
     parts = [
         _MOTION * shoulder,
         _LIMB * (elbow - shoulder),
@@ -87,11 +88,11 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
         seen[:, :, [0, 1, 2, 5]].astype(np.float64),
         on_own * np.clip(_SLEEVE * (own - hand), -_MOST, _MOST),
         on_own * direction[:, :, 0],
-        on_own * np.clip(_SLEEVE_SPEED * rates(own, period), -_MOST, _MOST),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * rates(own, period), -_MOST, _MOST),
         on_own * np.stack([progress, np.minimum(5.0 * distance, _MOST)], axis=2),
         on_own,
         on_other * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
-        on_other * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
+        lasting[:, :, 1:] * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
         on_other,
     ]
     tokens = np.concatenate(parts, axis=2).astype(np.float32)

@@ -1,0 +1,1 @@
+"""How well persons are predicted: baselines, errors, coverage and intent on any motion."""

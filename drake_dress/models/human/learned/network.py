@@ -1,0 +1,79 @@
+"""The residual network: what the linear predictor misses, and how far off the sum may be.
+
+Each channel of the tokens is reduced to a few learned averages over time; residual dense layers
+follow. Two heads give the displacement that is added to the linear predictor's, and the scale of
+the error that is left, for each joint and step. Where all joints are seen, row 0 takes the noise of
+the newest observation back; where one is hidden, it corrects its filled-in place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drake_dress.models.human.learned.layers import (
+    Array,
+    Weights,
+    dense,
+    dense_weights,
+    namespace,
+    norm_weights,
+    normalised,
+    softplus,
+    swish,
+)
+from drake_dress.models.human.learned.tokens import TOKEN_SIZE
+
+HISTORY, FUTURE = 20, 20  # samples
+PERIOD = 0.1  # s
+AVERAGES = 8
+WIDTH = 256
+_BLOCKS = ("first", "second", "third", "fourth")
+_JOINTS = 3
+# Smallest scale of an error, m.
+_SMALLEST = 0.001
+# Outputs grow with the horizon, as errors do: scale of each row.
+_GROWTH = np.sqrt(0.05 + np.arange(FUTURE + 1) / FUTURE).astype(np.float32)
+
+
+def motion_weights(rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Returns drawn weights; the network then returns about zero."""
+    averages = rng.normal(size=(TOKEN_SIZE, HISTORY, AVERAGES)) / HISTORY**0.5
+    weights = {"averages": averages.astype(np.float32)}
+    weights |= dense_weights(rng, "enter", TOKEN_SIZE * AVERAGES + 1, WIDTH)
+    for name in _BLOCKS:
+        weights |= norm_weights(f"{name}.norm", WIDTH)
+        weights |= dense_weights(rng, f"{name}.dense", WIDTH, WIDTH)
+    weights |= dense_weights(rng, "displacement", WIDTH, (FUTURE + 1) * _JOINTS * 3, 0.01)
+    return weights | dense_weights(rng, "scale", WIDTH, (FUTURE + 1) * _JOINTS, 0.01)
+
+
+def context(weights: Weights, tokens: Array, intent: Array) -> Array:
+    """Returns what the network makes of tokens (N,T,c) and the intent's probability (N,).
+
+    Returns:
+        (N,`WIDTH`).
+    """
+    xp = namespace(tokens)
+    averaged = xp.einsum("ntc,cta->nca", tokens, weights["averages"])
+    entering = [averaged.reshape(tokens.shape[0], -1), 2.0 * intent[:, None] - 1.0]
+    z = swish(dense(weights, "enter", xp.concatenate(entering, 1)))
+    for name in _BLOCKS:
+        inner = dense(weights, f"{name}.dense", normalised(weights, f"{name}.norm", z))
+        z = z + swish(inner)
+    return z
+
+
+def residual(weights: Weights, z: Array) -> Array:
+    """Returns the displacements (N,F+1,3,3), m, that are added to the linear predictor's."""
+    rows = dense(weights, "displacement", z).reshape(z.shape[0], FUTURE + 1, _JOINTS, 3)
+    return rows * _like(_GROWTH, z)[:, None, None]
+
+
+def error_scale(weights: Weights, z: Array) -> Array:
+    """Returns the expected size of the error (N,F+1,3), m, of each joint and step."""
+    rows = dense(weights, "scale", z).reshape(z.shape[0], FUTURE + 1, _JOINTS)
+    return _SMALLEST + 0.1 * softplus(rows - 1.0) * _like(_GROWTH, z)[:, None]
+
+
+def _like(array: np.ndarray, z: Array) -> Array:
+    return array if isinstance(z, np.ndarray) else namespace(z).as_tensor(array, device=z.device)

@@ -1,0 +1,187 @@
+"""The learned predictor of a person: intent, mean, regions and samples of both arms' motion.
+
+The history's gaps are filled, and each arm is brought into its own frame. An attention network
+tells intent. A residual network adds to the linear predictor's motion, and tells how far off the
+sum may be. The result is weighed with simpler predictors by how each did on this person. Samples
+come from leapfrog diffusion. Last, limbs get their lengths, and joints their limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.human.history import Sampling
+from drake_dress.models.human.learned import diffusion, network
+from drake_dress.models.human.learned.arm_frame import ArmFrames
+from drake_dress.models.human.learned.experts import ExpertMemory, ExpertSettings
+from drake_dress.models.human.learned.familiarity import distance
+from drake_dress.models.human.learned.filling import filled
+from drake_dress.models.human.learned.forecast import Forecast, PersonHistory
+from drake_dress.models.human.learned.intent import intent_logit
+from drake_dress.models.human.learned.kinematics import Lengths, person_like
+from drake_dress.models.human.learned.layers import logistic
+from drake_dress.models.human.learned.linear import LinearMotion
+from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
+from drake_dress.models.human.learned.tokens import ArmTokens, Windows, arm_tokens
+from drake_dress.models.human.prediction import ConstantVelocityPredictor
+from drake_dress.models.immutable import Immutable
+
+SAMPLING = Sampling(HISTORY, PERIOD)
+# Rows of the experts: no motion, decaying velocity, linear, network.
+EXPERTS = ("still", "damped", "linear", "network")
+_NETWORK = 3
+
+
+@dataclass(frozen=True)
+class Networks:
+    """Weights of everything that is learned, by name.
+
+    Attributes:
+        intent: of the intent network.
+        motion: of the residual network, the diffusion, the regions and the familiarity.
+        linear: the linear predictor.
+    """
+
+    intent: Mapping[str, np.ndarray]
+    motion: Mapping[str, np.ndarray]
+
+    @property
+    def linear(self) -> LinearMotion:
+        """The linear predictor."""
+        return LinearMotion(self.motion["linear.map"].astype(np.float64))
+
+
+@dataclass(frozen=True)
+class PredictorMemory(Immutable):
+    """What is carried from one forecast to the next.
+
+    Attributes:
+        experts: how the experts did.
+        poses: (time, s, (6,3) joints, m) of the last forecasts' row 0, newest last.
+    """
+
+    experts: ExpertMemory = ExpertMemory()
+    poses: tuple[tuple[float, FloatArray], ...] = ()
+
+
+@dataclass(frozen=True)
+class _Arms:
+    """Predictions in the arms' frames: mean and radii of the network, samples, (2,…) each."""
+
+    mean: FloatArray
+    radius: FloatArray
+    samples: FloatArray
+
+
+@dataclass(frozen=True)
+class LearnedPredictor:
+    """Predicts a person; see the module's docstring.
+
+    Attributes:
+        networks: weights.
+        experts: settings of their weighing.
+        sampling: of the history.
+    """
+
+    networks: Networks
+    experts: ExpertSettings = ExpertSettings()
+    sampling: Sampling = SAMPLING
+    _damped: ConstantVelocityPredictor = field(
+        default_factory=lambda: ConstantVelocityPredictor(history_length=5, sample_period=PERIOD)
+    )
+
+    def begin(self) -> PredictorMemory:
+        """Returns the memory before the first forecast."""
+        return PredictorMemory()
+
+    def forecast(
+        self, history: PersonHistory, memory: PredictorMemory
+    ) -> tuple[Forecast, PredictorMemory]:
+        """Returns the forecast from the last sample on; see `PersonPredictor`."""
+        known = memory.experts.compared(history.time, history.joints[-1], PERIOD, self.experts)
+        oldest = self._pose_at(memory, history.time - (HISTORY - 1) * PERIOD)
+        joints, seen = filled(history.joints[None], oldest)
+        arms = arm_tokens(_windows(joints, seen, history.sleeves[None]))
+        hidden = np.tile(~np.any(np.isfinite(history.joints), axis=(1, 2)), (2, 1))
+        intent = logistic(
+            intent_logit(self.networks.intent, arms.tokens, hidden.astype(np.float32))
+        )
+        found = self._arms(arms, intent)
+        lengths = Lengths.of(joints)
+        linear = self.networks.linear.displacement(arms.joints[:, :, :3])
+        now = joints[0, -1]
+        experts = np.stack(
+            [
+                np.tile(now, (FUTURE + 1, 1, 1)),
+                self._damped.predict(history_tail(joints[0]), PERIOD, FUTURE),
+                _in_world(arms.frames, arms.joints[:, -1:, :3] + linear),
+                _in_world(arms.frames, found.mean),
+            ]
+        )
+        experts = person_like(experts[None], lengths, joints[:, -1])[0]
+        is_linear = bool(np.max(distance(self.networks.motion, arms.tokens)) > 1.0)
+        allowed = np.ones(len(EXPERTS))
+        allowed[_NETWORK] = 0.0 if is_linear else 1.0
+        weights = known.weights(self.experts, allowed, FUTURE + 1)
+        mean = (weights[..., None] * experts).sum(axis=0)
+        # what is hidden now is known by the network alone
+        lost = ~seen[0, -1]
+        if not is_linear:
+            mean[:, lost] = experts[_NETWORK][:, lost]
+        moved = mean - _in_world(arms.frames, found.mean)
+        size = np.repeat(known.size, 3)
+        radius = size * np.concatenate([found.radius[0], found.radius[1]], axis=1)
+        samples = np.stack(
+            [_in_world(arms.frames, found.samples[:, k]) for k in range(diffusion.SAMPLES)]
+        )
+        both = np.concatenate([mean[None], samples + moved])[None]
+        both = person_like(both, lengths, joints[:, -1])[0]
+        forecast = Forecast(
+            history.time, PERIOD, both[0], radius, both[1:], intent, is_linear, seen[0, -1]
+        )
+        lasting = FUTURE * PERIOD
+        after = known.remembering(history.time, experts, both[0], radius, lasting)
+        poses = tuple(p for p in memory.poses if p[0] > history.time - lasting - 0.5 * PERIOD)
+        return forecast, PredictorMemory(after, (*poses, (history.time, both[0, 0])))
+
+    def _arms(self, arms: ArmTokens, intent: FloatArray) -> _Arms:
+        """Returns the network's predictions of both arms with intents (2,)."""
+        weights = self.networks.motion
+        z = network.context(weights, arms.tokens, intent)
+        linear = self.networks.linear.displacement(arms.joints[:, :, :3])
+        now = arms.joints[:, -1:, :3]
+        mean = now + linear + network.residual(weights, z)
+        scale = network.error_scale(weights, z)
+        latent = diffusion.samples(weights, z)
+        motion = diffusion.motion_of(weights, latent) * scale[:, None, 1:, :, None]
+        motion = np.concatenate([np.zeros_like(motion[:, :, :1]), motion], axis=2)
+        radius = scale * weights["region.factor"]
+        return _Arms(mean, radius, mean[:, None] + motion)
+
+    @staticmethod
+    def _pose_at(memory: PredictorMemory, time: float) -> FloatArray | None:
+        """Returns (1,6,3) the joints of an earlier forecast at `time`, s; None if there is none."""
+        for at, pose in memory.poses:
+            if abs(at - time) < 0.5 * PERIOD:
+                return pose[None]
+        return None
+
+
+def history_tail(joints: FloatArray) -> FloatArray:
+    """Returns the newest samples (5,6,3), m, of a history (T,6,3)."""
+    return joints[-5:]
+
+
+def _windows(joints: FloatArray, seen: BoolArray, sleeves: FloatArray) -> Windows:
+    shown = np.all(np.isfinite(sleeves), axis=3)
+    return Windows(joints, seen, np.where(shown[..., None], sleeves, 0.0), shown, PERIOD)
+
+
+def _in_world(frames: ArmFrames, points: FloatArray) -> FloatArray:
+    """Returns (F+1,6,3), m, world, of points (2,F+1,3,3) in the frames of left and right arm."""
+    world = frames.world(points)
+    return np.concatenate([world[0], world[1]], axis=1)
