@@ -22,7 +22,7 @@ from drake_dress.side_by_side import completed
 from drake_dress.worker_pool import WorkerPool
 
 COMMAND = "dataset"  # for messages on `--ray`
-_TOGETHER = 2  # sequences that a process makes at a time; they take about a second
+_TOGETHER = 2  # sequences that a process makes at a time; they take a second or two
 _LOOK = 0.2  # s, period of checking for a signal that ends the work
 
 
