@@ -45,7 +45,7 @@ from drake_dress.learning.motion.motion_file import (
     read_motion_file,
     write_motion,
 )
-from drake_dress.learning.motion.sequence import KINDS, PERIOD, Kind
+from drake_dress.learning.motion.sequence import COUNT, KINDS, PERIOD, Kind
 
 _Tell = Callable[[int, str], None]
 
@@ -151,6 +151,7 @@ def _kept(out: Path, wanted: Wanted) -> set[str]:
             continue
         of_set = Origin(found.origin.kind, wanted.seed, found.origin.first, __version__)
         check_origin(path, found.origin, of_set if expected is None else expected)
+        _check_samples(path, found)
         if expected is None or len(found.data) > lengths[path.name]:
             message = f"is of a larger set than {wanted.sizes}"
             what_to_do = "ask for as many, use another --out, or remove the file"
@@ -158,6 +159,19 @@ def _kept(out: Path, wanted: Wanted) -> set[str]:
         if len(found.data) == lengths[path.name]:
             kept.add(path.name)
     return kept
+
+
+def _check_samples(path: Path, found: MotionFile) -> None:
+    """Checks that sequences have the present length: a version in development may have changed it.
+
+    Raises:
+        UserError: They have another one.
+    """
+    samples = found.data.joint_position.shape[1]
+    if found.origin.kind != DRESSING and samples != COUNT:
+        message = f"has {samples} samples a sequence, expected {COUNT}"
+        what_to_do = "use another --out, or remove the file"
+        raise UserError(str(path), "time", f"{message}; {what_to_do}")
 
 
 def _make_sequences(

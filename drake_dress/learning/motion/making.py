@@ -7,7 +7,9 @@ nor on their order.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import wait
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from drake_dress.cluster import completed_on
@@ -20,7 +22,8 @@ from drake_dress.side_by_side import completed
 from drake_dress.worker_pool import WorkerPool
 
 COMMAND = "dataset"  # for messages on `--ray`
-_TOGETHER = 5  # sequences that a process makes at a time; they take about two seconds
+_TOGETHER = 2  # sequences that a process makes at a time; they take a second or two
+_LOOK = 0.2  # s, period of checking for a signal that ends the work
 
 
 @dataclass(frozen=True)
@@ -106,9 +109,21 @@ def _results(
     elif parts:
         jobs = min(place.jobs, len(parts))
         with WorkerPool(jobs) as pool:
-            yield from completed(
-                lambda part: answers([pool.submit(make_block, part)])[0], parts, jobs, stop
-            )
+            for part, arrays in completed(partial(_made_in, pool, stop), parts, jobs, stop):
+                if arrays is not None:
+                    yield part, arrays
+
+
+def _made_in(pool: WorkerPool, stop: Interrupt, part: Block) -> MotionArrays | None:
+    """Returns the sequences of a block; once `stop` is set, ends the processes and returns None."""
+    future = pool.submit(make_block, part)
+    while not wait([future], _LOOK).done and not stop.is_set():
+        pass
+    if stop.is_set():
+        pool.kill()
+        return None
+    arrays: MotionArrays = answers([future])[0]
+    return arrays
 
 
 def _made_on_node(block: Block, _folder: Path) -> MotionArrays:

@@ -132,6 +132,14 @@ def test_a_file_of_another_version_or_program_is_refused(whole: Path, tmp_path: 
         write_motion_set(tmp_path, WANTED, HERE)
 
 
+def test_sequences_of_another_length_are_refused(whole: Path, tmp_path: Path) -> None:
+    path = copied(whole, tmp_path) / "motion-passive-00000.h5"
+    origin = Origin("passive", 4, 0, __version__)
+    write_motion(path, MotionFile(origin, made_up(2, COUNT - 1), {}))
+    with pytest.raises(UserError, match=f"has {COUNT - 1} samples a sequence, expected {COUNT}"):
+        write_motion_set(tmp_path, WANTED, HERE)
+
+
 def test_what_is_done_before_a_signal_is_kept(
     whole: Path,
     tmp_path: Path,

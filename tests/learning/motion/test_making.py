@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -17,8 +19,8 @@ BLOCKS = [Block("free", 1, 0, 6), Block("free", 1, 6, 2)]
 
 
 def test_a_block_is_split_without_gaps() -> None:
-    parts = Block("free", 1, 50, 12).split()
-    assert [(p.first, p.count) for p in parts] == [(50, 5), (55, 5), (60, 2)]
+    parts = Block("free", 1, 50, 5).split()
+    assert [(p.first, p.count) for p in parts] == [(50, 2), (52, 2), (54, 1)]
 
 
 def test_the_number_of_processes_does_not_change_the_sequences() -> None:
@@ -36,7 +38,7 @@ def test_the_number_of_processes_does_not_change_the_sequences() -> None:
 def test_sequences_are_counted_as_they_are_made() -> None:
     counted: list[int] = []
     list(made(BLOCKS, Workplace(1), Interrupt(), counted.append))
-    assert sorted(counted) == [1, 2, 5]
+    assert sorted(counted) == [2, 2, 2, 2]
 
 
 def test_a_cluster_makes_the_same_sequences(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,6 +74,15 @@ def test_after_a_signal_no_more_work_begins(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(making, "make_block", made_once)
     assert not list(made(BLOCKS, Workplace(1), stop))
     assert len(begun) <= 2
+
+
+def test_a_signal_ends_the_processes_at_once() -> None:
+    stop = Interrupt()
+    started = time.monotonic()
+    threading.Timer(2.0, stop.set).start()
+    # a minute of work
+    assert not list(made([Block("passive", 1, 0, 300)], Workplace(2), stop))
+    assert time.monotonic() - started < 30.0
 
 
 def test_nothing_is_made_of_nothing() -> None:
