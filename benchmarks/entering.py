@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cloth.table import Table
+from benchmarks.garment_prediction import SEEN, Moment, read_run
 from benchmarks.logged import logged_policy, opened
-from benchmarks.prediction import SEEN, Moment, read_run
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.person_model import person_obstacles

@@ -1,8 +1,6 @@
-"""The seeds of a study: given ones, or ones drawn for a purpose.
+"""The seeds of a study: given ones, or ones drawn for a purpose (`drake_dress/seeds.py`).
 
-Seeds 0 to 99 are for development, 100 to 999 for choosing between variants, 1000 and above for
-reporting. Reported figures must come from seeds that nobody has looked at. Therefore, they are
-drawn; the root of the draw is printed, so that it can be repeated.
+The root of a draw is printed, so that it can be repeated.
 """
 
 from __future__ import annotations
@@ -12,13 +10,11 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from benchmarks.kept import seed_range
 from benchmarks.parser import seed_number
 from drake_dress.errors import UserError
+from drake_dress.seeds import PURPOSES, drawn_seeds
 
-PURPOSES = {"develop": range(100), "choose": range(100, 1000), "report": range(1000, 2**31)}
 _ROOTS = 10**6
 
 
@@ -35,12 +31,7 @@ def draw_seeds(draw: Draw, root: int) -> list[int]:
 
     A larger draw with the same root contains the smaller one, so that a study can be extended.
     """
-    among = PURPOSES[draw.purpose]
-    rng = np.random.default_rng([root, among.start])
-    drawn: dict[int, None] = {}
-    while len(drawn) < draw.count:
-        drawn[int(rng.integers(among.start, among.stop))] = None
-    return sorted(drawn)
+    return sorted(drawn_seeds(draw.purpose, draw.count, root))
 
 
 def draw_of(text: str) -> Draw:

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from benchmarks.cloth.table import Table
-from benchmarks.cluster import completed_on
 from benchmarks.figures import Figure
 from benchmarks.kept import read_results, write_results
 from benchmarks.parser import at_least_one, output_file, output_folder, some_of
 from benchmarks.scenario_run import run_scenario
 from benchmarks.section import add_into_option, around, write_between
-from benchmarks.side_by_side import completed
+from drake_dress.cluster import completed_on
 from drake_dress.errors import UserError
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.report.summary import read_summary
+from drake_dress.side_by_side import completed
 
 
 class _Named(Protocol):

@@ -32,6 +32,8 @@ FAILED, UNUSABLE = 1, 2
 _PORTS = 1024, 65535
 # Simulated seconds per second; at lower rates Ctrl-C would take minutes.
 _RATES = 0.02, 1e3
+# Most sequences of a kind and most dressings: their numbers have five digits.
+_MOST_SEQUENCES, _MOST_DRESSINGS = 100_000, 10_000
 # Range of the factor on a hidden effect's strength.
 _SIZES = 1e-3, 1e3
 # Larger noise is meaningless: the size of a room, m, and a gripper's payload, N.
@@ -48,6 +50,7 @@ BENCHMARKS = {
     "killed": "files left by runs that are killed, terminated or out of disk space",
     "local": "constrained DDP compared with the exact optimum",
     "delay": "solve time of the global controller on this machine",
+    "prediction": "prediction of a person's arms and intent, beside simple predictors",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
     "repeat": "whether the same seed gives the same log bit for bit under any load",
     "mutation": "share of mutants of central modules that the tests detect",
@@ -59,6 +62,9 @@ _EXAMPLES = """examples:
   drake-dress run dummy_varied --seed 3 --out out/try
   drake-dress run my_scenario.yaml --set plant.material.friction=0.5 --no-meshcat
   drake-dress dataset measured --hide random --seed 1 --out out/lab
+  drake-dress dataset motion --out out/motion --dressings 8
+  drake-dress dataset motion --out out/motion
+  drake-dress train intent --data out/motion --out out/train
   drake-dress explain out/lab/measured.h5 --scenario measured
   drake-dress explain out/lab/measured.h5 --scenario measured --plugin my_effects.py
   drake-dress sim-station lab
@@ -152,6 +158,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_replay(verbs)
     _add_explain(verbs)
     _add_dataset(verbs)
+    _add_train(verbs)
     shipped = verbs.add_parser(
         "scenarios", help="list the built-in scenarios, which all commands accept by name"
     )
@@ -277,6 +284,11 @@ def _add_explain(verbs: _Verbs) -> None:
 def _add_dataset(verbs: _Verbs) -> None:
     dataset = verbs.add_parser("dataset", help="make data")
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
+    _add_dataset_measured(kinds)
+    _add_dataset_motion(kinds)
+
+
+def _add_dataset_measured(kinds: _Verbs) -> None:
     hidden = kinds.add_parser(
         "measured", help="synthetic measurements of a lab with a hidden effect"
     )
@@ -314,6 +326,72 @@ def _add_dataset(verbs: _Verbs) -> None:
     )
     _add_plugin(hidden)
     hidden.set_defaults(command=_dataset_measured)
+
+
+def _add_dataset_motion(kinds: _Verbs) -> None:
+    motion = kinds.add_parser(
+        "motion",
+        help="sequences of persons in moving garments, to learn motion and intent from",
+        description="Makes sequences of 20 s of persons in moving garments, and their description, "
+        "card.md. Files of the set that are there are kept, so the same command goes on after an "
+        "interruption. The result depends only on the seed and the numbers of sequences.",
+    )
+    motion.add_argument("--out", metavar="DIR", required=True)
+    motion.add_argument(
+        "--seed", type=_seed, default=0, metavar="N", help="seed of all draws; default 0"
+    )
+    for kind, count, meaning in (
+        ("passive", 2000, "persons who follow the garment"),
+        ("active", 2000, "persons who also move by will"),
+        ("free", 800, "persons without a garment"),
+    ):
+        motion.add_argument(
+            f"--{kind}",
+            type=_up_to(_MOST_SEQUENCES),
+            default=count,
+            metavar="N",
+            help=f"sequences of {meaning}; default {count}",
+        )
+    motion.add_argument(
+        "--dressings",
+        type=_up_to(_MOST_DRESSINGS),
+        default=0,
+        metavar="N",
+        help="whole dressings by the simulator, to test on; a minute or two each; default 0",
+    )
+    motion.add_argument(
+        "--jobs", type=_count, metavar="N", help="processes side by side; default: all cores"
+    )
+    motion.add_argument(
+        "--ray",
+        metavar="ADDRESS",
+        help="run on a Ray cluster: auto, its address, or local to start one here",
+    )
+    motion.set_defaults(command=_dataset_motion)
+
+
+def _add_train(verbs: _Verbs) -> None:
+    train = verbs.add_parser(
+        "train",
+        help="train the networks that predict a person",
+        description="Trains on a set of drake-dress dataset motion and writes weights and figures. "
+        "`motion` needs the weights of `intent` in the same folder. The same command goes on after "
+        "an interruption, with the same result. Uses a CUDA device if there is one.",
+    )
+    train.add_argument("network", choices=("intent", "motion"))
+    train.add_argument("--data", metavar="DIR", default="out/motion", help="default: %(default)s")
+    train.add_argument("--out", metavar="DIR", default="out/train", help="default: %(default)s")
+    train.add_argument("--seed", type=_seed, default=0, metavar="N")
+    train.add_argument(
+        "--steps", type=_count, metavar="N", help="at most so many steps of each part; for a try"
+    )
+    train.add_argument(
+        "--sleeves",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="whether the networks see the sleeves",
+    )
+    train.set_defaults(command=_train)
 
 
 def _add_plugin(verb: argparse.ArgumentParser) -> None:
@@ -425,10 +503,39 @@ def _dataset_measured(options: argparse.Namespace) -> int:
     return 0
 
 
+def _dataset_motion(options: argparse.Namespace) -> int:
+    from drake_dress.learning.motion.commands import Wanted, write_motion_set
+    from drake_dress.learning.motion.dataset import CARD, INDEX
+    from drake_dress.learning.motion.making import Workplace
+    from drake_dress.learning.motion.sequence import KINDS
+
+    out = _directory(options.out, Path(), (CARD, INDEX), [])
+    counts = {kind: getattr(options, kind) for kind in KINDS}
+    if not any(counts.values()):
+        raise UserError(
+            "--passive, --active, --free", "", "are all 0, expected 1 or more sequences"
+        )
+    wanted = Wanted(options.seed, counts, options.dressings)
+    place = Workplace(options.jobs or worker_count(), options.ray)
+    return write_motion_set(out, wanted, place)
+
+
+def _train(options: argparse.Namespace) -> int:
+    from drake_dress.learning.training.commands import FIGURES, TrainOptions, train_command
+    from drake_dress.models.human.learned.weights import INTENT, MOTION
+
+    results = (FIGURES, INTENT if options.network == "intent" else MOTION)
+    out = _directory(options.out, Path(), results, [])
+    return train_command(
+        options.network,
+        TrainOptions(Path(options.data), out, options.seed, options.steps, options.sleeves),
+    )
+
+
 def _bench(words: list[str]) -> int:
     name, arguments = next(iter(BENCHMARKS)), list(words)
     if arguments[:1] in (["-h"], ["--help"]):
-        told = "".join(f"  {each:<10}{text}\n" for each, text in BENCHMARKS.items())
+        told = "".join(f"  {each:<11}{text}\n" for each, text in BENCHMARKS.items())
         print("usage: drake-dress bench [NAME] [OPTION …]\n\nnames:\n" + told)
         print(f"{name} where none is given; the options of each: drake-dress bench NAME --help")
         print("each takes --plugin FILE.py|MODULE, too")
@@ -516,6 +623,18 @@ def _seed(text: str) -> int:
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 or more")
     return value
+
+
+def _up_to(most: int) -> Callable[[str], int]:
+    """Returns a parser of whole numbers from 0 to `most`."""
+
+    def number(text: str) -> int:
+        value = _whole(text)
+        if not 0 <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text} is out of range, expected 0 to {most}")
+        return value
+
+    return number
 
 
 def _port(text: str) -> int:

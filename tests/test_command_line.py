@@ -38,6 +38,7 @@ OUTPUTS = [
     ["sim-station", "scenarios/lab.yaml", "--out"],
     ["explain", "none.h5", "--scenario", "scenarios/measured.yaml", "--out"],
     ["dataset", "measured", "--hide", "wind", "--out"],
+    ["dataset", "motion", "--out"],
     ["calibrate", ".", "--out"],
     ["calibrate", "--print-board"],
     *([["bench", name, "--json"] for name in BENCHMARKS]),
@@ -105,6 +106,11 @@ OPTIONS = [
     ),
     *(["dataset", "measured", "--hide", "wind", "--marker-noise", bad] for bad in ("2", "-1e-3")),
     ["dataset", "measured", "--hide", "wind", "--force-noise", "1e300"],
+    *(["dataset", "motion", "--seed", bad] for bad in ("-1", "0.5")),
+    *(["dataset", "motion", "--passive", bad] for bad in ("-1", "x", "1e9")),
+    *(["dataset", "motion", "--jobs", bad] for bad in ("0", "two")),
+    ["dataset", "motion", "--passive", "0", "--active", "0", "--free", "0"],
+    ["dataset", "motion", "--ray", "nowhere"],
     *(
         ["calibrate", ".", "--board", f"7x5:0.03:0.022:{dictionary}"]
         for dictionary in ("", "ArucoDetector", "DICT_0X0_1", "_native", "DICT_")

@@ -34,8 +34,8 @@ from benchmarks.parser import (
     some_of,
 )
 from benchmarks.section import add_into_option, around, write_between
-from benchmarks.side_by_side import completed
 from drake_dress.interrupt import caught_interrupt
+from drake_dress.side_by_side import completed
 
 _NAME = "inputs"
 # Longest response time, s.

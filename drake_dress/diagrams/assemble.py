@@ -19,6 +19,7 @@ from drake_dress.diagrams.hardware_station import (
 from drake_dress.diagrams.own_parts import NOTHING, OwnParts, own_controller
 from drake_dress.diagrams.person import Person, add_person
 from drake_dress.diagrams.planning import ControlSetup
+from drake_dress.diagrams.prediction import Predictor
 from drake_dress.diagrams.sections.controller import local_setup, predictor
 from drake_dress.diagrams.sections.hardware import hardware_parameters
 from drake_dress.diagrams.setup import Garments, Setup
@@ -151,6 +152,11 @@ def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
     return robots_at_start(p, p.placement, p.measures, person)
 
 
+def person_predictor(p: Parts) -> Predictor:
+    """Returns the predictor of the person: the user's own, or the scenario's."""
+    return p.own.predictor or predictor(p.setup.scenario.controller)
+
+
 def control_setup(p: Parts, record: list[LocalProblem] | None = None) -> ControlSetup:
     """Returns the controllers of a scenario.
 
@@ -166,7 +172,7 @@ def control_setup(p: Parts, record: list[LocalProblem] | None = None) -> Control
         p.policy,
         p.setup.rates,
         p.setup.limits,
-        own.predictor or predictor(controller),
+        person_predictor(p),
         local,
         p.in_worker,
         None if own.controller is None else own_controller(own.controller),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.systems.framework import Diagram
+from pydrake.systems.framework import Diagram, OutputPort
 from pydrake.systems.primitives import Multiplexer
 
 from drake_dress.diagrams.arms import ArmSetup
@@ -76,12 +76,14 @@ class _Controllers:
         requests: system that turns plans into requested velocities.
         governor: safety governor.
         arms: controller of the arms' joints; None where grippers float.
+        forecast: port of the forecasts of the person; None where the predictor makes none.
     """
 
     mpc: GlobalMpc
     requests: Any
     governor: SafetyGovernor
     arms: ArmController | None
+    forecast: OutputPort | None = None
 
 
 def make_dressing(
@@ -117,7 +119,7 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
     governor = add_governor(w, control)
     wire_governor(w, planning.requests, governor)
     arms = command_grippers(w, control, governor)
-    return _Controllers(planning.mpc, planning.requests, governor, arms)
+    return _Controllers(planning.mpc, planning.requests, governor, arms, planning.forecast)
 
 
 def add_governor(w: Wiring, control: ControlSetup) -> SafetyGovernor:
@@ -224,8 +226,11 @@ def _add_recorder(
             rates.command_period,
             control.local is not None,
             None if arms is None else rates.plant_period,
+            has_forecast=controllers.forecast is not None,
         ),
     )
+    if controllers.forecast is not None:
+        w.builder.Connect(controllers.forecast, recorder.GetInputPort("forecast"))
     if arms is not None:
         w.connect(arms, "clearance", recorder, "clearance")
         for side in SIDES:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydrake.systems.framework import DiagramBuilder, InputPort
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from drake_dress.diagrams.prediction import Prediction, Predictor
 from drake_dress.diagrams.station import MOTION
@@ -113,10 +113,12 @@ class Planning:
     Attributes:
         mpc: the global controller.
         requests: the system with outputs `{left,right}_velocity_request` and `request_time`.
+        forecast: port of the forecasts of the person; None where the predictor makes none.
     """
 
     mpc: GlobalMpc
     requests: Any
+    forecast: OutputPort | None = None
 
 
 def add_planning(
@@ -157,7 +159,7 @@ def add_planning(
     else:
         requests = builder.AddNamedSystem("plan_follower", PlanFollower())
         builder.Connect(mpc.GetOutputPort("plan"), requests.GetInputPort("plan"))
-    return Planning(mpc, requests)
+    return Planning(mpc, requests, person.forecast)
 
 
 def _add_local_controller(

@@ -52,6 +52,11 @@ class Prediction:
     shoulders: np.ndarray
     _forecast: HumanForecast | None = field(default=None, init=False)
 
+    @property
+    def forecast(self) -> OutputPort | None:
+        """Port of the forecasts; None where the predictor makes none, or before the first view."""
+        return None if self._forecast is None else self._forecast.GetOutputPort("forecast")
+
     def view(self, name: str, time_step: float, steps: int) -> View:
         """Adds a system of that name that predicts `steps` steps of `time_step`, s."""
         if isinstance(self.predictor, PersonPredictor):

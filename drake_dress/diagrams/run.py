@@ -16,7 +16,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from drake_dress.diagrams.arms import ArmReachError
-from drake_dress.diagrams.assemble import Parts, hardware_parts, parts, wired
+from drake_dress.diagrams.assemble import (
+    Parts,
+    hardware_parts,
+    parts,
+    person_predictor,
+    wired,
+)
 from drake_dress.diagrams.dressing import Dressing
 from drake_dress.diagrams.hardware_station import (
     NoBusError,
@@ -32,6 +38,7 @@ from drake_dress.errors import UserError
 from drake_dress.file_output import RUN_FILES, claimed
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.machine import left_out_of_garbage
+from drake_dress.models.human.learned.forecast import PersonPredictor
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import STAGE_NAMES
 from drake_dress.report.measures import Measures, measure
@@ -100,7 +107,7 @@ def run_scenario(
         begin = clock.perf_counter()
         with (
             caught_interrupt() as interrupt,
-            open_run_log(out, p.setup, p.station) as writer,
+            open_run_log(out, p.setup, p.station, forecasts_of(p)) as writer,
         ):
             dressing = wired(p, writer)
             simulator = Simulator(dressing.diagram)
@@ -114,6 +121,11 @@ def run_scenario(
         wall_time = clock.perf_counter() - begin
         by = interrupt if ending.interrupted else None
         return concluded(out, wall_time, options.report, by, options.told)
+
+
+def forecasts_of(p: Parts) -> bool:
+    """Returns whether the predictor of a run forecasts the person, so that this is logged."""
+    return isinstance(person_predictor(p), PersonPredictor)
 
 
 def _parts(setup: Setup, page: Meshcat | None, in_worker: bool, own: OwnParts) -> Parts:

@@ -14,13 +14,14 @@ from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 
 
-def open_run_log(out: Path, setup: Setup, station: Station) -> RunLogWriter:
+def open_run_log(out: Path, setup: Setup, station: Station, forecast: bool = False) -> RunLogWriter:
     """Returns a log with its constant content written.
 
     Args:
         out: folder; the results of an earlier run are removed from it.
         setup: of the scenario.
         station: the logged station.
+        forecast: whether forecasts of the person are logged.
     """
     person, scenario, garments = station.person, setup.scenario, setup.garments
     return RunLogWriter(
@@ -35,6 +36,7 @@ def open_run_log(out: Path, setup: Setup, station: Station) -> RunLogWriter:
             estimate_garment=garments.belief,
             bases=arm_bases(station.robots),
             estimated=station.in_real_time,
+            forecast=forecast,
         ),
         results=RUN_FILES[1:],
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -19,6 +19,22 @@ from drake_dress.hdf5_state import Hdf5State, look_at
 from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
+
+
+class LoggedForecast(NamedTuple):
+    """What the controllers foresaw of the person, at T samples.
+
+    Attributes:
+        joint_position: (T,6,3) joints `FORECAST_AHEAD` later, m.
+        radius: (T,6) of balls about them that hold the joints with probability 0.9, m.
+        intent: (T,2) probability that the left, the right arm moves by the person's own will.
+        is_linear: (T,) 1 where a linear predictor stood in for the network, else 0.
+    """
+
+    joint_position: FloatArray
+    radius: FloatArray
+    intent: FloatArray
+    is_linear: FloatArray
 
 
 @dataclass(frozen=True)
@@ -228,6 +244,16 @@ class RunLog:
         if "/human/intent" not in self.file:
             return None
         return np.asarray(self.file["/human/intent"], dtype=np.int64)
+
+    @cached_property
+    def forecast(self) -> LoggedForecast | None:
+        """What the controllers foresaw of the person; None if not logged."""
+        names = {f: f"/forecast/human/{f}" for f in LoggedForecast._fields}
+        if any(name not in self.file for name in names.values()):
+            return None
+        return LoggedForecast(
+            **{f: np.asarray(self.file[name], dtype=np.float64) for f, name in names.items()}
+        )
 
     @cached_property
     def gripper_position(self) -> dict[str, FloatArray]:

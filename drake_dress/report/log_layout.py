@@ -17,6 +17,7 @@ from drake_dress.report.log_schema import (
     ARM_SERIES,
     CLEARANCES,
     COMPLETE,
+    FORECAST_AHEAD,
     INTENT_NAMES,
     JOINT_NAMES,
     LOOPS,
@@ -44,6 +45,7 @@ class LogContent:
         bases: X_WB (4,4) of each arm, if samples have arms.
         estimated: Whether garment and person are estimates because the truth is not known; contact
             and the person's intent are not logged then.
+        forecast: Whether the controllers' predictor forecasts the person, so that this is logged.
     """
 
     garment: GarmentMesh
@@ -56,6 +58,7 @@ class LogContent:
     estimate_garment: GarmentMesh | None = None
     bases: Mapping[Side, npt.ArrayLike] | None = None
     estimated: bool = False
+    forecast: bool = False
 
 
 def begin_log(file: h5py.File, content: LogContent) -> dict[str, h5py.Dataset]:
@@ -145,9 +148,11 @@ class _Layout:
         self.series[name] = dataset
         return dataset
 
-    def joints(self, name: str, joint_names: Sequence[str]) -> None:
+    def joints(self, name: str, joint_names: Sequence[str]) -> h5py.Dataset:
         """Adds a series of the person's six joints."""
-        self.add(name, (6, 3), "m", "world", dtype="f8").attrs["names"] = list(joint_names)
+        dataset = self.add(name, (6, 3), "m", "world", dtype="f8")
+        dataset.attrs["names"] = list(joint_names)
+        return dataset
 
 
 def _write_attributes(file: h5py.File, content: LogContent) -> None:
@@ -172,6 +177,15 @@ def _add_garment_and_person(layout: _Layout, content: LogContent) -> None:
         intent.attrs["names"] = list(SIDES)
         intent.attrs["values"] = list(INTENT_NAMES)
     layout.joints("/human/joint_position", content.joint_names)
+    if content.forecast:
+        soon = layout.joints("/forecast/human/joint_position", content.joint_names)
+        radius = layout.add("/forecast/human/radius", (6,), "m")
+        for dataset in (soon, radius):
+            dataset.attrs["ahead"] = FORECAST_AHEAD
+        radius.attrs["names"] = list(content.joint_names)
+        intent = layout.add("/forecast/human/intent", (2,), "1")
+        intent.attrs["names"] = list(SIDES)
+        layout.add("/forecast/human/is_linear", (), "1", dtype="i1")
 
 
 def _add_dressing(layout: _Layout) -> None:

@@ -34,8 +34,10 @@ ARM_SERIES = (
     ("torque_peak", "N m"),
 )
 STAGE_NAMES = ("prepare", "dress", "done")
+# How far ahead of a sample the logged forecast of the person is, s.
+FORECAST_AHEAD = 1.0
 INTENT_NAMES = (
-    "passive: the arm rests or follows the garment",
+    "passive: the arm rests, is held, or follows the garment",
     "active: it moves by the person's own will: it reaches, withdraws, returns, waves, "
     "or the body turns",
 )
@@ -60,6 +62,10 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
     "/human/capsule_b": ("T", "c", 3),
     "/human/capsule_radius": ("c",),
     "/human/intent": ("T", 2),
+    "/forecast/human/joint_position": ("T", 6, 3),
+    "/forecast/human/radius": ("T", 6),
+    "/forecast/human/intent": ("T", 2),
+    "/forecast/human/is_linear": ("T",),
     "/control/safety": ("T", 2),
     "/control/global/solve_time": ("T",),
     "/control/local/solve_time": ("T",),

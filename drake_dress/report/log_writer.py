@@ -77,6 +77,23 @@ class ArmSample:
 
 
 @dataclass(frozen=True)
+class ForecastSample:
+    """What the controllers foresee of the person at one time.
+
+    Attributes:
+        joint_position: (6,3) joints `FORECAST_AHEAD` later, m.
+        radius: (6,) of balls about them that hold the joints with probability 0.9, m.
+        intent: (2,) probability that the left, the right arm moves by the person's own will.
+        is_linear: 1 if a linear predictor stood in for the network, else 0.
+    """
+
+    joint_position: npt.ArrayLike
+    radius: npt.ArrayLike
+    intent: npt.ArrayLike
+    is_linear: int
+
+
+@dataclass(frozen=True)
 class Sample:
     """Logged data of one time. Positions in the world frame, SI units.
 
@@ -103,6 +120,7 @@ class Sample:
             left, right.
         intent: (2,) 0 the arm rests or follows the garment, 1 it moves by the person's own will;
             left, right; None if not known.
+        forecast: What the controllers foresee; None if they do not.
     """
 
     time: float
@@ -126,6 +144,7 @@ class Sample:
     arms: Mapping[Side, ArmSample] | None = None
     clearance: npt.ArrayLike | None = None
     intent: npt.ArrayLike | None = None
+    forecast: ForecastSample | None = None
 
 
 class RunLogWriter:
@@ -335,6 +354,8 @@ class RunLogWriter:
             "/human/capsule_a": sample.capsule_a,
             "/human/capsule_b": sample.capsule_b,
         }
+        if sample.forecast is not None:
+            optional |= {f"/forecast/human/{k}": v for k, v in vars(sample.forecast).items()}
         for name, array in optional.items():
             if name in self._shapes:
                 # not the dataset's shape: reading it would wait for the thread that writes

@@ -68,7 +68,9 @@ class _Solve:
         radius: np.ndarray | None = None,
     ) -> _Finished:
         begin = clock.perf_counter()
-        state, decision = self.policy.decide(memory, x, v, joints, now, steps, radius)
+        # a policy from before there were radii takes none
+        more = () if radius is None else (radius,)
+        state, decision = self.policy.decide(memory, x, v, joints, now, steps, *more)
         return _Finished(decision, state, joints, clock.perf_counter() - begin)
 
 

@@ -15,9 +15,11 @@ from drake_dress.models.dressing.linking import arm_linking_number, torso_interi
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import Capsule
+from drake_dress.models.human.learned.forecast import Forecast
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arm_extremes import ArmExtremes
-from drake_dress.report.log_writer import ArmSample, RunLogWriter, Sample
+from drake_dress.report.log_schema import FORECAST_AHEAD
+from drake_dress.report.log_writer import ArmSample, ForecastSample, RunLogWriter, Sample
 from drake_dress.systems.body_frames import world_points
 
 # Ports of an arm, in the order of `ArmSample`.
@@ -56,6 +58,7 @@ class RunRecorder(LeafSystem):
         - right_arm_command
         - right_arm_torque
         - clearance
+        - forecast
         - active
 
     Sizes and units are those of the ports of station and controllers. A sample combines the flags
@@ -64,8 +67,8 @@ class RunRecorder(LeafSystem):
     arms. A sample holds the least clearance since the previous sample, and the extremes of joint
     positions, speeds and torques, observed every `arm_period`. contact, contact_force, body_poses
     and intent exist only if the truth is known; stage, solve_time, verdict and clearance only with
-    controllers. If active (1,) is connected, samples are taken only while it is positive, and time
-    counts from the first sample.
+    controllers; forecast, a `Forecast`, only with `has_forecast`. If active (1,) is connected,
+    samples are taken only while it is positive, and time counts from the first sample.
 
     Args:
         writer: The open log.
@@ -78,6 +81,7 @@ class RunRecorder(LeafSystem):
         has_local: Whether there is a local controller.
         arm_period: Time between observations of the arms, s; None without arms.
         has_control: Whether there are controllers.
+        has_forecast: Whether their predictor forecasts the person.
     """
 
     def __init__(
@@ -91,6 +95,7 @@ class RunRecorder(LeafSystem):
         has_local: bool = False,
         arm_period: float | None = None,
         has_control: bool = True,
+        has_forecast: bool = False,
     ) -> None:
         super().__init__()
         self._writer = writer
@@ -99,7 +104,7 @@ class RunRecorder(LeafSystem):
         shapes = [] if isinstance(capsules, PersonModel) else list(capsules)
         self._bodies = [body for body, _ in shapes]
         self._capsule_ends = [np.array([getattr(c, e) for _, c in shapes]) for e in ("a_B", "b_B")]
-        self._has_control = has_control
+        self._has_control, self._has_forecast = has_control, has_forecast
         self._begun: float | None = None
         self._heard = False
         self._signs = [loop_orientation(mesh, side) for side in SIDES]
@@ -141,6 +146,8 @@ class RunRecorder(LeafSystem):
                     self.DeclareVectorInputPort(f"{side}_arm_{name}", 7)
             if self._has_control:
                 self.DeclareVectorInputPort("clearance", 3)
+        if self._has_forecast:
+            self.DeclareAbstractInputPort("forecast", Value[object](None))
         self.DeclareVectorInputPort("active", 1)
 
     def _collect(self, context: Context) -> None:
@@ -218,6 +225,19 @@ class RunRecorder(LeafSystem):
             arms=self._arms(context),
             clearance=clearance if self._has_control else None,
             intent=value("intent") if has_truth else None,
+            forecast=self._forecast(context),
+        )
+
+    def _forecast(self, context: Context) -> ForecastSample | None:
+        if not self._has_forecast:
+            return None
+        forecast: Forecast = self.GetInputPort("forecast").Eval(context)
+        soon = np.array([context.get_time() + FORECAST_AHEAD])
+        return ForecastSample(
+            forecast.mean_at(soon)[0],
+            forecast.radius_at(soon)[0],
+            forecast.intent,
+            int(forecast.is_linear),
         )
 
     def _value(self, context: Context, name: str) -> np.ndarray:

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.seeds import (
-    PURPOSES,
     Draw,
     add_seed_options,
     chosen_seeds,
@@ -18,6 +17,7 @@ from benchmarks.seeds import (
     draw_seeds,
 )
 from drake_dress.errors import UserError
+from drake_dress.seeds import PURPOSES
 
 purposes = st.sampled_from(sorted(PURPOSES))
 

@@ -76,7 +76,7 @@ def test_intent_depends_on_time_and_state() -> None:
         found.append(system.GetOutputPort("intent").Eval(context).tolist())
     assert found == [[0.0, 0.0], [1.0, 1.0], [1.0, 1.0], [0.0, 0.0]]
     right = context.get_discrete_state(1).CopyToVector()
-    reaching = replace(ArmState.of(right), want=Want.REACH)
+    reaching = replace(ArmState.of(right), want=Want.REACH, rate=np.full(4, 0.5))
     context.SetDiscreteState(1, reaching.flat())
     np.testing.assert_array_equal(system.GetOutputPort("intent").Eval(context), [0.0, 1.0])
 

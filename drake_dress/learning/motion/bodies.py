@@ -15,21 +15,27 @@ from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.body import BodyMeasures, Posture
 from drake_dress.models.sides import SIDES
 
-# Stature of adults and of tall children over that of the preset, and each measure's own variation.
+_SITTING = 0.35  # share of persons who sit
+# Stature of adults and of tall children over that of the preset. Each measure varies besides:
+# standard deviation, and the number of these at which it is cut off.
 _STATURE = 0.78, 1.18
-_MEASURE = 0.07
+_MEASURE, _OUTLIERS = 0.07, 2.5
 # Comfortable poses, rad: abduction, extension, rotation, elbow; arms that hang, that are held back
 # or forward, or that lie in the lap.
 _LOW = np.array([-0.05, -0.7, -0.6, 0.0])
 _HIGH = np.array([0.7, 0.9, 0.6, 1.7])
-# Ranges of an adult's joints, rad, and how far a person's own limits lie inside, as a share.
+_UNLIKE = 0.15  # standard deviation of differences between left and right, rad
+# Ranges of an adult's joints, rad, and the largest share of each that a stiffer person lacks.
 _LIMITS = np.array([[-0.6, -2.6, -1.4, 0.0], [2.6, 1.2, 1.4, 2.5]])
 _STIFFER = 0.15
+_ELBOW = 3
+# Relative effort of moving each joint, and the standard deviation of its logarithm: a shoulder
+# carries the whole arm.
+_EFFORT, _EFFORT_SPREAD = np.array([1.0, 1.0, 0.6, 0.4]), 0.4
+# Size of a coat over that of the preset, and each measure's own largest variation.
 _COAT_SCALE, _COAT_MEASURE = (0.85, 1.15), 0.06
-# Spacing at which a drawn coat's reach is measured, m, and attempts to draw measures that fit.
-_SPACING, _ATTEMPTS = 0.06, 20
-# Standard deviation of differences between left and right in a comfortable pose, rad.
-_UNLIKE = 0.15
+_SPACING = 0.06  # m, of the mesh on which a coat's reach is measured
+_ATTEMPTS = 20  # to draw measures that fit each other
 
 
 @dataclass(frozen=True)
@@ -59,14 +65,15 @@ class DrawnPerson:
 
 def draw_person(rng: np.random.Generator) -> DrawnPerson:
     """Returns a person with drawn measures, posture, pose and joints."""
-    posture: Posture = "sitting" if rng.random() < 0.35 else "standing"
+    posture: Posture = "sitting" if rng.random() < _SITTING else "standing"
     low, high = _LIMITS
-    inside = _STIFFER * rng.random(4) * (high - low)
-    limits = np.stack([np.stack([low + 0.5 * inside, high - 0.5 * inside])] * 2)
-    limits[:, 0, 3] = 0.0
+    lacking = _STIFFER * rng.random(4) * (high - low)
+    limits = np.stack([np.stack([low + 0.5 * lacking, high - 0.5 * lacking])] * 2)
+    # all elbows can be straight
+    limits[:, 0, _ELBOW] = 0.0
     both = rng.uniform(_LOW, _HIGH)
     comfort = np.clip(both + _UNLIKE * rng.normal(size=(2, 4)), limits[:, 0], limits[:, 1])
-    effort = np.array([1.0, 1.0, 0.6, 0.4]) * np.exp(0.4 * rng.normal(size=4))
+    effort = _EFFORT * np.exp(_EFFORT_SPREAD * rng.normal(size=4))
     return DrawnPerson(_draw_measures(rng), posture, comfort, limits, effort)
 
 
@@ -84,6 +91,7 @@ def draw_reach(rng: np.random.Generator) -> Reach:
         try:
             return reach(make_coat(replace(preset, **drawn), _SPACING))
         except UserError:
+            # measures that make no coat
             continue
     return reach(make_coat(COATS["jacket"], _SPACING))
 
@@ -93,8 +101,9 @@ def _draw_measures(rng: np.random.Generator) -> BodyMeasures:
         scale = rng.uniform(*_STATURE)
         values = {}
         for entry in fields(BodyMeasures):
+            # a body that is a tenth larger in all lengths weighs a third more
             whole = scale**3 if entry.name.endswith("mass") else scale
-            own = 1.0 + _MEASURE * float(np.clip(rng.normal(), -2.5, 2.5))
+            own = 1.0 + _MEASURE * float(np.clip(rng.normal(), -_OUTLIERS, _OUTLIERS))
             values[entry.name] = float(getattr(BodyMeasures, entry.name)) * whole * own
         try:
             return BodyMeasures(**values)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.learning.motion.arms import INTO_SLEEVE
 from drake_dress.learning.motion.bodies import draw_reach
 from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axis_of
+from drake_dress.learning.motion.movements import Armhole
 from drake_dress.learning.motion.moving_person import MovingPerson
 from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
-from drake_dress.learning.motion.torso import draw_lean, draw_turn
+from drake_dress.learning.motion.torso import draw_turn
+from drake_dress.learning.motion.will import Will
 from drake_dress.models.arrays import FloatArray
 
 _SUBSTEPS = round(STEP / PERIOD)
@@ -17,7 +18,7 @@ _SUBSTEPS = round(STEP / PERIOD)
 _FIRST = 4.0
 # Share of active persons who reach for the armhole, and the distance at which they do, m.
 _HELPERS, _HELPS = 0.75, (0.15, 0.40)
-_TURNS_A_SECOND = 0.04
+_TURNS = 0.04  # 1/s, how often the body turns
 _LEANS = 0.35  # share of movements that the torso goes along with
 _TOGETHER = 0.4  # share of movements that both arms make
 _TOUCH = 0.10  # distance at which an armhole that is not on the arm pushes the hand along, m
@@ -33,13 +34,10 @@ class DressedScene:
     """
 
     def __init__(self, active: bool, rng: np.random.Generator) -> None:
-        self._rng, self._active = rng, active
+        self._rng = rng
         of = GarmentDraw.drawn(rng, draw_reach(rng))
         self._mover = MovingPerson(rng, of.beside + rng.uniform(0.0, _LOOSER))
-        if active:
-            for arm in self._mover.arms:
-                arm.next_at = float(rng.uniform(0.0, _FIRST))
-                arm.helps_within = float(rng.uniform(*_HELPS)) if rng.random() < _HELPERS else 0.0
+        self._wills = [self._drawn_will(i) for i in (0, 1)] if active else []
         self._before, self._way = self._mover.joints(0.0), np.zeros((2, 3))
         self._sleeves = Sleeves.drawn(rng, of, self._before)
 
@@ -50,10 +48,17 @@ class DressedScene:
             time = k * PERIOD
             made.joints[k] = self._mover.trembling(time)
             made.sleeves[k] = np.hstack([sleeves.center, sleeves.direction])
-            made.intent[k], made.on[k] = self._mover.is_willed(time), sleeves.on
+            made.intent[k], made.on[k] = self._mover.intent(time), sleeves.on
             self._advance(k, time)
         _interpolate(made.sleeves)
         return made
+
+    def _drawn_will(self, i: int) -> Will:
+        rng = self._rng
+        will = Will(self._mover.arms[i], self._mover.movements(i), float(rng.uniform(0.0, _FIRST)))
+        if rng.random() < _HELPERS:
+            will.helps_within = float(rng.uniform(*_HELPS))
+        return will
 
     def _advance(self, k: int, time: float) -> None:
         """Moves the person by one `PERIOD`, and the garment every `STEP`."""
@@ -90,30 +95,28 @@ class DressedScene:
 
     def _decide(self, time: float) -> None:
         """Begins the movements whose time has come."""
-        if not self._active:
+        if not self._wills:
             return
-        rng, torso, arms = self._rng, self._mover.torso, self._mover.arms
-        if not torso.is_moving(time) and rng.random() < _TURNS_A_SECOND * STEP:
+        rng, torso = self._rng, self._mover.torso
+        if not torso.is_moving(time) and rng.random() < _TURNS * STEP:
             torso.strokes.append(draw_turn(rng, time))
-        for i, arm in enumerate(arms):
+        for i, will in enumerate(self._wills):
             armhole = self._armhole(i, time)
-            kind = arm.due(time, armhole)
-            if kind is None or not arm.begin(time, kind, armhole):
+            kind = will.due(time, armhole)
+            if kind is None or not will.begin(time, kind, armhole):
                 continue
-            other, both = arms[1 - i], kind != INTO_SLEEVE and rng.random() < _TOGETHER
-            if both and not other.is_willed(time):
+            other, both = self._wills[1 - i], kind != "sleeve" and rng.random() < _TOGETHER
+            if both and not other.arm.is_willed(time):
                 other.begin(time, kind, self._armhole(1 - i, time))
-            if arm.strokes and not torso.is_moving(time) and rng.random() < _LEANS:
-                end = max(s.end for s in arm.strokes)
-                way = sum((s.way for s in arm.strokes), np.zeros(3))
-                torso.strokes.append(draw_lean(rng, time, end - time, way))
+            self._mover.lean_with(will.arm, time, _LEANS)
 
-    def _armhole(self, i: int, time: float) -> tuple[FloatArray, FloatArray] | None:
+    def _armhole(self, i: int, time: float) -> Armhole | None:
+        """Returns the armhole of a sleeve that is not on its arm, in the torso's frame."""
         if self._sleeves.on[i]:
             return None
         rotation, origin = self._mover.torso.pose(time)
         center = (self._sleeves.center[i] - origin) @ rotation
-        return center, -self._sleeves.direction[i] @ rotation
+        return Armhole(center, -self._sleeves.direction[i] @ rotation)
 
 
 def _interpolate(rows: FloatArray) -> None:

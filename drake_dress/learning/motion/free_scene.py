@@ -1,4 +1,4 @@
-"""A person without a garment who moves with the whole body: walks, steps, bends, sits down, reaches.
+"""A person without a garment who moves the whole body: walks, steps, bends, sits down, reaches.
 
 Such sequences teach motion that a dressing seldom has, so that a predictor of arms is of use beside
 it, too: before the garment is near, and on persons of whom nobody knows what they do.
@@ -6,14 +6,14 @@ it, too: before the garment is near, and on persons of whom nobody knows what th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from drake_dress.learning.motion.gait import Gait
 from drake_dress.learning.motion.moving_person import MovingPerson
-from drake_dress.learning.motion.sequence import COUNT, DURATION, PERIOD, Sequence
+from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
 from drake_dress.learning.motion.strokes import Stroke, draw_stroke
-from drake_dress.learning.motion.torso import draw_lean, draw_turn
+from drake_dress.learning.motion.torso import draw_turn
+from drake_dress.learning.motion.will import Will
 from drake_dress.models.arrays import FloatArray
 
 _WALKERS = 0.35  # share of persons who walk
@@ -21,68 +21,17 @@ _WALKERS = 0.35  # share of persons who walk
 _STEPS, _BENDS, _TURNS = 0.12, 0.08, 0.08
 _REST = 1.5
 _FASTER = 0.6  # factor on the duration of movements; outside a dressing people are less careful
+# Shares of movements that both arms make, and that the torso goes along with.
 _TOGETHER, _LEANS = 0.5, 0.5
 _DECIDES = 0.1  # s
-
-
-@dataclass(frozen=True)
-class Gait:
-    """Walking in a bout: the torso travels and sways, and the arms swing.
-
-    Attributes:
-        start, end: s. speed: m/s. turning: rad/s. cadence: steps, Hz.
-        bob, sway: half amplitudes of the torso, up and sideways, m.
-        swing, bend: half amplitudes of the shoulder's and the elbow's angle, rad.
-        phase: of the first step, rad.
-    """
-
-    start: float
-    end: float
-    speed: float
-    turning: float
-    cadence: float
-    bob: float
-    sway: float
-    swing: float
-    bend: float
-    phase: float
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Gait:
-        """Returns a bout of walking that begins and ends within a sequence or around it."""
-        start = rng.uniform(-3.0, 0.6 * DURATION)
-        speed = rng.uniform(0.3, 1.5)
-        return cls(
-            float(start),
-            float(start + rng.uniform(2.0, 12.0)),
-            float(speed),
-            float(0.25 * rng.normal()),
-            float(rng.uniform(1.4, 2.1)),
-            float(rng.uniform(0.005, 0.03)),
-            float(rng.uniform(0.01, 0.04)),
-            float(rng.uniform(0.05, 0.4) * speed),
-            float(rng.uniform(0.0, 0.3)),
-            float(rng.uniform(0.0, 2.0 * np.pi)),
-        )
-
-    def share(self, time: float) -> float:
-        """Returns the share of its speed that it has at `time`: it begins and ends smoothly."""
-        return float(np.clip(min(time - self.start, self.end - time) / 0.6, 0.0, 1.0))
-
-    def arm_angles(self, time: float) -> FloatArray:
-        """Returns (2,4) angles that the arms swing by, rad."""
-        wave = self.share(time) * np.sin(np.pi * self.cadence * time + self.phase)
-        swing = np.zeros((2, 4))
-        swing[0, 1], swing[1, 1] = self.swing * wave, -self.swing * wave
-        swing[:, 3] = 0.5 * self.bend * self.share(time) + 0.5 * self.bend * np.array([-wave, wave])
-        swing[:, 3] = np.maximum(swing[:, 3], 0.0)
-        return swing
-
-    def sway_of(self, time: float) -> FloatArray:
-        """Returns the torso's offset (3,), m: sideways and up."""
-        angle = np.pi * self.cadence * time + self.phase
-        share = self.share(time)
-        return share * np.array([0.0, self.sway * np.cos(angle), self.bob * np.cos(2.0 * angle)])
+# A step: its length, m, the standard deviation of the turn with it, rad, its mean speed, m/s, and
+# its least duration, s.
+_STEP, _STEP_TURN, _STEP_SPEED, _SHORTEST_STEP = (0.1, 0.9), 0.3, (0.25, 0.9), 0.5
+# A bend, squat or sitting down: way down as a share of the leg, way forward, m, pitch, rad,
+# duration of each half, s, the share of persons who stay down, and mean time until the others
+# rise, s.
+_DOWN, _FORWARD, _PITCH, _BEND_TIME = (0.0, 0.5), (-0.25, 0.1), (0.0, 1.0), (0.7, 2.2)
+_STAY_DOWN, _DOWN_TIME = 0.3, 1.0
 
 
 class FreeScene:
@@ -97,8 +46,10 @@ class FreeScene:
         self._mover = MovingPerson(rng)
         self._gait = Gait.drawn(rng) if rng.random() < _WALKERS else None
         self._place, self._heading = np.zeros(2), self._mover.torso.yaw
-        for arm in self._mover.arms:
-            arm.next_at = float(rng.exponential(_REST))
+        self._wills = [
+            Will(arm, self._mover.movements(i), float(rng.exponential(_REST)))
+            for i, arm in enumerate(self._mover.arms)
+        ]
 
     def run(self) -> Sequence:
         """Moves for the whole duration; returns the samples."""
@@ -108,7 +59,7 @@ class FreeScene:
             gait = self._gait
             swing = None if gait is None else gait.arm_angles(time)
             made.joints[k] = self._walked(mover.trembling(time, swing), time)
-            made.intent[k] = mover.is_willed(time) | (gait is not None and gait.share(time) > 0.0)
+            made.intent[k] = mover.intent(time) | (gait is not None and gait.share(time) > 0.0)
             if k % round(_DECIDES / PERIOD) == 0:
                 self._decide(time)
             for arm in mover.arms:
@@ -120,6 +71,7 @@ class FreeScene:
         return made
 
     def _walk(self, time: float) -> None:
+        """Carries the person along by one `PERIOD`."""
         if self._gait is not None:
             share = PERIOD * self._gait.share(time)
             self._heading += share * self._gait.turning
@@ -139,50 +91,56 @@ class FreeScene:
 
     def _decide(self, time: float) -> None:
         """Begins the movements whose time has come."""
-        rng, torso, arms = self._rng, self._mover.torso, self._mover.arms
-        if not torso.is_moving(time):
-            drawn = rng.random() / _DECIDES
-            if drawn < _STEPS:
-                torso.strokes.append(_step(rng, time))
-            elif drawn < _STEPS + _BENDS:
-                torso.strokes += _bend(rng, time, self._mover.person.measures.leg_length)
-            elif drawn < _STEPS + _BENDS + _TURNS:
-                torso.strokes.append(draw_turn(rng, time))
-        for i, arm in enumerate(arms):
-            kind = arm.due(time, None)
-            if kind is None or not arm.begin(time, kind, None, slower=_FASTER, rest=_REST):
+        self._decide_on_body(time)
+        for i, will in enumerate(self._wills):
+            kind = will.due(time, None)
+            if kind is None or not will.begin(time, kind, None, slower=_FASTER, rest=_REST):
                 continue
-            other = arms[1 - i]
-            if rng.random() < _TOGETHER and not other.is_willed(time):
+            other = self._wills[1 - i]
+            if self._rng.random() < _TOGETHER and not other.arm.is_willed(time):
                 other.begin(time, kind, None, slower=_FASTER, rest=_REST)
-            if arm.strokes and not torso.is_moving(time) and rng.random() < _LEANS:
-                end = max(s.end for s in arm.strokes)
-                way = sum((s.way for s in arm.strokes), np.zeros(3))
-                torso.strokes.append(draw_lean(rng, time, end - time, way))
+            self._mover.lean_with(will.arm, time, _LEANS)
+
+    def _decide_on_body(self, time: float) -> None:
+        rng, torso = self._rng, self._mover.torso
+        if torso.is_moving(time):
+            return
+        drawn = rng.random() / _DECIDES
+        if drawn < _STEPS:
+            torso.strokes.append(_step(rng, time))
+        elif drawn < _STEPS + _BENDS:
+            torso.strokes += _bend(rng, time, self._mover.person.measures.leg_length)
+        elif drawn < _STEPS + _BENDS + _TURNS:
+            torso.strokes.append(draw_turn(rng, time))
 
 
 def _step(rng: np.random.Generator, time: float) -> Stroke:
     """Returns a step or two to a place nearby."""
     way = np.zeros(6)
-    way[:2] = rng.uniform(0.1, 0.9) * _direction(rng)
-    way[3] = 0.3 * rng.normal()
-    shape = draw_stroke(rng, time, way[:3]).shape
-    duration = float(np.linalg.norm(way[:2])) / rng.uniform(0.25, 0.9)
-    return Stroke(time, max(0.5, duration), way, np.zeros(6), shape)
+    way[:2] = rng.uniform(*_STEP) * _direction(rng)
+    way[3] = _STEP_TURN * rng.normal()
+    exponents = draw_stroke(rng, time, way[:3]).exponents
+    duration = float(np.linalg.norm(way[:2])) / rng.uniform(*_STEP_SPEED)
+    return Stroke(time, max(_SHORTEST_STEP, duration), way, np.zeros(6), exponents)
 
 
 def _bend(rng: np.random.Generator, time: float, leg: float) -> list[Stroke]:
-    """Returns a bow, a squat or a sitting down, and mostly the rise after it."""
+    """Returns a bow, a squat or a sitting down, and mostly the rise after it.
+
+    Args:
+        rng: draws.
+        time: of its start, s.
+        leg: length of the leg, m.
+    """
     way = np.zeros(6)
-    way[2] = -rng.uniform(0.0, 0.5) * leg
-    way[5] = rng.uniform(0.0, 1.0)
-    way[0] = rng.uniform(-0.25, 0.1)
-    duration = rng.uniform(0.7, 2.2)
-    down = Stroke(time, duration, way, np.zeros(6), (2.0, 2.0))
-    if rng.random() < 0.3:
+    way[2] = -rng.uniform(*_DOWN) * leg
+    way[5] = rng.uniform(*_PITCH)
+    way[0] = rng.uniform(*_FORWARD)
+    down = Stroke(time, rng.uniform(*_BEND_TIME), way, np.zeros(6))
+    if rng.random() < _STAY_DOWN:
         return [down]
-    held = down.end + rng.exponential(1.0)
-    return [down, Stroke(held, rng.uniform(0.7, 2.2), -way, np.zeros(6), (2.0, 2.0))]
+    held = down.end + rng.exponential(_DOWN_TIME)
+    return [down, Stroke(held, rng.uniform(*_BEND_TIME), -way, np.zeros(6))]
 
 
 def _direction(rng: np.random.Generator) -> FloatArray:

@@ -6,7 +6,9 @@ import numpy as np
 
 from drake_dress.learning.motion.arms import Following, MovingArm
 from drake_dress.learning.motion.bodies import DrawnPerson, draw_person
-from drake_dress.learning.motion.torso import Torso
+from drake_dress.learning.motion.movements import Movements
+from drake_dress.learning.motion.strokes import PACES
+from drake_dress.learning.motion.torso import Torso, draw_lean
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.body import shoulder_joint
 from drake_dress.models.human.tremor import TremorWave, Wandering
@@ -46,15 +48,35 @@ class MovingPerson:
         self._girdle_share = _GIRDLE_SHARE * rng.random()
         self._shifted = (-1.0, np.zeros((2, 3)))
         self._tremor = self._drawn_tremor()
+        self._pace = float(np.exp(PACES * rng.normal()))
+
+    def movements(self, i: int) -> Movements:
+        """Returns what draws the movements of left (0) or right (1) arm."""
+        arm = self.arms[i]
+        return Movements(arm.arm, arm.home, arm.limits, self._rng, self._pace)
 
     def is_willed(self, time: float) -> BoolArray:
         """Returns (2,) whether each arm moves by will; while the torso does, both do."""
         moving = self.torso.is_moving(time)
         return np.array([moving or arm.is_willed(time) for arm in self.arms])
 
+    def intent(self, time: float) -> BoolArray:
+        """Returns (2,) whether will moves each arm to speak of now, by itself or with the torso."""
+        moved = self.torso.is_moved(time)
+        return np.array([moved or arm.is_moved(time) for arm in self.arms])
+
+    def lean_with(self, arm: MovingArm, time: float, share: float) -> None:
+        """Lets the torso go along with an arm's movement from `time`, s, in a `share` of cases."""
+        strokes = () if arm.movement is None else arm.movement.strokes
+        if not strokes or self.torso.is_moving(time) or self._rng.random() >= share:
+            return
+        end = max(s.end for s in strokes)
+        way = sum((s.way for s in strokes), np.zeros(3))
+        self.torso.strokes.append(draw_lean(self._rng, time, end - time, way))
+
     def joints(self, time: float) -> FloatArray:
         """Returns the joints (6,3), m, world, without tremor."""
-        return self.placed([arm.angles for arm in self.arms], time)
+        return self._placed([arm.angles for arm in self.arms], time)
 
     def trembling(self, time: float, more: FloatArray | None = None) -> FloatArray:
         """Returns the joints (6,3), m, world.
@@ -67,12 +89,13 @@ class MovingPerson:
         if self._tremor is not None:
             amplitude, waves = self._tremor
             for i, wave in enumerate(waves):
+                # about the upper arm's axis and at the elbow
                 angles[i][2:] += amplitude / self.person.measures.forearm_length * wave.value(time)
         if more is not None:
             angles = [a + b for a, b in zip(angles, more, strict=True)]
-        return self.placed(angles, time)
+        return self._placed(angles, time)
 
-    def placed(self, angles: list[FloatArray], time: float) -> FloatArray:
+    def _placed(self, angles: list[FloatArray], time: float) -> FloatArray:
         """Returns the joints (6,3), m, world, of both arms with `angles`."""
         rotation, origin = self.torso.pose(time)
         if self._shifted[0] != time:
@@ -95,10 +118,10 @@ class MovingPerson:
             p.limits[i],
             p.effort,
             Following.drawn(rng, clearance),
-            rng,
         )
 
     def _drawn_tremor(self) -> tuple[float, list[TremorWave]] | None:
+        """Returns amplitude, m, and waves of a tremor; None for a person without."""
         rng = self._rng
         if rng.random() > _TREMBLES:
             return None

@@ -13,7 +13,7 @@ from drake_dress.models.arrays import FloatArray, IndexArray
 # and with the whole body.
 Kind = Literal["passive", "active", "free"]
 KINDS: tuple[Kind, ...] = ("passive", "active", "free")
-DURATION = 10.0  # s
+DURATION = 20.0  # s
 PERIOD = 0.05  # s, between samples
 COUNT = round(DURATION / PERIOD) + 1
 
@@ -26,7 +26,8 @@ class Sequence:
         joints: (T,6,3) shoulder, elbow, hand of left, then right arm, m, world.
         sleeves: (T,2,6) centre, m, and unit direction from cuff to armhole of left and right
             armhole; NaN without a garment.
-        intent: (T,2) 1 where the arm moves by will, else 0.
+        intent: (T,2) 1 where will moves the arm, by itself or with the torso; 0 where it rests, is
+            held, or follows.
         on: (T,2) 1 where the arm is in its sleeve.
     """
 

@@ -15,13 +15,24 @@ from scipy.special import betainc
 
 from drake_dress.models.arrays import FloatArray
 
-# Exponents of a stroke's profile are drawn from this range.
-_SHAPES = 1.6, 3.2
-# Standard deviation of a path's bow, as a share of its length, and mean speeds, m/s.
+# Range of the exponents of a stroke's profile: about the minimum-jerk profile and steeper ones.
+_EXPONENTS = 1.6, 3.2
+# Standard deviation of a path's bow, as a share of its length: hand paths are nearly straight.
 _BOW = 0.06
-_MEAN_SPEED, _SPEED_SPREAD = 0.22, 0.5
-_SHORTEST, _LONGEST = 0.35, 3.5  # s
-_FASTEST = 0.9  # mean, m/s
+# Duration of a stroke: s, at a length, m; it grows with this power of the length, since longer
+# movements are faster (isochrony: Viviani and McCollum 1983), and spreads from one movement of a
+# person to the next by this standard deviation of its logarithm. Calm movements, as in a dressing.
+_TYPICAL_TIME, _TYPICAL_LENGTH, _GROWTH, _SPREAD = 1.4, 0.3, 0.4, 0.12
+_FASTEST = 0.9  # m/s, largest mean speed
+_SHORTEST, _LONGEST = 0.35, 4.0  # s, duration of a stroke
+# Persons differ more from each other: standard deviation of the logarithm of their pace.
+PACES = 0.3
+# Share of its way before which a stroke has hardly begun, and that is left where it has nearly
+# ended.
+_UNSEEN = 0.02
+# Share of movements made of one stroke. Others hesitate: they stop after a share of the way, for up
+# to this time, s.
+_WITHOUT_PAUSE, _FIRST_SHARE, _LONGEST_PAUSE = 0.75, (0.25, 0.75), 0.8
 
 
 @dataclass(frozen=True)
@@ -32,14 +43,14 @@ class Stroke:
         start: s. duration: s.
         way: (k,) displacement, in any unit.
         bow: (k,) largest deviation from the straight line.
-        shape: exponents a, b of its profile.
+        exponents: a, b of its speed profile.
     """
 
     start: float
     duration: float
     way: FloatArray
     bow: FloatArray
-    shape: tuple[float, float] = (2.0, 2.0)
+    exponents: tuple[float, float] = (2.0, 2.0)
 
     @property
     def end(self) -> float:
@@ -50,14 +61,22 @@ class Stroke:
         """Returns whether the movement is in progress at `time`, s."""
         return self.start <= time < self.end
 
+    def done(self, time: float) -> float:
+        """Returns the share of its way that is done at `time`, s."""
+        u = min(1.0, max(0.0, (time - self.start) / self.duration))
+        return float(betainc(self.exponents[0] + 1.0, self.exponents[1] + 1.0, u))
+
+    def is_seen(self, time: float) -> bool:
+        """Returns whether it moves anything to speak of at `time`, s."""
+        return _UNSEEN < self.done(time) < 1.0 - _UNSEEN
+
     def position(self, time: float) -> FloatArray:
         """Returns the displacement (k,) since the start, at `time`, s."""
-        u = (time - self.start) / self.duration
-        if u <= 0.0:
+        done = self.done(time)
+        if done <= 0.0:
             return np.zeros_like(self.way)
-        if u >= 1.0:
+        if done >= 1.0:
             return self.way
-        done = float(betainc(self.shape[0] + 1.0, self.shape[1] + 1.0, u))
         placed: FloatArray = done * self.way + 4.0 * done * (1.0 - done) * self.bow
         return placed
 
@@ -65,33 +84,39 @@ class Stroke:
 def draw_stroke(
     rng: np.random.Generator, start: float, way: FloatArray, slower: float = 1.0
 ) -> Stroke:
-    """Returns a stroke by `way` (k,), m, of drawn duration, shape and bow.
+    """Returns a stroke by `way` of drawn duration, profile and bow.
 
     Args:
         rng: draws.
         start: time of its start, s.
-        way: displacement, m.
+        way: (k,) displacement, m.
         slower: factor on its duration.
     """
     length = float(np.linalg.norm(way))
-    speed = _MEAN_SPEED * float(np.exp(_SPEED_SPREAD * rng.normal()))
-    # longer movements are faster: duration grows with the root of the length beyond 0.3 m
-    duration = slower * max(np.sqrt(length * max(length, 0.3)) / speed, length / _FASTEST)
+    time = _TYPICAL_TIME * (length / _TYPICAL_LENGTH) ** _GROWTH * np.exp(_SPREAD * rng.normal())
+    duration = max(slower * time, length / _FASTEST)
     bow = _BOW * length * rng.normal(size=len(way))
     if length > 0.0:
+        # across the way
         bow = bow - way * float(bow @ way) / length**2
-    a, b = rng.uniform(*_SHAPES, 2)
+    a, b = rng.uniform(*_EXPONENTS, 2)
     return Stroke(start, float(np.clip(duration, _SHORTEST, _LONGEST)), way, bow, (a, b))
 
 
 def draw_strokes(
     rng: np.random.Generator, start: float, way: FloatArray, slower: float = 1.0
 ) -> list[Stroke]:
-    """Returns strokes that together move by `way` (k,), m: one, or two with a pause between."""
-    if rng.random() < 0.75:
+    """Returns strokes that together move by `way`: one, or two with a pause between.
+
+    Args:
+        rng: draws.
+        start: time of the first start, s.
+        way: (k,) displacement, m.
+        slower: factor on their durations.
+    """
+    if rng.random() < _WITHOUT_PAUSE:
         return [draw_stroke(rng, start, way, slower)]
-    # hesitation: it stops on the way, and goes on
-    share = rng.uniform(0.25, 0.75)
+    share = rng.uniform(*_FIRST_SHARE)
     first = draw_stroke(rng, start, share * way, slower)
-    pause = rng.uniform(0.0, 0.8)
+    pause = rng.uniform(0.0, _LONGEST_PAUSE)
     return [first, draw_stroke(rng, first.end + pause, (1.0 - share) * way, slower)]

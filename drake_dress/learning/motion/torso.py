@@ -6,17 +6,30 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drake_dress.learning.motion.strokes import Stroke, draw_stroke
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.tremor import Wandering
-from drake_dress.learning.motion.strokes import Stroke, draw_stroke
 
 # Standard deviations of quiet stance: of its sway, m, and of yaw, roll and pitch, rad.
 _SWAY = np.array([0.004, 0.003, 0.0005])
 _TILT = np.array([0.006, 0.004, 0.006])
-# Largest turn of the whole body, rad; leans, rad, and steps, m, likewise.
-_TURN, _LEAN = 1.2, 0.45
-_STEP = np.array([0.35, 0.25, 0.04])
-_TURN_SPEED = 0.35  # mean, rad/s
+# The sway of a person has a log-normal size: mean and standard deviation of its logarithm.
+_SIZE, _SIZE_SPREAD = -0.3, 0.6
+_ROOM = 1.0  # m, half the width of the square on which persons stand
+# Turn of the whole body: angle, rad; median over turns of the mean rate, rad/s, and the standard
+# deviation of its logarithm; duration, s; standard deviation of the small step with it, m.
+_TURN = 0.1, 1.2
+_TURN_RATE, _TURN_RATE_SPREAD = 0.35, 0.4
+_TURN_TIME, _TURN_STEP = (0.6, 4.0), 0.06
+# Lean with a hand: it is at most this share of the hand's way (small shares are more frequent: the
+# drawn share is raised to this power).
+_LEAN_SHARE, _LEAN_POWER = 0.6, 1.5
+# The torso's step per share of the hand's way, and the largest step, m.
+_STEP_OF_WAY, _STEP = np.array([1.0, 1.0, 0.2]), np.array([0.35, 0.25, 0.04])
+# Angles per share of the hand's way, rad/m: forward, aside, twist (standard deviation).
+_FORWARD, _ASIDE, _TWIST = 1.2, -0.6, 0.8
+# Limits of these angles, rad: people lean forward farther than back and aside.
+_MOST_FORWARD, _MOST_BACK, _MOST_ASIDE, _MOST_TWIST = 0.45, 0.3 * 0.45, 0.5 * 0.45, 0.4
 
 
 @dataclass
@@ -28,6 +41,7 @@ class Torso:
         size: factor on the sway.
         origin: (2,) place on the floor, m.
         yaw: initial heading, rad.
+        waves: of the sway, one for each of place, m, and angles, rad.
         strokes: of (6,) place, m, and angles, rad.
     """
 
@@ -44,8 +58,8 @@ class Torso:
         """Returns a torso at a drawn place, with a drawn heading and sway."""
         return cls(
             pelvis,
-            float(np.exp(0.6 * rng.normal() - 0.3)),
-            rng.uniform(-1.0, 1.0, 2),
+            float(np.exp(_SIZE_SPREAD * rng.normal() + _SIZE)),
+            rng.uniform(-_ROOM, _ROOM, 2),
             float(rng.uniform(-np.pi, np.pi)),
             [Wandering(rng) for _ in range(6)],
         )
@@ -54,31 +68,34 @@ class Torso:
         """Returns whether the person moves the torso by will at `time`, s."""
         return any(s.is_on(time) for s in self.strokes)
 
+    def is_moved(self, time: float) -> bool:
+        """Returns whether a movement by will moves the torso to speak of at `time`, s."""
+        return any(s.is_seen(time) for s in self.strokes)
+
     def pose(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Returns rotation (3,3) and origin (3,), m, of the torso's frame in the world."""
         if self._last is not None and self._last[0] == time:
+            # also right if a stroke has begun since: at its start it has not moved the torso yet
             return self._last[1:]
         wave = np.array([w.value(time) for w in self.waves])
         state = self.size * wave * np.concatenate([_SWAY, _TILT])
         for stroke in self.strokes:
             state = state + stroke.position(time)
-        turned = _about_z(self.yaw + state[3])
-        leaned = turned @ _about_x(state[4]) @ _about_y(state[5])
+        leaned = _about_z(self.yaw + state[3]) @ _about_x(state[4]) @ _about_y(state[5])
         pelvis = np.array([0.0, 0.0, self.pelvis])
         place = np.array([*self.origin, 0.0]) + _about_z(self.yaw) @ state[:3]
-        # a stroke that begins at this time has not moved it yet
         self._last = (time, leaned, place + pelvis - leaned @ pelvis)
         return self._last[1:]
 
 
 def draw_turn(rng: np.random.Generator, start: float) -> Stroke:
-    """Returns a turn of the whole body, in place or with a small step."""
-    angle = rng.uniform(0.1, _TURN) * rng.choice([-1.0, 1.0])
+    """Returns a turn of the whole body from `start`, s, in place or with a small step."""
+    angle = rng.uniform(*_TURN) * rng.choice([-1.0, 1.0])
     way = np.zeros(6)
     way[3] = angle
-    way[:2] = 0.06 * rng.normal(size=2)
-    duration = abs(angle) / (_TURN_SPEED * np.exp(0.4 * rng.normal()))
-    return Stroke(start, float(np.clip(duration, 0.6, 4.0)), way, np.zeros(6), (2.0, 2.0))
+    way[:2] = _TURN_STEP * rng.normal(size=2)
+    duration = abs(angle) / (_TURN_RATE * np.exp(_TURN_RATE_SPREAD * rng.normal()))
+    return Stroke(start, float(np.clip(duration, *_TURN_TIME)), way, np.zeros(6))
 
 
 def draw_lean(rng: np.random.Generator, start: float, duration: float, way: FloatArray) -> Stroke:
@@ -90,14 +107,14 @@ def draw_lean(rng: np.random.Generator, start: float, duration: float, way: Floa
         duration: of the hand's movement, s.
         way: (3,) of the hand in the torso's frame, m.
     """
-    share = rng.uniform(0.0, 0.6) ** 1.5
-    step = np.clip(share * way * [1.0, 1.0, 0.2], -_STEP, _STEP)
-    forward = float(np.clip(share * 1.2 * way[0], -0.3 * _LEAN, _LEAN))
-    aside = float(np.clip(-0.6 * share * way[1], -0.5 * _LEAN, 0.5 * _LEAN))
-    twist = float(np.clip(share * 0.8 * rng.normal() * way[0], -0.4, 0.4))
+    share = rng.uniform(0.0, _LEAN_SHARE) ** _LEAN_POWER
+    step = np.clip(share * way * _STEP_OF_WAY, -_STEP, _STEP)
+    forward = float(np.clip(share * _FORWARD * way[0], -_MOST_BACK, _MOST_FORWARD))
+    aside = float(np.clip(_ASIDE * share * way[1], -_MOST_ASIDE, _MOST_ASIDE))
+    twist = float(np.clip(share * _TWIST * rng.normal() * way[0], -_MOST_TWIST, _MOST_TWIST))
     turned = np.concatenate([step, [twist, aside, forward]])
-    shape = draw_stroke(rng, start, np.ones(1)).shape
-    return Stroke(start, duration, turned, np.zeros(6), shape)
+    exponents = draw_stroke(rng, start, np.ones(1)).exponents
+    return Stroke(start, duration, turned, np.zeros(6), exponents)
 
 
 def _about_x(angle: float) -> FloatArray:

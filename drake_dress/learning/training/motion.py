@@ -31,17 +31,17 @@ from drake_dress.models.human.learned.network import FUTURE, HISTORY
 
 RESIDUAL = Schedule(steps=30000, rate=2e-3, every=1000, patience=8)
 DENOISER = Schedule(steps=6000, rate=2e-3, every=500, patience=6)
-INITIALISER = Schedule(steps=5000, rate=1e-3, every=500, patience=6)
+INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
 COVERED = 0.9
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
-_BATCH, _SMALLER_BATCH, _CHUNK = 256, 128, 1500
-_LINEAR_BATCHES, _LINEAR_BATCH = 60, 1024
-# Windows of which contexts are kept for the diffusion.
-_CONTEXT_BATCHES = 240
+_BATCH, _SMALLER_BATCH, _CHUNK = 256, 64, 1500
+_LINEAR_BATCH = 1024
 _SCALE_SHARE = 0.01  # of the scale's loss in the whole
 # Share of the free sequences' error in the validation's: they move five times as far.
 _FREE_SHARE = 0.1
+_HELD_OUT_BATCHES = 12  # of validation data for the diffusion
+_OTHERS = (1, 3, 6, 10)  # places of the samples that a sample's distance is taken from
 _SEED_OF = {"linear": 1, "residual": 2, "contexts": 3, "denoiser": 4, "validation": 5}
 
 Arrays = dict[str, np.ndarray]
@@ -67,6 +67,9 @@ class MotionTraining:
         seed: of weights and batches.
         with_sleeves: whether the networks see sleeves.
         residual, denoiser, initialiser: schedules.
+        linear_batches: number of batches that the linear map is fitted to.
+        context_batches: number of batches that the diffusion learns from.
+        familiar_batches: number of batches that say what is familiar.
     """
 
     train: Sequences
@@ -77,6 +80,9 @@ class MotionTraining:
     residual: Schedule = RESIDUAL
     denoiser: Schedule = DENOISER
     initialiser: Schedule = INITIALISER
+    linear_batches: int = 60
+    context_batches: int = 240
+    familiar_batches: int = 60
 
     def run(
         self,
@@ -96,8 +102,9 @@ class MotionTraining:
         if found is None:
             return None
         weights |= found
-        contexts = self._contexts(weights, self.train, _CONTEXT_BATCHES, "contexts")
-        held_out = self._contexts(weights, self.validation["active"], 12, "validation")
+        contexts = self._contexts(weights, self.train, self.context_batches, "contexts")
+        count = min(self.context_batches, _HELD_OUT_BATCHES)
+        held_out = self._contexts(weights, self.validation["active"], count, "validation")
         weights |= diffusion.latent_basis(contexts.motion)
         for name, part in (("denoiser", self._denoiser), ("initialiser", self._initialiser)):
             found = part(weights, contexts, held_out, folder, said(name), stop)
@@ -113,7 +120,7 @@ class MotionTraining:
 
     def _linear(self) -> LinearMotion:
         fit = LinearFit(HISTORY, FUTURE)
-        for k in range(_LINEAR_BATCHES):
+        for k in range(self.linear_batches):
             seed = (self.seed, _SEED_OF["linear"], k)
             batch = self._source(self.train, seed, changed=False).drawn(_LINEAR_BATCH)
             fit.add(batch.arms.joints[:, :, :3], batch.displacement)
@@ -236,9 +243,10 @@ class MotionTraining:
             both = {k: v.to(device) for k, v in kept.items()} | dict(w)
             found = diffusion.motion_of(both, diffusion.samples(both, z))
             off = _distance(found - wanted[:, None])
-            apart = _distance(found[:, :, None] - found[:, None])
+            # each sample and a few others: all pairs would cost five times as much
+            apart = sum(_distance(found - found.roll(k, 1)).mean(1) for k in _OTHERS)
             # the energy score, which the true distribution minimises, and the best of all samples
-            score = off.mean(1) - 0.5 * apart.mean((1, 2))
+            score = off.mean(1) - 0.5 * apart / len(_OTHERS)
             return (score + off.min(1).values).mean()
 
         fixed = torch.from_numpy(held_out.z[:512]), torch.from_numpy(held_out.motion[:512])
@@ -272,7 +280,7 @@ class MotionTraining:
     def _familiar(self) -> Arrays:
         tokens = [
             self._source(self.train, (self.seed, _SEED_OF["contexts"], k, 1)).drawn(_BATCH)
-            for k in range(60)
+            for k in range(self.familiar_batches)
         ]
         return familiar_weights(np.concatenate([batch.arms.tokens for batch in tokens]))
 
@@ -312,14 +320,16 @@ def errors(
 
 
 def shortened(training: MotionTraining, steps: int) -> MotionTraining:
-    """Returns a training of at most `steps` steps a part."""
-    return replace(
-        training,
-        **{
-            name: replace(getattr(training, name), steps=steps, every=min(500, steps))
-            for name in ("residual", "denoiser", "initialiser")
-        },
-    )
+    """Returns a training of at most `steps` steps or batches a part."""
+    parts = {
+        name: replace(getattr(training, name), steps=steps, every=min(500, steps))
+        for name in ("residual", "denoiser", "initialiser")
+    }
+    counts = {
+        name: min(steps, getattr(training, name))
+        for name in ("linear_batches", "context_batches", "familiar_batches")
+    }
+    return replace(training, **parts, **counts)
 
 
 def _distance(off: torch.Tensor) -> torch.Tensor:

@@ -41,6 +41,7 @@ _BEFORE = 0.08  # that point's distance before the opening, m
 _ENTERED = 0.6  # fraction of the push beyond which the hand has entered
 _HARDER = 1.0  # 1/s, gain from the hand's path error to the rate of the target's shift
 _HARDEST = 0.10  # m, largest shift
+_MOVING = 0.03  # rad/s: an arm whose joints are slower is not seen to move
 _ARRIVED, _STILL, _STUCK = 0.003, 0.01, 0.02  # m, m/s, rad/s
 _UNPLANNED = -1.0
 _LEFTWARD = np.array([0.0, 1.0, 0.0])
@@ -164,15 +165,16 @@ class ActiveArm:
     def has_intent(self, state: ArmState, time: float) -> bool:
         """Returns whether the arm moves by the person's own will.
 
-        It does while it has a goal, while it waves, and while the body turns. Otherwise it rests or
-        follows the garment.
+        It does while it is on its way to a goal, while it waves, and while the body turns.
+        Otherwise it rests, is held where it was moved, or follows the garment.
 
         Args:
             state: current state.
             time: current time, s.
         """
         turning = any(t.is_on(time) for t in self._turns)
-        return state.want is not Want.FOLLOW or self._is_waving(time) or turning
+        moving = state.want is not Want.FOLLOW and float(np.max(np.abs(state.rate))) > _MOVING
+        return moving or self._is_waving(time) or turning
 
     def step(
         self, state: ArmState, angles: FloatArray, armhole: Armhole, time: float, step: float

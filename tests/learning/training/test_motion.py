@@ -42,9 +42,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     for name, value in {
         "_BATCH": 16,
         "_SMALLER_BATCH": 16,
-        "_LINEAR_BATCHES": 2,
         "_LINEAR_BATCH": 128,
-        "_CONTEXT_BATCHES": 8,
     }.items():
         monkeypatch.setattr(module, name, value)
     threads = torch.get_num_threads()

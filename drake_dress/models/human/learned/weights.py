@@ -16,10 +16,8 @@ from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import FAMILIAR_SHAPES
 from drake_dress.models.human.learned.intent import intent_weights
 from drake_dress.models.human.learned.network import FUTURE, HISTORY
-from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
-from drake_dress.models.human.learned.ridge import RidgePredictor
+from drake_dress.models.human.learned.predictor import Networks
 
-SHIPPED = Path(__file__).parent / "shipped"
 INTENT, MOTION = "intent.safetensors", "motion.safetensors"
 Arrays = dict[str, np.ndarray]
 
@@ -80,7 +78,7 @@ def motion_shapes() -> dict[str, tuple[int, ...]]:
 
 
 @lru_cache
-def networks(folder: Path = SHIPPED) -> Networks:
+def networks(folder: Path) -> Networks:
     """Returns the networks in a folder.
 
     Raises:
@@ -90,16 +88,6 @@ def networks(folder: Path = SHIPPED) -> Networks:
         read_weights(folder / INTENT, intent_shapes()),
         read_weights(folder / MOTION, motion_shapes()),
     )
-
-
-def learned_predictor() -> LearnedPredictor:
-    """Returns the predictor with the shipped weights."""
-    return LearnedPredictor(networks())
-
-
-def ridge_predictor() -> RidgePredictor:
-    """Returns the linear predictor with the shipped map."""
-    return RidgePredictor(networks().linear)
 
 
 def _shapes(weights: Mapping[str, np.ndarray]) -> dict[str, tuple[int, ...]]:

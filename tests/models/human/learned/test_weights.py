@@ -16,8 +16,6 @@ from safetensors.numpy import save_file
 
 from drake_dress.errors import UserError
 from drake_dress.models.human.learned import weights as module
-from drake_dress.models.human.learned.predictor import LearnedPredictor
-from drake_dress.models.human.learned.ridge import RidgePredictor
 from drake_dress.models.human.learned.weights import (
     INTENT,
     MOTION,
@@ -161,9 +159,7 @@ def test_damaged_files_are_refused_or_hold_other_numbers(
         assert all(np.isfinite(v).all() for v in found.values())
 
 
-def test_networks_of_a_folder_are_read_and_predict(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_networks_of_a_folder_are_read(tmp_path: Path) -> None:
     drawn = drawn_networks(3)
     write_weights(tmp_path / INTENT, drawn.intent, {})
     write_weights(tmp_path / MOTION, drawn.motion, {})
@@ -172,9 +168,6 @@ def test_networks_of_a_folder_are_read_and_predict(
         for name, array in getattr(drawn, part).items():
             np.testing.assert_array_equal(getattr(found, part)[name], array)
     np.testing.assert_array_equal(found.linear.map, drawn.motion["linear.map"])
-    monkeypatch.setattr(module, "networks", lambda: found)
-    assert isinstance(module.learned_predictor(), LearnedPredictor)
-    assert isinstance(module.ridge_predictor(), RidgePredictor)
 
 
 def test_drawn_weights_have_all_names_and_shapes() -> None:

@@ -1,6 +1,6 @@
 """Prediction error of the controller's garment, by time step, iterations and mesh.
 
-    python -m benchmarks.prediction out/dummy_standing-seed0/run.h5
+    python -m benchmarks.garment_prediction out/dummy_standing-seed0/run.h5
 
 From several times of a run, the controller's garment is simulated with the recorded motion of the
 grippers and the person, so that the remaining error is the garment model's own. After 1, 2 and 3 s

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.cluster import completed_on
+from drake_dress.cluster import completed_on, sent_code
 from drake_dress.errors import UserError
 from drake_dress.interrupt import Interrupt
 
@@ -92,3 +92,19 @@ def test_no_cluster_is_told_in_one_line(
     with pytest.raises(UserError, match=told):
         list(completed_on(address, Sleeper(Path("x"), 0.0), [1], Interrupt()))
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_the_error_names_the_command_that_was_given() -> None:
+    runs = completed_on("host:0", Sleeper(Path("x"), 0.0), [1], Interrupt(), command="dataset")
+    with pytest.raises(UserError) as error:
+        list(runs)
+    assert error.value.source == "dataset"
+
+
+def test_a_checkout_is_sent_and_an_installed_package_is_not(tmp_path: Path) -> None:
+    package = tmp_path / "drake_dress"
+    assert sent_code(package) == {}
+    (tmp_path / "pyproject.toml").touch()
+    assert sent_code(package)["working_dir"] == str(tmp_path)
+    # this test runs in a checkout
+    assert Path(sent_code()["working_dir"]) == Path(__file__).parents[1]

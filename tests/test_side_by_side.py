@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from benchmarks.side_by_side import completed
 from drake_dress.interrupt import Interrupt, caught_interrupt, signals_raised
+from drake_dress.side_by_side import completed
 
 
 @pytest.mark.parametrize("jobs", [1, 3])

@@ -1,0 +1,1 @@
+"""How well the person is predicted."""

@@ -1,0 +1,84 @@
+"""Where the sleeves of a coat are at the start of a sequence: in a drawn phase of a dressing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drake_dress.learning.motion.goals import unit
+from drake_dress.models.arrays import BoolArray, FloatArray
+from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.garment.geodesics import Reach
+
+# Phases of a dressing, which arms are in their sleeves, and their shares.
+_PHASES = np.array([[False, False], [True, False], [False, True], [True, True]])
+_SHARES = 0.2, 0.2, 0.2, 0.4
+_PROGRESS = 0.05, 1.9  # s of a sleeve on its arm: past the hand, before the shoulder
+# A sleeve off its arm is at this distance from the hand, m, before it and lower, in a direction
+# with this standard deviation of each component.
+_AWAY, _SPREAD, _LOWER = (0.08, 0.45), 0.7, 0.3
+_TURNED = 0.2  # standard deviation of the components of its own direction toward the hand
+_STRETCH = 0.95  # share of the coat's reach that sleeves are apart at most
+# Grippers are at this share of their reach from their armholes, above, in a direction with this
+# standard deviation of each component.
+_HELD, _HELD_SPREAD = 0.9, 0.5
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class SleeveStart:
+    """State of both sleeves and grippers at the start.
+
+    Attributes:
+        center, direction, gripper: (2,3), m, unit vectors from cuff to armhole, m.
+        on: (2,) whether each arm is in its sleeve.
+        progress: (2,) s of each sleeve on its arm; 0 off it.
+    """
+
+    center: FloatArray
+    direction: FloatArray
+    gripper: FloatArray
+    on: BoolArray
+    progress: FloatArray
+
+
+def draw_start(
+    rng: np.random.Generator, reach: Reach, axes: tuple[ArmAxis, ArmAxis]
+) -> SleeveStart:
+    """Returns a drawn start.
+
+    Args:
+        rng: draws.
+        reach: of the coat.
+        axes: of left and right arm.
+    """
+    on = _PHASES[rng.choice(len(_PHASES), p=_SHARES)].copy()
+    progress = np.where(on, rng.uniform(*_PROGRESS, 2), 0.0)
+    center, direction = np.zeros((2, 3)), np.zeros((2, 3))
+    for i, axis in enumerate(axes):
+        if on[i]:
+            center[i], direction[i] = axis.G(progress[i]), axis.D(progress[i])
+            continue
+        hand = axis.G(0.0)
+        away = unit(-axis.D(0.0) + _SPREAD * rng.normal(size=3) - _LOWER * _UP)
+        center[i] = hand + rng.uniform(*_AWAY) * away
+        direction[i] = unit(hand - center[i] + _TURNED * rng.normal(size=3))
+    _bring_within_reach(center, on, reach)
+    near = np.array(reach.to_near_gripper)[:, None]
+    above = np.stack([unit(_UP + _HELD_SPREAD * rng.normal(size=3)) for _ in (0, 1)])
+    return SleeveStart(center, direction, center + _HELD * near * above, on, progress)
+
+
+def _bring_within_reach(center: FloatArray, on: BoolArray, reach: Reach) -> None:
+    """Moves sleeves (2,3) that the coat cannot span nearer to each other, in place.
+
+    A sleeve that is off its arm goes to the other; if both are on or off, each goes half the way.
+    """
+    gap = center[1] - center[0]
+    far = float(np.linalg.norm(gap)) / (_STRETCH * reach.between_sleeves)
+    if far > 1.0:
+        free = [i for i in (0, 1) if not on[i]] or [0, 1]
+        for i in free:
+            sign = 1.0 if i == 0 else -1.0
+            center[i] += sign * gap * (1.0 - 1.0 / far) / len(free)

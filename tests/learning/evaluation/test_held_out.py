@@ -1,0 +1,67 @@
+"""Scores on held-out sequences: the area under a curve, and errors of baselines that are known."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drake_dress.learning.evaluation.held_out import area_under_curve, held_out_batches, plain
+from drake_dress.models.human.learned.linear import LinearMotion
+
+
+@dataclass
+class Moving:
+    """Two persons who move as a whole at a constant velocity."""
+
+    joint_position: Any
+    sleeve: Any
+    intent: Any
+
+
+def moving(velocity: float) -> Moving:
+    left = np.array([[0.0, 0.18, 1.4], [0.02, 0.22, 1.12], [0.1, 0.24, 0.85]])
+    pose = np.concatenate([left, left * [1.0, -1.0, 1.0]])
+    time = 0.05 * np.arange(120)
+    way = velocity * time[:, None] * np.array([1.0, 0.0, 0.0])
+    joints = np.tile(pose + way[:, None], (2, 1, 1, 1))
+    return Moving(joints, np.full((2, 120, 2, 6), np.nan), np.zeros((2, 120, 2), dtype=np.int64))
+
+
+def test_constant_velocity_is_exact_where_it_is_constant_and_still_lags() -> None:
+    batches = held_out_batches(moving(0.2), 0.0)
+    baselines = plain(LinearMotion(np.zeros((3, 19, 20))))
+    assert sum(len(b.intent) for b in batches) > 10
+    for batch in batches:
+        for name in ("last velocity", "constant velocity"):
+            off = np.linalg.norm(baselines[name](batch) - batch.displacement, axis=3)
+            assert off.max() < 1e-9
+        still = np.linalg.norm(baselines["still"](batch) - batch.displacement, axis=3)
+        way = np.broadcast_to(0.02 * np.arange(21)[:, None], still.shape)
+        np.testing.assert_allclose(still, way, atol=1e-9)
+        damped = np.linalg.norm(baselines["damped velocity"](batch) - batch.displacement, axis=3)
+        assert np.all(damped[:, 1:] < still[:, 1:])
+
+
+def test_noise_is_what_is_said() -> None:
+    batches = held_out_batches(moving(0.0), 0.01)
+    now = np.concatenate([b.displacement[:, 0] for b in batches])
+    assert np.std(now) == pytest.approx(0.01, rel=0.15)
+
+
+@given(
+    st.lists(st.tuples(st.integers(-3, 3), st.booleans()), min_size=2, max_size=40).filter(
+        lambda rows: len({true for _, true in rows}) == 2
+    )
+)
+def test_area_is_the_share_of_pairs_in_the_right_order(rows: list[tuple[int, bool]]) -> None:
+    score, true = np.array([float(s) for s, _ in rows]), np.array([t for _, t in rows])
+    gap = score[true][:, None] - score[~true][None]
+    expected = float(np.mean((gap > 0.0) + 0.5 * (gap == 0.0)))
+    assert area_under_curve(score, true) == pytest.approx(expected)
+
+
+def test_area_without_both_is_not_known() -> None:
+    assert np.isnan(area_under_curve(np.zeros(3), np.ones(3, dtype=bool)))

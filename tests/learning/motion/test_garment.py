@@ -1,0 +1,129 @@
+"""Sleeves move as the garment allows, and arms carry them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axis_of
+from drake_dress.learning.motion.goals import Goal
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.geodesics import Reach
+from drake_dress.models.human.arm import Arm
+from drake_dress.models.human.body import BodyMeasures
+from tests.learning.motion.persons import HOME
+
+REACH = Reach(0.45, (0.5, 0.5), (0.12, 0.12), 0.5)
+ARMS = [Arm(BodyMeasures(), "standing", side) for side in ("left", "right")]
+NOBODY = np.zeros(2, dtype=bool)
+
+
+def joints(angles: FloatArray = HOME) -> FloatArray:
+    return np.concatenate([arm.points(angles) for arm in ARMS])
+
+
+def sleeves(seed: int, on: tuple[bool, bool] | None = None) -> Sleeves:
+    """Returns sleeves in a phase in which these arms are in their sleeves."""
+    for attempt in range(seed, seed + 1000, 50):
+        of = GarmentDraw(REACH, 0.15, 0.03, 0.5, 0.9, 0.2)
+        drawn = Sleeves.drawn(np.random.default_rng(attempt), of, joints())
+        if on is None or tuple(drawn.on) == on:
+            return drawn
+    raise AssertionError
+
+
+def beyond(of: Sleeves) -> FloatArray:
+    """Returns the four distances that the local problem bounds, as shares of the reach."""
+    (left, right), (left_gripper, right_gripper), r = of.center, of.gripper, of.of.reach
+    ways = [left - right_gripper, right - left_gripper, left - right, left_gripper - right_gripper]
+    largest = np.array([*r.to_far_gripper, r.between_sleeves, r.between_grippers])
+    shares: FloatArray = np.linalg.norm(ways, axis=1) / largest
+    return shares
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_distances_stay_within_the_garments_reach_or_come_back_to_it(seed: int) -> None:
+    moving = sleeves(seed)
+    for k in range(40):
+        before = beyond(moving)
+        moving.advance(joints(), NOBODY, k * STEP)
+        # the bounds of the solver hold up to 0.2 %
+        assert (beyond(moving) <= np.maximum(1.0, before) + 2e-3).all()
+    # grippers that began too far apart have come back
+    assert (beyond(moving) <= np.maximum(1.0, beyond(sleeves(seed)) - 0.1)).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sleeves_keep_the_speed_of_their_grippers(seed: int) -> None:
+    moving = sleeves(seed)
+    for k in range(20):
+        gripper = moving.gripper.copy()
+        way = moving.advance(joints(), NOBODY, k * STEP)
+        fastest = moving.of.max_speed * STEP * 1.01
+        assert (np.linalg.norm(way, axis=1) <= fastest).all()
+        assert (np.linalg.norm(moving.gripper - gripper, axis=1) <= fastest).all()
+        np.testing.assert_allclose(np.linalg.norm(moving.direction, axis=1), 1.0)
+
+
+def test_a_sleeve_on_an_arm_that_moves_by_will_stays_near_its_axis() -> None:
+    moving = sleeves(0, (True, True))
+    moving.goals = [Goal("aside", moving.center[0] + [0.4, 0.0, 0.0], 99.0), None]
+    free = sleeves(0, (True, True))
+    free.goals = list(moving.goals)
+    for k in range(15):
+        moving.advance(joints(), np.array([True, True]), k * STEP)
+        free.advance(joints(), NOBODY, k * STEP)
+    axis = axis_of(joints(), 0)
+    assert axis.coordinates(moving.center[0]).l < 0.05
+    assert axis.coordinates(free.center[0]).l > 0.1
+
+
+def test_a_sleeve_is_drawn_up_an_arm() -> None:
+    moving = sleeves(0, (True, True))
+    moving.progress[:] = 0.3
+    moving.goals = [Goal("draw", moving.center[i], 99.0) for i in (0, 1)]
+    before = moving.progress.copy()
+    for k in range(30):
+        moving.advance(joints(), NOBODY, k * STEP)
+        moving.meet(joints(), joints())
+    assert moving.on.all()
+    assert (moving.progress > before + 0.2).all()
+
+
+def test_an_arm_carries_its_sleeve() -> None:
+    moving = sleeves(0, (True, True))
+    after = joints(HOME + [0.6, -0.4, 0.0, 0.5])
+    moving.meet(after, joints())
+    for i in (0, 1):
+        assert axis_of(joints(), i).coordinates(moving.center[i]).l > 0.09
+        assert axis_of(after, i).coordinates(moving.center[i]).l <= 0.09 + 1e-6
+
+
+def test_a_sleeve_goes_over_a_hand_that_is_in_it_and_comes_off_beyond_it() -> None:
+    moving = sleeves(0, (False, False))
+    hand, elbow = joints()[2], joints()[1]
+    out = (hand - elbow) / np.linalg.norm(hand - elbow)
+    moving.center[0] = hand + 0.04 * out
+    moving.center[1] = joints()[5] + 0.2
+    moving.meet(joints(), joints())
+    assert moving.on.tolist() == [True, False]
+    moving.center[0] = hand + 0.03 * out
+    moving.meet(joints(), joints())
+    assert moving.on[0]
+    moving.center[0] = hand + 0.05 * out
+    moving.meet(joints(), joints())
+    assert not moving.on[0]
+
+
+def test_grippers_follow_a_sleeve_that_an_arm_carries_away() -> None:
+    moving = sleeves(0)
+    moving.center += [0.0, 0.0, -0.5]
+    moving.meet(joints(), joints())
+    off = np.linalg.norm(moving.gripper - moving.center, axis=1)
+    assert (off <= 1.4 * 0.12 + 1e-12).all()
+
+
+def test_drawn_garments_differ_within_their_ranges() -> None:
+    drawn = [GarmentDraw.drawn(np.random.default_rng(s), REACH) for s in range(30)]
+    assert len({g.max_speed for g in drawn}) == 30
+    assert all(0.06 <= g.max_speed <= 0.22 and 0.8 <= g.share <= 1.0 for g in drawn)
