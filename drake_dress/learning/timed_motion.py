@@ -43,7 +43,7 @@ class TimedMotion:
             [observed[first:last], self.sleeves[first:last].reshape(-1, 4, 3)], axis=1
         )
         rows = Observations(self.time[first:last], points).sampled(now, sampling)
-        return PersonHistory(now, rows[:, :6], rows[:, 6:].reshape(-1, 2, 6))
+        return PersonHistory.of_points(now, rows)
 
     def joints_at(self, times: FloatArray) -> FloatArray:
         """Returns the joints (K,6,3), m, at times (K,), s: interpolated; NaN beyond the ends."""

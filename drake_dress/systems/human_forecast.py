@@ -119,7 +119,7 @@ class HumanForecast(LeafSystem):
         known = self._with_newest(context, known)
         now, sampling = context.get_time(), self._predictor.sampling
         rows = known.observations.sampled(now, sampling)
-        history = PersonHistory(now, rows[:, :_JOINTS], rows[:, _JOINTS:].reshape(len(rows), 2, 6))
+        history = PersonHistory.of_points(now, rows)
         if np.isfinite(history.joints).any():
             forecast, memory = self._predictor.forecast(history, known.memory)
             state.get_mutable_abstract_state(self._forecast).set_value(forecast)

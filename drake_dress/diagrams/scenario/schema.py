@@ -404,8 +404,8 @@ class GlobalMpc:
             prepared, m.
         waiting_progress: lowest s at which a sleeve waits for the other one.
         spread_share: share of the radius about a predicted joint, in which it is with probability
-            0.9, by which the grippers keep further away from that limb. Only the predictor
-            `learned` tells radii.
+            0.9, by which the grippers keep further away from that limb. It acts only if the
+            predictor tells radii.
         force_limit: old name of `safety.force_limit`, N. Deprecated.
     """
 

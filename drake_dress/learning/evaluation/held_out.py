@@ -22,7 +22,7 @@ from drake_dress.models.human.learned.predictor import Networks
 # Displacements (2B,F+1,3,3), m, that a baseline predicts for the arms of a batch.
 Baseline = Callable[[Batch], FloatArray]
 EVERY = 0.5  # s, between windows
-_CHUNK, _SEED = 1200, 9
+_TOGETHER, _SEED = 1200, 9
 _WINDOW = 5  # samples of a velocity
 _HORIZONS = {"1 s": 10, "2 s": 20}
 _DECAY, _FASTEST = 0.5, 1.0  # s, m/s, as the shipped constant_velocity
@@ -54,9 +54,7 @@ def held_out_batches(data: Sequences, noise: float, with_sleeves: bool = True) -
         with_sleeves: whether sleeves are seen.
     """
     source = WindowSource(data, _SEED, noise=noise, with_sleeves=with_sleeves)
-    number, time = source.grid(EVERY)
-    parts = np.array_split(np.arange(len(number)), max(1, len(number) // _CHUNK))
-    return [source.at(number[part], time[part]) for part in parts]
+    return source.every(EVERY, _TOGETHER)
 
 
 def compared(batches: Sequence[Batch], networks: Networks, more: Mapping[str, Baseline]) -> HeldOut:

@@ -9,6 +9,7 @@ import numpy as np
 from drake_dress.learning.motion.strokes import Stroke, draw_stroke
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.tremor import Wandering
+from drake_dress.models.rotation import rotation_about
 
 # Standard deviations of quiet stance: of its sway, m, and of yaw, roll and pitch, rad.
 _SWAY = np.array([0.004, 0.003, 0.0005])
@@ -81,9 +82,13 @@ class Torso:
         state = self.size * wave * np.concatenate([_SWAY, _TILT])
         for stroke in self.strokes:
             state = state + stroke.position(time)
-        leaned = _about_z(self.yaw + state[3]) @ _about_x(state[4]) @ _about_y(state[5])
+        leaned = (
+            rotation_about("z", self.yaw + state[3])
+            @ rotation_about("x", state[4])
+            @ rotation_about("y", state[5])
+        )
         pelvis = np.array([0.0, 0.0, self.pelvis])
-        place = np.array([*self.origin, 0.0]) + _about_z(self.yaw) @ state[:3]
+        place = np.array([*self.origin, 0.0]) + rotation_about("z", self.yaw) @ state[:3]
         self._last = (time, leaned, place + pelvis - leaned @ pelvis)
         return self._last[1:]
 
@@ -115,18 +120,3 @@ def draw_lean(rng: np.random.Generator, start: float, duration: float, way: Floa
     turned = np.concatenate([step, [twist, aside, forward]])
     exponents = draw_stroke(rng, start, np.ones(1)).exponents
     return Stroke(start, duration, turned, np.zeros(6), exponents)
-
-
-def _about_x(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def _about_y(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def _about_z(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -20,6 +20,7 @@ from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.tokens import ArmTokens, Windows, arm_tokens
 
 _STRIDE = PERIOD / SAMPLED
+_TOGETHER = 1500  # windows of a batch, where all of some sequences are looked at
 
 
 class Sequences(Protocol):
@@ -133,6 +134,12 @@ class WindowSource:
         times = np.arange(first[0], last[0] + 1e-9, every / SAMPLED)
         number, time = np.meshgrid(np.arange(len(self._data.joint_position)), times, indexing="ij")
         return number.ravel(), time.ravel()
+
+    def every(self, apart: float, together: int = _TOGETHER) -> list[Batch]:
+        """Returns all windows, `apart` s from each other, in batches of about `together`."""
+        number, time = self.grid(apart)
+        parts = np.array_split(np.arange(len(number)), max(1, len(number) // together))
+        return [self.at(number[part], time[part]) for part in parts]
 
     def at(self, number: IndexArray, time: FloatArray, pace: FloatArray | None = None) -> Batch:
         """Returns the windows of sequences `number` (B,) whose now is `time` (B,), in samples.

@@ -18,12 +18,12 @@ from drake_dress.errors import UserError
 from drake_dress.learning.recordings.columns import columns_of, read_table
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.human.prediction import LIMBS
 
 UPS = ("x", "-x", "y", "-y", "z", "-z")
 # Units by which files give lengths, m, and the plausible median length of a limb, m.
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "0.1 mm": 1e-4}
 _LIMBS = 0.15, 0.45
-_LIMB_PAIRS = ((0, 1), (1, 2), (3, 4), (4, 5))
 # A direction counts as down if arms hang along it by this share of their length on average.
 _HANGING = 0.3
 _FEWEST = 5  # samples with a joint
@@ -195,6 +195,6 @@ def _up(path: Path, joints: FloatArray, told: Callable[[str], None]) -> str:
 
 def _limb_lengths(joints: FloatArray) -> FloatArray:
     """Returns the lengths (k,) of all limbs whose both ends are known at a time."""
-    found = [np.linalg.norm(joints[:, b] - joints[:, a], axis=1) for a, b in _LIMB_PAIRS]
+    found = [np.linalg.norm(joints[:, b] - joints[:, a], axis=1) for a, b in LIMBS]
     every = np.concatenate(found)
     return every[np.isfinite(every)]

@@ -22,7 +22,7 @@ _BATCH = 256
 _SHORTER, _SHORTEST = 0.5, 5
 # Noise of joints in validation, m, and time between its windows, s.
 NOISE, EVERY = 0.004, 0.5
-_VALIDATION, _CHUNK = 7, 1500
+_VALIDATION = 7  # seed
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,7 @@ class IntentTraining:
 def windows_of(data: Sequences, seed: int, with_sleeves: bool = True) -> list[Batch]:
     """Returns windows of all sequences, `EVERY` s apart, with noise."""
     source = WindowSource(data, seed, noise=NOISE, with_sleeves=with_sleeves)
-    number, time = source.grid(EVERY)
-    parts = np.array_split(np.arange(len(number)), max(1, len(number) // _CHUNK))
-    return [source.at(number[part], time[part]) for part in parts]
+    return source.every(EVERY)
 
 
 def logits(weights: Mapping[str, np.ndarray], batch: Batch, steps: int) -> FloatArray:

@@ -20,7 +20,7 @@ import numpy as np
 import torch
 
 from drake_dress.learning.motion.windows import Augmentation, Batch, Sequences, WindowSource
-from drake_dress.learning.training.loop import Report, Schedule, train
+from drake_dress.learning.training.loop import Batches, Loss, Report, Schedule, train
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import familiar_weights
@@ -35,7 +35,7 @@ INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
 COVERED = 0.9
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
-_BATCH, _SMALLER_BATCH, _CHUNK = 256, 64, 1500
+_BATCH, _SMALLER_BATCH = 256, 64
 _LINEAR_BATCH = 1024
 _SCALE_SHARE = 0.01  # of the scale's loss in the whole
 # Share of the free sequences' error in the validation's: they move five times as far.
@@ -54,6 +54,17 @@ class Contexts:
 
     z: np.ndarray
     motion: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A part of the diffusion: first weights, batches, loss, held-out batch and schedule."""
+
+    first: Arrays
+    batches: Batches
+    loss: Loss
+    held_out: Any
+    schedule: Schedule
 
 
 @dataclass(frozen=True)
@@ -107,7 +118,17 @@ class MotionTraining:
         held_out = self._contexts(weights, self.validation["active"], count, "validation")
         weights |= diffusion.latent_basis(contexts.motion)
         for name, part in (("denoiser", self._denoiser), ("initialiser", self._initialiser)):
-            found = part(weights, contexts, held_out, folder, said(name), stop)
+            stage = part(weights, contexts, held_out)
+            found = train(
+                stage.first,
+                stage.batches,
+                stage.loss,
+                lambda w, stage=stage: float(stage.loss(w, stage.held_out)),  # type: ignore[misc]
+                stage.schedule,
+                _file(folder, name),
+                said(name),
+                stop,
+            )
             if found is None:
                 return None
             weights |= found
@@ -178,15 +199,7 @@ class MotionTraining:
             motion.append((batch.displacement - mean)[:, 1:] / scale[:, 1:, :, None])
         return Contexts(np.concatenate(z), np.concatenate(motion).astype(np.float32))
 
-    def _denoiser(
-        self,
-        weights: Arrays,
-        contexts: Contexts,
-        held_out: Contexts,
-        folder: Path | None,
-        report: Report,
-        stop: Callable[[], bool],
-    ) -> Arrays | None:
+    def _denoiser(self, weights: Arrays, contexts: Contexts, held_out: Contexts) -> _Stage:
         latent = diffusion.latent_of(weights, contexts.motion)
         other = diffusion.latent_of(weights, held_out.motion)
 
@@ -210,26 +223,9 @@ class MotionTraining:
 
         fixed = drawn(held_out.z, other, np.random.default_rng(self.seed))
         first = diffusion.denoiser_weights(np.random.default_rng(self.seed))
-        return train(
-            first,
-            batches,
-            loss,
-            lambda w: float(loss(w, fixed)),
-            self.denoiser,
-            _file(folder, "denoiser"),
-            report,
-            stop,
-        )
+        return _Stage(first, batches, loss, fixed, self.denoiser)
 
-    def _initialiser(
-        self,
-        weights: Arrays,
-        contexts: Contexts,
-        held_out: Contexts,
-        folder: Path | None,
-        report: Report,
-        stop: Callable[[], bool],
-    ) -> Arrays | None:
+    def _initialiser(self, weights: Arrays, contexts: Contexts, held_out: Contexts) -> _Stage:
         kept = {k: torch.from_numpy(v) for k, v in weights.items() if not k.startswith("region")}
 
         def batches(step: int) -> Any:
@@ -251,16 +247,7 @@ class MotionTraining:
 
         fixed = torch.from_numpy(held_out.z[:512]), torch.from_numpy(held_out.motion[:512])
         first = diffusion.initialiser_weights(np.random.default_rng(self.seed))
-        return train(
-            first,
-            batches,
-            loss,
-            lambda w: float(loss(w, fixed)),
-            self.initialiser,
-            _file(folder, "initialiser"),
-            report,
-            stop,
-        )
+        return _Stage(first, batches, loss, fixed, self.initialiser)
 
     def regions(self, weights: Arrays) -> Arrays:
         """Returns the factors (F+1,3) on the error's scale with which regions cover `COVERED`."""
@@ -288,9 +275,7 @@ class MotionTraining:
 def validation_windows(data: Sequences, with_sleeves: bool = True) -> list[Batch]:
     """Returns windows of all sequences, `EVERY` s apart, with noise."""
     source = WindowSource(data, _SEED_OF["validation"], noise=NOISE, with_sleeves=with_sleeves)
-    number, time = source.grid(EVERY)
-    parts = np.array_split(np.arange(len(number)), max(1, len(number) // _CHUNK))
-    return [source.at(number[part], time[part]) for part in parts]
+    return source.every(EVERY)
 
 
 def intents(weights: Mapping[str, np.ndarray], batch: Batch) -> np.ndarray:

@@ -17,6 +17,7 @@ from drake_dress.models.effects.effect import (
     parameter,
 )
 from drake_dress.models.garment.sampling import spread_out
+from drake_dress.models.rotation import rotation_about
 
 # Radius over which a local mass is spread (standard deviation), m.
 _SPREAD = 0.05
@@ -114,7 +115,9 @@ class GravityTilt(GravityEffect):
 
     def apply(self, gravity: FloatArray) -> FloatArray:
         """Returns (3,) m/s²."""
-        turned: FloatArray = _about_y(self.about_y) @ _about_x(self.about_x) @ gravity
+        turned: FloatArray = (
+            rotation_about("y", self.about_y) @ rotation_about("x", self.about_x) @ gravity
+        )
         return turned
 
     def derivative(self, name: str, gravity: FloatArray) -> FloatArray:
@@ -124,19 +127,15 @@ class GravityTilt(GravityEffect):
         if name == "about_x":
             off = np.diag([1.0, 0.0, 0.0])
             slope: FloatArray = (
-                _about_y(self.about_y) @ (_about_x(self.about_x + quarter) - off) @ gravity
+                rotation_about("y", self.about_y)
+                @ (rotation_about("x", self.about_x + quarter) - off)
+                @ gravity
             )
         else:
             off = np.diag([0.0, 1.0, 0.0])
-            slope = (_about_y(self.about_y + quarter) - off) @ _about_x(self.about_x) @ gravity
+            slope = (
+                (rotation_about("y", self.about_y + quarter) - off)
+                @ rotation_about("x", self.about_x)
+                @ gravity
+            )
         return slope
-
-
-def _about_x(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def _about_y(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

@@ -23,6 +23,7 @@ import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.rotation import rotation_about
 from drake_dress.models.sides import SIDES, Side
 
 Posture = Literal["standing", "sitting"]
@@ -198,11 +199,11 @@ def arm_rotations(side: Side, pose: ArmPose) -> tuple[FloatArray, FloatArray]:
     """Returns the orientations (3,3) of upper arm and forearm in the torso's frame."""
     sign = 1.0 if side == "left" else -1.0
     upper = (
-        _about("x", sign * pose.abduction)
-        @ _about("y", pose.extension)
-        @ _about("z", sign * pose.rotation)
+        rotation_about("x", sign * pose.abduction)
+        @ rotation_about("y", pose.extension)
+        @ rotation_about("z", sign * pose.rotation)
     )
-    return upper, upper @ _about("y", -pose.elbow_flexion)
+    return upper, upper @ rotation_about("y", -pose.elbow_flexion)
 
 
 def arm_points(
@@ -232,12 +233,3 @@ def arm_points(
     rotation, origin = X_WTorso
     in_world: FloatArray = points @ rotation.T + origin
     return in_world
-
-
-def _about(axis: str, angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    if axis == "x":
-        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]], dtype=np.float64)
-    if axis == "y":
-        return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], dtype=np.float64)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=np.float64)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from drake_dress.models.human.learned.forecast import PersonPredictor
 
 # Rows of the two joints of each limb, parent first; a limb has a fixed length.
-_LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))
+LIMBS = ((0, 1), (1, 2), (3, 4), (4, 5))
 _SHOULDERS = (0, 3)
 
 
@@ -144,7 +144,7 @@ def with_lengths(joints: FloatArray, like: FloatArray) -> FloatArray:
         middle = 0.5 * (joints[left] + joints[right])
         half = 0.5 * _resized(joints[left] - joints[right], like[left] - like[right])
         result[left], result[right] = middle + half, middle - half
-    for parent, child in _LIMBS:
+    for parent, child in LIMBS:
         if not (known[parent] and known[child]):
             continue
         limb = _resized(joints[child] - result[parent], like[child] - like[parent])

@@ -16,6 +16,7 @@ from drake_dress.models.human.learned.layers import (
     Weights,
     dense,
     dense_weights,
+    like,
     namespace,
     norm_weights,
     normalised,
@@ -60,7 +61,7 @@ def initialiser_weights(rng: np.random.Generator) -> dict[str, np.ndarray]:
 
 def noised(latent: Array, noise: Array, step: Array) -> Array:
     """Returns latents (N,L) after `step` (N,) steps of the diffusion with `noise` (N,L)."""
-    kept = _like(_KEPT, latent)[step][:, None]
+    kept = like(_KEPT, latent)[step][:, None]
     return kept**0.5 * latent + (1.0 - kept) ** 0.5 * noise
 
 
@@ -131,7 +132,7 @@ def latent_basis(motion: np.ndarray) -> dict[str, np.ndarray]:
 
 def _noise(weights: Weights, inner: Array, step: int | Array) -> Array:
     clock = _clock(step)
-    clock = _like(clock, inner)
+    clock = like(clock, inner)
     inner = swish(inner + dense(weights, "denoise.clock", clock))
     for name in ("denoise.first", "denoise.second"):
         inner = inner + swish(
@@ -145,9 +146,3 @@ def _clock(step: int | Array) -> np.ndarray:
     at = np.asarray(step, dtype=np.float64)[..., None] / NOISE_STEPS
     angle = at * np.pi * np.arange(1, _CLOCK // 2 + 1)
     return np.concatenate([np.sin(angle), np.cos(angle)], axis=-1).astype(np.float32)
-
-
-def _like(array: np.ndarray, other: Array) -> Array:
-    if isinstance(other, np.ndarray):
-        return array
-    return namespace(other).as_tensor(array, device=other.device)

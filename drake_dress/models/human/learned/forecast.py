@@ -27,6 +27,11 @@ class PersonHistory:
     joints: FloatArray
     sleeves: FloatArray
 
+    @classmethod
+    def of_points(cls, time: float, rows: FloatArray) -> PersonHistory:
+        """Returns the history of points (T,10,3), m: joints, then each sleeve's two rows."""
+        return cls(time, rows[:, :6], rows[:, 6:].reshape(-1, 2, 6))
+
 
 @dataclass(frozen=True)
 class Forecast(Immutable):

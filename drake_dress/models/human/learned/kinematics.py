@@ -12,12 +12,12 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned.arm_frame import facing
+from drake_dress.models.human.prediction import LIMBS
 
 # Lower and upper limits of abduction, extension, rotation, elbow flexion, rad: the ranges of mobile
 # adults, since nobody knows the person's own.
 LIMITS = np.array([[-1.0, -3.2, -1.9, 0.0], [3.2, 1.4, 1.9, 2.7]])
 _MIDDLE = LIMITS.mean(axis=0)
-_PAIRS = ((0, 3), (0, 1), (1, 2), (3, 4), (4, 5))
 _MIRROR = np.array([1.0, -1.0, 1.0])
 # A limit is passed by more than this before a pose is changed, rad: rounding is left alone.
 _SLACK = 1e-9
@@ -35,7 +35,7 @@ class Lengths:
         """Returns the medians over histories of joints (B,T,6,3), m, without gaps."""
         found = [
             np.median(np.linalg.norm(joints[:, :, b] - joints[:, :, a], axis=2), axis=1)
-            for a, b in _PAIRS
+            for a, b in ((0, 3), *LIMBS)
         ]
         return cls(found[0], np.stack(found[1:], axis=1))
 

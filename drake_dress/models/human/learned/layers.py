@@ -24,6 +24,13 @@ def namespace(array: Array) -> Any:
     return np if isinstance(array, np.ndarray) else sys.modules["torch"]
 
 
+def like(array: np.ndarray, other: Array) -> Array:
+    """Returns `array` as what `other` is, on its device: a NumPy array or a torch tensor."""
+    if isinstance(other, np.ndarray):
+        return array
+    return namespace(other).as_tensor(array, device=other.device)
+
+
 def dense(weights: Weights, name: str, x: Array) -> Array:
     """Returns x W + b over the last axis: (…,i) → (…,o)."""
     return x @ weights[f"{name}.weight"] + weights[f"{name}.bias"]

@@ -15,6 +15,7 @@ from drake_dress.models.human.learned.layers import (
     Weights,
     dense,
     dense_weights,
+    like,
     namespace,
     norm_weights,
     normalised,
@@ -66,14 +67,10 @@ def context(weights: Weights, tokens: Array, intent: Array) -> Array:
 def residual(weights: Weights, z: Array) -> Array:
     """Returns the displacements (N,F+1,3,3), m, that are added to the linear predictor's."""
     rows = dense(weights, "displacement", z).reshape(z.shape[0], FUTURE + 1, _JOINTS, 3)
-    return rows * _like(_GROWTH, z)[:, None, None]
+    return rows * like(_GROWTH, z)[:, None, None]
 
 
 def error_scale(weights: Weights, z: Array) -> Array:
     """Returns the expected size of the error (N,F+1,3), m, of each joint and step."""
     rows = dense(weights, "scale", z).reshape(z.shape[0], FUTURE + 1, _JOINTS)
-    return _SMALLEST + 0.1 * softplus(rows - 1.0) * _like(_GROWTH, z)[:, None]
-
-
-def _like(array: np.ndarray, z: Array) -> Array:
-    return array if isinstance(z, np.ndarray) else namespace(z).as_tensor(array, device=z.device)
+    return _SMALLEST + 0.1 * softplus(rows - 1.0) * like(_GROWTH, z)[:, None]

@@ -110,14 +110,14 @@ class LearnedPredictor:
         intent = logistic(
             intent_logit(self.networks.intent, arms.tokens, hidden.astype(np.float32))
         )
-        found = self._arms(arms, intent)
-        lengths = Lengths.of(joints)
         linear = self.networks.linear.displacement(arms.joints[:, :, :3])
-        now = joints[0, -1]
+        found = self._arms(arms, arms.joints[:, -1:, :3] + linear, intent)
+        lengths = Lengths.of(joints)
+        now, tail = joints[0, -1], joints[0, -self._damped.history_length :]
         experts = np.stack(
             [
                 np.tile(now, (FUTURE + 1, 1, 1)),
-                self._damped.predict(history_tail(joints[0]), PERIOD, FUTURE),
+                self._damped.predict(tail, PERIOD, FUTURE),
                 _in_world(arms.frames, arms.joints[:, -1:, :3] + linear),
                 _in_world(arms.frames, found.mean),
             ]
@@ -148,13 +148,17 @@ class LearnedPredictor:
         poses = tuple(p for p in memory.poses if p[0] > history.time - lasting - 0.5 * PERIOD)
         return forecast, PredictorMemory(after, (*poses, (history.time, both[0, 0])))
 
-    def _arms(self, arms: ArmTokens, intent: FloatArray) -> _Arms:
-        """Returns the network's predictions of both arms with intents (2,)."""
+    def _arms(self, arms: ArmTokens, linear: FloatArray, intent: FloatArray) -> _Arms:
+        """Returns the network's predictions of both arms.
+
+        Args:
+            arms: tokens.
+            linear: (2,F+1,3,3) the linear predictor's, m, in the arms' frames.
+            intent: (2,) probabilities.
+        """
         weights = self.networks.motion
         z = network.context(weights, arms.tokens, intent)
-        linear = self.networks.linear.displacement(arms.joints[:, :, :3])
-        now = arms.joints[:, -1:, :3]
-        mean = now + linear + network.residual(weights, z)
+        mean = linear + network.residual(weights, z)
         scale = network.error_scale(weights, z)
         latent = diffusion.samples(weights, z)
         motion = diffusion.motion_of(weights, latent) * scale[:, None, 1:, :, None]
@@ -169,11 +173,6 @@ class LearnedPredictor:
             if abs(at - time) < 0.5 * PERIOD:
                 return pose[None]
         return None
-
-
-def history_tail(joints: FloatArray) -> FloatArray:
-    """Returns the newest samples (5,6,3), m, of a history (T,6,3)."""
-    return joints[-5:]
 
 
 def _windows(joints: FloatArray, seen: BoolArray, sleeves: FloatArray) -> Windows:
