@@ -51,6 +51,7 @@ BENCHMARKS = {
     "local": "constrained DDP compared with the exact optimum",
     "delay": "solve time of the global controller on this machine",
     "prediction": "prediction of a person's arms and intent, beside simple predictors",
+    "predictors": "active persons dressed with each predictor of their motion",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
     "repeat": "whether the same seed gives the same log bit for bit under any load",
     "mutation": "share of mutants of central modules that the tests detect",
@@ -378,7 +379,7 @@ def _add_train(verbs: _Verbs) -> None:
         "`motion` needs the weights of `intent` in the same folder. The same command goes on after "
         "an interruption, with the same result. Uses a CUDA device if there is one.",
     )
-    train.add_argument("network", choices=("intent", "motion"))
+    train.add_argument("network", choices=("intent", "motion", "recurrent"))
     train.add_argument("--data", metavar="DIR", default="out/motion", help="default: %(default)s")
     train.add_argument("--out", metavar="DIR", default="out/train", help="default: %(default)s")
     train.add_argument("--seed", type=_seed, default=0, metavar="N")
@@ -390,6 +391,27 @@ def _add_train(verbs: _Verbs) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="whether the networks see the sleeves",
+    )
+    train.add_argument(
+        "--recordings",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="motion: go on from trained weights with recordings of people, see docs/prediction.md",
+    )
+    train.add_argument(
+        "--start",
+        metavar="DIR",
+        help="weights that recordings are added to; default: those of the package",
+    )
+    train.add_argument(
+        "--rate", type=_between(1.0, 2000.0), metavar="HZ", help="of recordings without stamps"
+    )
+    train.add_argument(
+        "--up", choices=("x", "-x", "y", "-y", "z", "-z"), help="axis of recordings that points up"
+    )
+    train.add_argument(
+        "--unit", type=_between(1e-6, 10.0), metavar="M", help="of the recordings, in metres"
     )
     train.set_defaults(command=_train)
 
@@ -521,14 +543,26 @@ def _dataset_motion(options: argparse.Namespace) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
-    from drake_dress.learning.training.commands import FIGURES, TrainOptions, train_command
-    from drake_dress.models.human.learned.weights import INTENT, MOTION
+    from drake_dress.learning.recordings import RecordingOptions
+    from drake_dress.learning.training.commands import FIGURES, FILES, TrainOptions, train_command
+    from drake_dress.models.human.learned.weights import SHIPPED
 
-    results = (FIGURES, INTENT if options.network == "intent" else MOTION)
+    if options.recordings and options.network != "motion":
+        raise UserError("train", "--recordings", "are learned from by motion alone")
+    results = (FIGURES, FILES[options.network])
     out = _directory(options.out, Path(), results, [])
     return train_command(
         options.network,
-        TrainOptions(Path(options.data), out, options.seed, options.steps, options.sleeves),
+        TrainOptions(
+            Path(options.data),
+            out,
+            options.seed,
+            options.steps,
+            options.sleeves,
+            tuple(map(Path, options.recordings)),
+            RecordingOptions(options.rate, options.up, options.unit),
+            SHIPPED if options.start is None else Path(options.start),
+        ),
     )
 
 
@@ -602,6 +636,20 @@ def _between(low: float, high: float) -> Callable[[str], float]:
         return value
 
     return number
+
+
+def _between(low: float, high: float) -> Callable[[str], float]:
+    """Returns a parser of numbers from `low` to `high`."""
+
+    def parsed(text: str) -> float:
+        value = float(_number(text))
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"{text} is out of range, expected {low:g} to {high:g}"
+            )
+        return value
+
+    return parsed
 
 
 def _whole(text: str) -> int:

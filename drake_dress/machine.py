@@ -6,7 +6,10 @@ import contextlib
 import gc
 import os
 from collections.abc import Iterator, MutableMapping
+from functools import cache
 from pathlib import Path
+
+from threadpoolctl import ThreadpoolController
 
 _OWN_GROUPS = Path("/proc/self/cgroup")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -44,6 +47,21 @@ def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
     if count < len(os.sched_getaffinity(0)):
         for name in _THREADS:
             environment.setdefault(name, str(count))
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def one_thread() -> contextlib.AbstractContextManager[object]:
+    """Returns a context in which linear algebra uses one thread.
+
+    For small matrices a second thread gains nothing, and where other processes use the cores, each
+    product waits for it: a forecast of 6 ms took 160 ms.
+    """
+    context: contextlib.AbstractContextManager[object] = _libraries().limit(limits=1)
+    return context
 
 
 @contextlib.contextmanager

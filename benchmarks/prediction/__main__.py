@@ -3,6 +3,7 @@
     drake-dress dataset motion --out out/motion --dressings 40
     drake-dress bench prediction --data out/motion --into docs/prediction.md
     drake-dress bench prediction --recordings recordings/*.csv
+    drake-dress bench prediction --data out/motion --recordings persons/*/*.csv --only persons
 
 Held-out sequences are those of the set that nothing was trained on; whole dressings come from the
 simulator of garment and person. Recordings are files of joint positions of people, see the section
@@ -15,18 +16,27 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.cloth.table import Table
 from benchmarks.figures import Figure, at_least, at_most, write_figures
-from benchmarks.parser import bench_parser, exit_with, number_between, output_file, some_of
+from benchmarks.parser import (
+    at_least_one,
+    bench_parser,
+    exit_with,
+    number_between,
+    output_file,
+    some_of,
+)
 from benchmarks.prediction.hidden import ELBOW, HAND, hidden_errors
+from benchmarks.prediction.persons import OWN_RIDGE, SHIPPED_RIDGE, across_persons, folds, gain
 from benchmarks.prediction.streams import Told, delays_of
 from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
-from drake_dress.learning.evaluation.baselines import plain_baselines
+from drake_dress.learning.evaluation.baselines import mean_of, plain_baselines
 from drake_dress.learning.evaluation.held_out import (
     HeldOut,
     compared,
@@ -35,19 +45,27 @@ from drake_dress.learning.evaluation.held_out import (
 )
 from drake_dress.learning.evaluation.stream import followed
 from drake_dress.learning.motion.dataset import MotionData, read_dressings, read_motion
+from drake_dress.learning.motion.sequence import KINDS, Kind
 from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
-from drake_dress.learning.motion.sequence import Kind
-from drake_dress.learning.motion.windows import Sequences
+from drake_dress.learning.motion.windows import Batch, Sequences
 from drake_dress.learning.recordings import RecordingOptions, read_recording
 from drake_dress.learning.recordings.reading import UPS
 from drake_dress.learning.timed_motion import TimedMotion
+from drake_dress.learning.training.motion import MotionTraining
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned.forecast import PersonHistory
 from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
+from drake_dress.models.human.learned.recurrent import recurrent_motion
 from drake_dress.models.human.learned.ridge import RidgePredictor
-from drake_dress.models.human.learned.weights import networks
+from drake_dress.models.human.learned.weights import (
+    RECURRENT,
+    SHIPPED,
+    networks,
+    recurrent_predictor,
+)
 
 _NAME = "prediction"
-SECTIONS = ("held_out", "intent", "hidden", "dressings", "recordings", "speed")
+SECTIONS = ("held_out", "intent", "hidden", "dressings", "recordings", "persons", "speed")
 _NOISES = (0.004, 0.0)
 _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _HIDDEN_SEQUENCES, _HIDDEN = 60, (1.0, 3.0)  # of each kind, s
@@ -60,11 +78,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.into is not None:
         around(options.into, _NAME)
-    needs = {"held_out", "intent", "hidden", "dressings"}
+    needs = {"held_out", "intent", "hidden", "dressings", "persons"}
     only = options.only or [
         s
         for s in SECTIONS
-        if (s in needs and options.data)
+        if (s in needs and s != "persons" and options.data)
         or (s == "recordings" and options.recordings)
         or s == "speed"
     ]
@@ -99,7 +117,12 @@ class Study:
     def __init__(self, weights: Networks, options: argparse.Namespace) -> None:
         self._networks, self._options = weights, options
         self._predictor = LearnedPredictor(weights)
-        self._baselines = plain_baselines(RidgePredictor(weights.linear))
+        self._baselines = dict(plain_baselines(RidgePredictor(weights.linear)))
+        self._more: dict[str, Callable[[Batch], FloatArray]] = {}
+        if (options.weights / RECURRENT).is_file():
+            recurrent = recurrent_predictor(options.weights)
+            self._baselines["recurrent"] = mean_of(recurrent)
+            self._more["recurrent"] = lambda b: recurrent_motion(recurrent.weights, b.arms.tokens)
 
     def held_out(self) -> tuple[list[Table], list[Figure]]:
         """Errors on held-out sequences."""
@@ -108,7 +131,9 @@ class Study:
         kinds: tuple[Kind, ...] = (*_DRESSED, "free")
         for kind in kinds:
             for noise in _NOISES:
-                found = compared(held_out_batches(self._data(kind), noise), self._networks, {})
+                found = compared(
+                    held_out_batches(self._data(kind), noise), self._networks, self._more
+                )
                 if kind in _DRESSED:
                     both[noise].append(found)
                 rows.append(_held_out_row(f"{kind}, {1e3 * noise:g} mm", found))
@@ -184,9 +209,8 @@ class Study:
     def recordings(self) -> tuple[list[Table], list[Figure]]:
         """Recordings of people."""
         rows, figures, everything = [], [], Told()
-        how = RecordingOptions(self._options.rate, self._options.up, self._options.unit)
         for path in self._options.recordings:
-            motion = read_recording(path, how, lambda line: print(f"note: {line}", flush=True))
+            motion = self._recording(path)
             told = Told()
             found = list(followed(motion, self._predictor, self._baselines))
             told.add(found)
@@ -200,6 +224,28 @@ class Study:
             ratio = everything.mean("learned", "resting") / everything.mean("still", "resting")
             figures.append(at_most("recordings, resting arms: over still", ratio, "1", 1.1))
         return [Table("Recordings of people", self._header("recording"), rows)], figures
+
+    def persons(self) -> tuple[list[Table], list[Figure]]:
+        """Recordings of some persons, predicted by what learned from others."""
+        paths: list[Path] = self._options.recordings
+        motions = [self._recording(path) for path in paths]
+        parts = folds(paths, [float(m.time[-1] - m.time[0]) for m in motions])
+        base = MotionTraining(
+            read_motion(self._options.data, KINDS, "training"),
+            {kind: read_motion(self._options.data, (kind,), "validation") for kind in KINDS},
+            self._networks.intent,
+        )
+        say = partial(print, flush=True)
+        found = across_persons(motions, parts, base, self._networks, self._options.steps, say)
+        rows = [row for name, told in found.items() for row in _told_rows(name, told)]
+        told = list(found.values())
+        figures = [
+            at_least(f"trained on other persons, below {name} by", 100 * gain(told, name), "%", 15)
+            for name in (SHIPPED_RIDGE, OWN_RIDGE)
+        ]
+        names = list(told[0].first)
+        header = ["recording", "arms", *names, "best of 20", "90 % region, %", "linear, %"]
+        return [Table("Recordings, learned from those of other persons", header, rows)], figures
 
     def speed(self) -> tuple[list[Table], list[Figure]]:
         """Time of one call."""
@@ -217,6 +263,10 @@ class Study:
         median, p95 = float(np.median(spent)), float(np.quantile(spent, 0.95))
         table = Table("One call, both arms", ["", "ms"], [["median", median], ["95 %", p95]])
         return [table], [at_most("one call, both arms, median", median, "ms", 10.0)]
+
+    def _recording(self, path: Path) -> TimedMotion:
+        how = RecordingOptions(self._options.rate, self._options.up, self._options.unit)
+        return read_recording(path, how, lambda line: print(f"note: {line}", flush=True))
 
     def _data(self, *kinds: Kind) -> MotionData:
         return read_motion(self._options.data, kinds, "test")
@@ -245,12 +295,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--weights",
         type=Path,
-        default=Path("out/train"),
+        default=SHIPPED,
         metavar="DIR",
-        help="of drake-dress train; default: %(default)s",
+        help="of drake-dress train; default: those of the package",
     )
     parser.add_argument(
         "--only", type=some_of(SECTIONS), metavar="NAME,…", help=", ".join(SECTIONS)
+    )
+    parser.add_argument(
+        "--steps",
+        type=at_least_one,
+        metavar="N",
+        help="persons: at most so many steps of each training; for a try",
     )
     parser.add_argument("--json", type=output_file, metavar="FILE")
     add_into_option(parser, _NAME)

@@ -30,6 +30,14 @@ class TimedMotion:
     sleeves: FloatArray
     intent: IndexArray | None = None
 
+    def between(self, first: float, last: float) -> TimedMotion:
+        """Returns the part from `first` to `last`, s."""
+        kept = (self.time >= first) & (self.time <= last)
+        intent = None if self.intent is None else self.intent[kept]
+        return TimedMotion(
+            self.name, self.time[kept], self.joints[kept], self.sleeves[kept], intent
+        )
+
     def history(self, now: float, sampling: Sampling, observed: FloatArray) -> PersonHistory:
         """Returns what is known at `now`, s.
 

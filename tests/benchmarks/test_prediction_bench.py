@@ -9,7 +9,9 @@ import pytest
 
 from benchmarks.prediction.__main__ import main
 from benchmarks.prediction.hidden import HAND, hidden_errors
+from benchmarks.prediction.persons import folds
 from benchmarks.prediction.streams import Told, delays_of, switch_delays
+from drake_dress.errors import UserError
 from drake_dress.learning.evaluation.baselines import plain_baselines
 from drake_dress.learning.evaluation.stream import Compared, followed
 from drake_dress.learning.motion.commands import Wanted, write_motion_set
@@ -77,11 +79,38 @@ def test_figures_and_tables_of_all_sections_are_written(
     assert "note: person.npz: unit m" in capsys.readouterr().out
 
 
+def test_persons_are_predicted_by_what_learned_from_others(
+    trained: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, out = trained
+    files = []
+    for name, speed in (("a", 0.05), ("b", 0.1), ("c", 0.15)):
+        made = motion(speed)
+        (tmp_path / name).mkdir()
+        files.append(tmp_path / name / "walk.npz")
+        np.savez(files[-1], time=2.0 * made.time, joint_position=made.joints)
+    words = ["--data", str(data), "--weights", str(out), "--only", "persons", "--steps", "2"]
+    told = tmp_path / "told.json"
+    assert main([*words, "--recordings", *map(str, files), "--json", str(told)]) == 0
+    kept = json.loads(told.read_text())
+    asked = {figure["name"]: figure["asked"] for figure in kept["figures"]}
+    assert asked == {
+        "trained on other persons, below ridge by": 15,
+        "trained on other persons, below ridge of the same recordings by": 15,
+    }
+    assert capsys.readouterr().out.count("learns from 2 recordings") == 3
+    with pytest.raises(UserError, match="are in 1 folders, expected 3 or more"):
+        main([*words, "--recordings", str(files[0])])
+
+
+def test_folders_are_dealt_out_by_their_duration() -> None:
+    paths = [Path(f"/rec/{name}.npz") for name in ("a/1", "a/2", "b/1", "c/1", "d/1")]
+    assert folds(paths, [5.0, 5.0, 8.0, 2.0, 1.0]) == [[0, 1], [2], [3, 4]]
+
+
 def test_sections_that_need_data_ask_for_it(
     trained: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from drake_dress.errors import UserError
-
     with pytest.raises(UserError, match=r"--data: is missing, intent needs a set of motion"):
         main(["--weights", str(trained[1]), "--only", "intent"])
 
@@ -89,8 +118,6 @@ def test_sections_that_need_data_ask_for_it(
 def test_interrupted_training_says_how_to_go_on_and_other_data_are_refused(
     trained: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    from drake_dress.errors import UserError
-
     with pytest.raises(UserError, match=r"motion.json: no such file"):
         train_command("intent", TrainOptions(tmp_path, tmp_path / "out"))
     with pytest.raises(UserError, match=r"intent.safetensors: no such file"):

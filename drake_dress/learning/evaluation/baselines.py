@@ -12,7 +12,7 @@ from drake_dress.models.human.learned.filling import filled
 from drake_dress.models.human.learned.forecast import PersonHistory
 from drake_dress.models.human.learned.network import FUTURE, PERIOD
 from drake_dress.models.human.learned.ridge import RidgePredictor
-from drake_dress.models.human.prediction import ConstantVelocityPredictor
+from drake_dress.models.human.prediction import ConstantVelocityPredictor, MotionPredictor
 
 # Samples from which velocities are found, as the shipped predictor does in the same time.
 _WINDOW = 5
@@ -40,8 +40,8 @@ def damped_velocity(history: PersonHistory) -> FloatArray:
     return _velocity(history, ConstantVelocityPredictor.decay_time)
 
 
-def ridge(predictor: RidgePredictor) -> Baseline:
-    """Returns the shipped linear predictor as a baseline."""
+def mean_of(predictor: MotionPredictor) -> Baseline:
+    """Returns a predictor of histories of `HISTORY` samples as a baseline."""
     return lambda history: predictor.predict(_complete(history), PERIOD, FUTURE)
 
 
@@ -52,7 +52,7 @@ def plain_baselines(linear: RidgePredictor) -> Mapping[str, Baseline]:
         "last velocity": last_velocity,
         "constant velocity": constant_velocity,
         "damped velocity": damped_velocity,
-        "ridge": ridge(linear),
+        "ridge": mean_of(linear),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from drake_dress.learning.motion.movements import Movement
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import Arm
-from drake_dress.models.human.hand_tracking import rate_bounds, tracking_rate
+from drake_dress.models.human.hand_tracking import eased, rate_bounds, tracking_rate
 
 # Fastest hand, m/s, and joint, rad/s, of a movement by will.
 _FASTEST, _FASTEST_JOINT = 2.5, 6.0
@@ -134,7 +134,8 @@ class MovingArm:
             self.rest = self.angles.copy()
 
     def _turn(self, rate: FloatArray, step: float) -> None:
-        """Turns the joints at `rate` (4,), rad/s, within their limits."""
+        """Turns the joints at `rate` (4,), rad/s, as far as limits and accelerations allow."""
+        rate = eased(rate, self.rate, step)
         angles = np.clip(self.angles + step * rate, *self.limits)
         self.rate = (angles - self.angles) / step
         self.angles = angles

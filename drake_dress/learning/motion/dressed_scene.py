@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from drake_dress.learning.motion.bodies import draw_reach
-from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axis_of
+from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axes_of
 from drake_dress.learning.motion.movements import Armhole
 from drake_dress.learning.motion.moving_person import MovingPerson
 from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
@@ -38,8 +38,9 @@ class DressedScene:
         of = GarmentDraw.drawn(rng, draw_reach(rng))
         self._mover = MovingPerson(rng, of.beside + rng.uniform(0.0, _LOOSER))
         self._wills = [self._drawn_will(i) for i in (0, 1)] if active else []
-        self._before, self._way = self._mover.joints(0.0), np.zeros((2, 3))
-        self._sleeves = Sleeves.drawn(rng, of, self._before)
+        self._axes = axes_of(self._mover.joints(0.0))
+        self._before, self._way = self._axes, np.zeros((2, 3))
+        self._sleeves = Sleeves.drawn(rng, of, self._axes)
 
     def run(self) -> Sequence:
         """Moves for the whole duration; returns the samples."""
@@ -65,21 +66,21 @@ class DressedScene:
         mover = self._mover
         if k % _SUBSTEPS == 0:
             self._decide(time)
-            self._before = mover.joints(time)
-            self._way = self._sleeves.advance(self._before, mover.is_willed(time), time)
+            self._before = self._axes
+            self._way = self._sleeves.advance(self._axes, mover.is_willed(time), time)
         for i, arm in enumerate(mover.arms):
             if arm.is_willed(time):
                 arm.move_by_will(time, PERIOD)
             else:
-                self._follow(i, self._way[i], time)
+                self._follow(i, time)
+        self._axes = axes_of(mover.joints(time + PERIOD))
         if k % _SUBSTEPS == _SUBSTEPS - 1:
-            self._sleeves.meet(mover.joints(time + PERIOD), self._before)
+            self._sleeves.meet(self._axes, self._before)
 
-    def _follow(self, i: int, way: FloatArray, time: float) -> None:
-        """Lets an arm go along with its sleeve, whose motion in this step is `way` (3,), m."""
-        arm, sleeves = self._mover.arms[i], self._sleeves
+    def _follow(self, i: int, time: float) -> None:
+        """Lets an arm go along with its sleeve."""
+        arm, axis, sleeves, way = self._mover.arms[i], self._axes[i], self._sleeves, self._way[i]
         rotation, _ = self._mover.torso.pose(time)
-        axis = axis_of(self._mover.joints(time), i)
         led, progress = None, 0.0
         if sleeves.on[i]:
             progress = float(sleeves.progress[i])

@@ -28,17 +28,20 @@ from drake_dress.models.control.local_model import (
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.garment.geodesics import Reach
-from drake_dress.models.human.tremor import Wandering
+from drake_dress.models.human.tremor import Wanderings
+
+ArmAxes = tuple[ArmAxis, ArmAxis]
+"""Axes of left and right arm."""
 
 STEP = 0.1  # s, between solves
 _HORIZON = 8  # steps
 # Ranges of what is drawn of a garment and its robot (`GarmentDraw`).
-_MAX_SPEED, _BESIDE = (0.06, 0.22), (0.01, 0.05)  # m/s, m
+_MAX_SPEED, _BESIDE = (0.03, 0.22), (0.01, 0.05)  # m/s (its logarithm is even), m
 _CARRIED, _SHARE, _RATE = (0.0, 0.7), (0.8, 1.0), (0.05, 0.35)  # 1, 1, 1/s
 _SLOWEST_ACROSS = 0.05  # m/s, least bound on the speed of a sleeve across its arm
 _OVER = 0.05  # m, distance of an armhole from the hand at which it is over it
 _FIRST_PROGRESS = 0.02  # s of a sleeve that has just come over its hand
-_SLIPPED = 0.04  # m beyond the hand: the sleeve has come off
+_SLIPPED = 0.08  # m beyond the hand: the sleeve has come off; more than `_OVER`
 _TAUT = 0.09  # m, largest distance of an armhole's centre from the axis of an arm in it
 # Largest distance of a gripper from its armhole, as a share of the geodesic distance: cloth of the
 # coarse mesh stretches, and a gripper holds a patch.
@@ -74,8 +77,9 @@ class GarmentDraw:
     @classmethod
     def drawn(cls, rng: np.random.Generator, reach: Reach) -> GarmentDraw:
         """Returns drawn values for a coat."""
-        ranges = _MAX_SPEED, _BESIDE, _CARRIED, _SHARE, _RATE
-        return cls(reach, *(float(rng.uniform(*each)) for each in ranges))
+        speed = float(np.exp(rng.uniform(*np.log(_MAX_SPEED))))
+        ranges = _BESIDE, _CARRIED, _SHARE, _RATE
+        return cls(reach, speed, *(float(rng.uniform(*each)) for each in ranges))
 
 
 @dataclass
@@ -100,26 +104,24 @@ class Sleeves:
     gripper: FloatArray
     on: BoolArray
     progress: FloatArray
-    sideways: list[Wandering]
+    sideways: Wanderings
     goals: list[Goal | None] = field(default_factory=lambda: [None, None])
     coupled: bool = False
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator, of: GarmentDraw, joints: FloatArray) -> Sleeves:
-        """Returns sleeves in a drawn phase of a dressing of joints (6,3), m."""
-        start = draw_start(rng, of.reach, (axis_of(joints, 0), axis_of(joints, 1)))
-        sideways = [Wandering(rng) for _ in range(6)]
-        return cls(of, rng, **vars(start), sideways=sideways)
+    def drawn(cls, rng: np.random.Generator, of: GarmentDraw, axes: ArmAxes) -> Sleeves:
+        """Returns sleeves in a drawn phase of a dressing of arms with `axes`."""
+        start = draw_start(rng, of.reach, axes)
+        return cls(of, rng, **vars(start), sideways=Wanderings(rng, 6))
 
-    def advance(self, joints: FloatArray, willed: BoolArray, time: float) -> FloatArray:
+    def advance(self, axes: ArmAxes, willed: BoolArray, time: float) -> FloatArray:
         """Moves the sleeves by one `STEP`; returns their motion (2,3), m.
 
         Args:
-            joints: (6,3) of both arms, m.
+            axes: of both arms.
             willed: (2,) which arms move by will.
             time: s.
         """
-        axes = axis_of(joints, 0), axis_of(joints, 1)
         problem = self._problem(axes, willed, time)
         moved = (problem.input_matrix @ solve(problem).v[0]).reshape(4, 3)
         if not np.all(np.isfinite(moved)):
@@ -130,19 +132,16 @@ class Sleeves:
         self._turn(axes, time)
         return way
 
-    def meet(self, joints: FloatArray, before: FloatArray) -> None:
-        """Keeps sleeves on the arms that have moved from `before` to `joints`, (6,3), m."""
-        for i in (0, 1):
-            axis = axis_of(joints, i)
+    def meet(self, axes: ArmAxes, before: ArmAxes) -> None:
+        """Keeps sleeves on the arms that have moved from `before` to `axes`."""
+        for i, axis in enumerate(axes):
             if self.on[i]:
-                self._carry(i, axis, axis_of(before, i))
+                self._carry(i, axis, before[i])
             elif float(np.linalg.norm(axis.G(0.0) - self.center[i])) < _OVER:
                 self.on[i], self.progress[i], self.goals[i] = True, _FIRST_PROGRESS, None
         self._hold()
 
-    def _problem(
-        self, axes: tuple[ArmAxis, ArmAxis], willed: BoolArray, time: float
-    ) -> LocalProblem:
+    def _problem(self, axes: ArmAxes, willed: BoolArray, time: float) -> LocalProblem:
         """Returns the local problem whose solution is the sleeves' next motion."""
         left, right = (self._goal(axes[i], i, bool(willed[i]), time) for i in (0, 1))
         nominal = Nominal(
@@ -187,9 +186,9 @@ class Sleeves:
         target: FloatArray = self.center[i] + share[:, None] * way
         return target
 
-    def _turn(self, axes: tuple[ArmAxis, ArmAxis], time: float) -> None:
+    def _turn(self, axes: ArmAxes, time: float) -> None:
         """Turns the sleeves' directions by one `STEP` to where arm, hand and gripper pull them."""
-        sway = _SWAYS * np.array([w.value(time) for w in self.sideways]).reshape(2, 3)
+        sway = _SWAYS * self.sideways.value(time).reshape(2, 3)
         for i, axis in enumerate(axes):
             pull = self.gripper[i] - self.center[i]
             if self.on[i]:
@@ -226,7 +225,6 @@ class Sleeves:
                 self.gripper[i] = self.center[i] + off * (largest / length)
 
 
-def axis_of(joints: FloatArray, side: int) -> ArmAxis:
-    """Returns the axis of an arm of joints (6,3), m."""
-    shoulder, elbow, hand = joints[3 * side : 3 * side + 3]
-    return ArmAxis(hand, elbow, shoulder)
+def axes_of(joints: FloatArray) -> ArmAxes:
+    """Returns the axes of left and right arm of joints (6,3), m."""
+    return ArmAxis(*joints[2::-1]), ArmAxis(*joints[:2:-1])

@@ -11,7 +11,7 @@ from drake_dress.learning.motion.strokes import PACES
 from drake_dress.learning.motion.torso import Torso, draw_lean
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.body import shoulder_joint
-from drake_dress.models.human.tremor import TremorWave, Wandering
+from drake_dress.models.human.tremor import TremorWave, Wanderings
 from drake_dress.models.sides import SIDES
 
 _TREMBLES = 0.2  # share of persons with a tremor
@@ -44,7 +44,7 @@ class MovingPerson:
         self.torso = Torso.drawn(rng, shoulders - _PELVIS * m.torso_length)
         self.arms = [self._arm(i, clearance) for i in (0, 1)]
         self._home = [arm.arm.hand(arm.home) for arm in self.arms]
-        self._girdle = [Wandering(rng) for _ in range(6)]
+        self._girdle = Wanderings(rng, 6)
         self._girdle_share = _GIRDLE_SHARE * rng.random()
         self._shifted = (-1.0, np.zeros((2, 3)))
         self._tremor = self._drawn_tremor()
@@ -99,8 +99,7 @@ class MovingPerson:
         """Returns the joints (6,3), m, world, of both arms with `angles`."""
         rotation, origin = self.torso.pose(time)
         if self._shifted[0] != time:
-            wave = np.array([w.value(time) for w in self._girdle]).reshape(2, 3)
-            self._shifted = (time, _GIRDLE * wave)
+            self._shifted = (time, _GIRDLE * self._girdle.value(time).reshape(2, 3))
         points = []
         for i, arm in enumerate(self.arms):
             own = arm.arm.points(angles[i])

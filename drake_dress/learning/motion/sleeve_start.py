@@ -19,7 +19,7 @@ _PROGRESS = 0.05, 1.9  # s of a sleeve on its arm: past the hand, before the sho
 # with this standard deviation of each component.
 _AWAY, _SPREAD, _LOWER = (0.08, 0.45), 0.7, 0.3
 _TURNED = 0.2  # standard deviation of the components of its own direction toward the hand
-_STRETCH = 0.95  # share of the coat's reach that sleeves are apart at most
+_STRETCH = 0.95  # share of the coat's reach that sleeves, and grippers, are apart at most
 # Grippers are at this share of their reach from their armholes, above, in a direction with this
 # standard deviation of each component.
 _HELD, _HELD_SPREAD = 0.9, 0.5
@@ -64,21 +64,28 @@ def draw_start(
         away = unit(-axis.D(0.0) + _SPREAD * rng.normal(size=3) - _LOWER * _UP)
         center[i] = hand + rng.uniform(*_AWAY) * away
         direction[i] = unit(hand - center[i] + _TURNED * rng.normal(size=3))
-    _bring_within_reach(center, on, reach)
+    _bring_within_reach(center, on, reach.between_sleeves)
     near = np.array(reach.to_near_gripper)[:, None]
     above = np.stack([unit(_UP + _HELD_SPREAD * rng.normal(size=3)) for _ in (0, 1)])
-    return SleeveStart(center, direction, center + _HELD * near * above, on, progress)
+    gripper = center + _HELD * near * above
+    _bring_within_reach(gripper, np.zeros(2, dtype=bool), reach.between_grippers)
+    return SleeveStart(center, direction, gripper, on, progress)
 
 
-def _bring_within_reach(center: FloatArray, on: BoolArray, reach: Reach) -> None:
-    """Moves sleeves (2,3) that the coat cannot span nearer to each other, in place.
+def _bring_within_reach(places: FloatArray, bound: BoolArray, reach: float) -> None:
+    """Moves places (2,3) that the coat cannot span nearer to each other, in place.
 
-    A sleeve that is off its arm goes to the other; if both are on or off, each goes half the way.
+    One that is not bound goes to the other; if both are bound or free, each goes half the way.
+
+    Args:
+        places: m.
+        bound: (2,) whether each is bound to its arm.
+        reach: largest distance between them in the coat, m.
     """
-    gap = center[1] - center[0]
-    far = float(np.linalg.norm(gap)) / (_STRETCH * reach.between_sleeves)
+    gap = places[1] - places[0]
+    far = float(np.linalg.norm(gap)) / (_STRETCH * reach)
     if far > 1.0:
-        free = [i for i in (0, 1) if not on[i]] or [0, 1]
+        free = [i for i in (0, 1) if not bound[i]] or [0, 1]
         for i in free:
             sign = 1.0 if i == 0 else -1.0
-            center[i] += sign * gap * (1.0 - 1.0 / far) / len(free)
+            places[i] += sign * gap * (1.0 - 1.0 / far) / len(free)

@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_dress.learning.motion.strokes import Stroke, draw_stroke
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.human.tremor import Wandering
+from drake_dress.models.human.tremor import Wanderings
 from drake_dress.models.rotation import rotation_about
 
 # Standard deviations of quiet stance: of its sway, m, and of yaw, roll and pitch, rad.
@@ -50,7 +50,7 @@ class Torso:
     size: float
     origin: FloatArray
     yaw: float
-    waves: list[Wandering]
+    waves: Wanderings
     strokes: list[Stroke] = field(default_factory=list)
     _last: tuple[float, FloatArray, FloatArray] | None = None
 
@@ -62,7 +62,7 @@ class Torso:
             float(np.exp(_SIZE_SPREAD * rng.normal() + _SIZE)),
             rng.uniform(-_ROOM, _ROOM, 2),
             float(rng.uniform(-np.pi, np.pi)),
-            [Wandering(rng) for _ in range(6)],
+            Wanderings(rng, 6),
         )
 
     def is_moving(self, time: float) -> bool:
@@ -78,8 +78,7 @@ class Torso:
         if self._last is not None and self._last[0] == time:
             # also right if a stroke has begun since: at its start it has not moved the torso yet
             return self._last[1:]
-        wave = np.array([w.value(time) for w in self.waves])
-        state = self.size * wave * np.concatenate([_SWAY, _TILT])
+        state = self.size * self.waves.value(time) * np.concatenate([_SWAY, _TILT])
         for stroke in self.strokes:
             state = state + stroke.position(time)
         leaned = (

@@ -55,7 +55,7 @@ class Augmentation:
         hidden: share in which joints of one arm are hidden from some moment on.
         lost: standard deviation of a coordinate of a joint that is hidden all along, m.
         one_armed: share in which an arm is never seen.
-        late: share in which nothing was seen before some moment.
+        late: share in which neither joints nor sleeves were seen before some moment.
         bare: share without sleeves.
     """
 
@@ -159,7 +159,7 @@ class WindowSource:
         if self._how is not None:
             turned = self._how.turned * self._rng.normal(size=len(number))
             visible[self._rng.random(len(number)) < self._how.bare] = False
-            first = self._hide(observed)
+            first = self._hide(observed, visible)
         complete, seen = filled(observed, first)
         shown[~visible] = 0.0
         arms = arm_tokens(Windows(complete, seen, shown, visible, PERIOD), turned)
@@ -210,10 +210,10 @@ class WindowSource:
         joints += size * rng.normal(size=joints.shape)
         sleeves[..., :3] += more * size * rng.normal(size=sleeves[..., :3].shape)
 
-    def _hide(self, joints: FloatArray) -> FloatArray:
-        """Hides joints of some windows: NaN; returns what is known before, (B,6,3), m.
+    def _hide(self, joints: FloatArray, visible: BoolArray) -> FloatArray:
+        """Hides joints (NaN) and sleeves of some windows; returns joints before, (B,6,3), m.
 
-        That is where a joint was, with an error, if it is hidden from the first sample on.
+        A joint before is where it was, with an error, if it is hidden from the first sample on.
         """
         rng, how, count = self._rng, self._how, len(joints)
         assert how is not None
@@ -232,5 +232,5 @@ class WindowSource:
             joints[b, :, 3 - arm[b] : 6 - arm[b]] = np.nan
         begin = rng.integers(1, HISTORY - 4, size=count)
         for b in np.flatnonzero(rng.random(count) < how.late):
-            joints[b, : begin[b]] = np.nan
+            joints[b, : begin[b]], visible[b, : begin[b]] = np.nan, False
         return first

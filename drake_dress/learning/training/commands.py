@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,20 +21,28 @@ from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.learning.evaluation.held_out import compared, held_out_batches, intent_score
 from drake_dress.learning.motion.dataset import MotionData, Part, read_motion
 from drake_dress.learning.motion.sequence import Kind
+from drake_dress.learning.recordings import RecordingOptions, read_recording
+from drake_dress.learning.recordings.pieces import Pieces
+from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.intent import IntentTraining
 from drake_dress.learning.training.loop import Report, Schedule
-from drake_dress.learning.training.motion import MotionTraining, shortened
+from drake_dress.learning.training.motion import ADAPTING, MotionTraining, shortened
+from drake_dress.learning.training.recurrent import RecurrentTraining, recurrent_errors
 from drake_dress.models.human.learned.predictor import Networks
 from drake_dress.models.human.learned.weights import (
     INTENT,
     MOTION,
+    RECURRENT,
+    SHIPPED,
     intent_shapes,
+    networks,
     read_weights,
     write_weights,
 )
 
 FIGURES = "figures.json"
-NAMES = ("intent", "motion")
+NAMES = ("intent", "motion", "recurrent")
+FILES = {"intent": INTENT, "motion": MOTION, "recurrent": RECURRENT}
 _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _KINDS: tuple[Kind, ...] = ("passive", "active", "free")
 _NOISES = (0.004, 0.0)
@@ -51,6 +59,9 @@ class TrainOptions:
         seed: of weights and batches.
         steps: largest number of steps of each part; None: as scheduled.
         with_sleeves: whether the networks see sleeves.
+        recordings: files of people that the motion is learned from, too.
+        how: what the user says of them.
+        start: folder of the weights that recordings are added to.
     """
 
     data: Path
@@ -58,6 +69,9 @@ class TrainOptions:
     seed: int = 0
     steps: int | None = None
     with_sleeves: bool = True
+    recordings: tuple[Path, ...] = ()
+    how: RecordingOptions = RecordingOptions()
+    start: Path = SHIPPED
 
 
 def train_command(name: str, options: TrainOptions) -> int:
@@ -68,10 +82,8 @@ def train_command(name: str, options: TrainOptions) -> int:
     """
     begin = time.perf_counter()
     with claimed("--out", options.out), caught_interrupt() as stop:
-        if name == "intent":
-            weights, figures = _intent(options, stop)
-        else:
-            weights, figures = _motion(options, stop)
+        trainings = {"intent": _intent, "motion": _motion, "recurrent": _recurrent}
+        weights, figures = trainings[name](options, stop)
         if weights is None:
             print(f"stopped; the same command goes on from {options.out}", flush=True)
             return stop.status
@@ -80,7 +92,7 @@ def train_command(name: str, options: TrainOptions) -> int:
             "version": __version__,
             "data": _told_of(options.data),
         }
-        write_weights(options.out / (INTENT if name == "intent" else MOTION), weights, told)
+        write_weights(options.out / FILES[name], weights, told)
         kept = _figures_of(options.out)
         # a training that went on tells the time of its last part only
         kept[name] = figures | told | {"seconds_of_last_part": time.perf_counter() - begin}
@@ -109,6 +121,10 @@ def _intent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
 
 
 def _motion(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict[str, Any]]:
+    start = None
+    if options.recordings:
+        start = networks(options.start)
+        write_weights(options.out / INTENT, start.intent, {"copied from": options.start.name})
     intent = read_weights(options.out / INTENT, intent_shapes())
     training = MotionTraining(
         read_motion(options.data, _KINDS, "training"),
@@ -117,6 +133,8 @@ def _motion(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
         options.seed,
         options.with_sleeves,
     )
+    if start is not None:
+        training = with_recordings(training, start.motion, _recordings(options))
     if options.steps is not None:
         training = shortened(training, options.steps)
     schedules = {name: getattr(training, name).steps for name in _STAGES}
@@ -130,6 +148,62 @@ def _motion(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
     return weights, motion_figures(test, Networks(intent, weights), options.with_sleeves)
 
 
+def _recurrent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict[str, Any]]:
+    training = RecurrentTraining(
+        read_motion(options.data, _KINDS, "training"),
+        {kind: read_motion(options.data, (kind,), "validation") for kind in _KINDS},
+        options.seed,
+        with_sleeves=options.with_sleeves,
+    )
+    if options.steps is not None:
+        training = replace(training, schedule=_at_most(training.schedule, options.steps))
+    checkpoint = options.out / "recurrent.checkpoint.safetensors"
+    with _progress() as said:
+        report = said("recurrent", training.schedule.steps)
+        weights = training.run(checkpoint, report, stop.is_set)
+    if weights is None:
+        return None, {}
+    test = {kind: read_motion(options.data, (kind,), "test") for kind in _KINDS}
+    return weights, {
+        kind: float(
+            np.mean(
+                [
+                    recurrent_errors(weights, batch).mean()
+                    for batch in held_out_batches(data, _NOISES[0], options.with_sleeves)
+                ]
+            )
+        )
+        for kind, data in test.items()
+    }
+
+
+def with_recordings(
+    training: MotionTraining, start: Mapping[str, np.ndarray], motions: Sequence[TimedMotion]
+) -> MotionTraining:
+    """Returns a training that goes on from the weights `start` with recordings.
+
+    The last fifth of each recording is for validation, and counts as much as all else.
+    """
+    cut = [float(np.quantile(m.time, 1.0 - _HELD_BACK)) for m in motions]
+    early = Pieces.of(m.between(-np.inf, t) for m, t in zip(motions, cut, strict=True))
+    late = Pieces.of(m.between(t, np.inf) for m, t in zip(motions, cut, strict=True))
+    return replace(
+        training,
+        recorded=early,
+        start=start,
+        residual=ADAPTING,
+        validation={**training.validation, "recorded": late},
+    )
+
+
+def _recordings(options: TrainOptions) -> list[TimedMotion]:
+    return [
+        read_recording(path, options.how, lambda line: print(f"note: {line}", flush=True))
+        for path in options.recordings
+    ]
+
+
+_HELD_BACK = 0.2  # share of a recording
 _PARTS: tuple[Part, ...] = ("training", "validation", "test")
 _STAGES = ("residual", "denoiser", "initialiser")
 

@@ -16,8 +16,8 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned.intent import intent_logit, intent_weights
 from drake_dress.models.human.learned.network import HISTORY
 
-SCHEDULE = Schedule(steps=12000, rate=2e-3, every=500, patience=8)
-_BATCH = 256
+SCHEDULE = Schedule(steps=10000, rate=2e-3, every=500, patience=10)
+_BATCH = 128
 # Share of windows with a shorter history, and the shortest, in steps.
 _SHORTER, _SHORTEST = 0.5, 5
 # Noise of joints in validation, m, and time between its windows, s.

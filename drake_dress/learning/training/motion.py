@@ -7,6 +7,9 @@ The parts are trained one after the other, each on what those before it leave:
 3. the denoiser of a diffusion of what is left, in its principal coordinates;
 4. the initialiser that leaps over most of the diffusion, on the samples that come out of it;
 5. the factors of the regions, from validation sequences (split conformal prediction).
+
+A training may go on from other weights with recordings of people: the residual network then learns
+from both, half and half, and all else but the regions and what is familiar stays.
 """
 
 from __future__ import annotations
@@ -29,9 +32,10 @@ from drake_dress.models.human.learned.layers import logistic
 from drake_dress.models.human.learned.linear import LinearFit, LinearMotion
 from drake_dress.models.human.learned.network import FUTURE, HISTORY
 
-RESIDUAL = Schedule(steps=30000, rate=2e-3, every=1000, patience=8)
-DENOISER = Schedule(steps=6000, rate=2e-3, every=500, patience=6)
+RESIDUAL = Schedule(steps=12000, rate=2e-3, every=1000, patience=12)
+DENOISER = Schedule(steps=4000, rate=2e-3, every=500, patience=6)
 INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
+ADAPTING = Schedule(steps=3000, rate=5e-4, every=250, patience=6)
 COVERED = 0.9
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
@@ -81,6 +85,8 @@ class MotionTraining:
         linear_batches: number of batches that the linear map is fitted to.
         context_batches: number of batches that the diffusion learns from.
         familiar_batches: number of batches that say what is familiar.
+        recorded: sequences of people that are learned from besides.
+        start: weights to go on from.
     """
 
     train: Sequences
@@ -94,6 +100,8 @@ class MotionTraining:
     linear_batches: int = 60
     context_batches: int = 240
     familiar_batches: int = 60
+    recorded: Sequences | None = None
+    start: Mapping[str, np.ndarray] | None = None
 
     def run(
         self,
@@ -108,6 +116,8 @@ class MotionTraining:
             said: returns what reports the steps of a stage of that name.
             stop: returns whether to stop.
         """
+        if self.start is not None:
+            return self._adapted(self.start, folder, said, stop)
         weights: Arrays = {"linear.map": self._linear().map.astype(np.float32)}
         found = self._residual(weights, folder, said("residual"), stop)
         if found is None:
@@ -135,9 +145,31 @@ class MotionTraining:
         weights |= self.regions(weights) | self._familiar()
         return weights
 
+    def _adapted(
+        self,
+        start: Mapping[str, np.ndarray],
+        folder: Path | None,
+        said: Said,
+        stop: Callable[[], bool],
+    ) -> Arrays | None:
+        """Returns the weights `start` after the residual network has learned further."""
+        weights: Arrays = {"linear.map": start["linear.map"]}
+        found = self._residual(weights, folder, said("residual"), stop)
+        if found is None:
+            return None
+        weights = dict(start) | found
+        return weights | self.regions(weights) | self._familiar()
+
     def _source(self, data: Sequences, seed: tuple[int, ...], changed: bool = True) -> WindowSource:
         how = Augmentation() if self.with_sleeves else Augmentation(bare=1.0)
         return WindowSource(data, seed, how if changed else None, NOISE, self.with_sleeves)
+
+    def _drawn(self, seed: tuple[int, ...]) -> list[Batch]:
+        """Returns a batch of windows; with recordings, half of them are of these."""
+        if self.recorded is None:
+            return [self._source(self.train, seed).drawn(_BATCH)]
+        both = self._source(self.train, seed), self._source(self.recorded, (*seed, 1))
+        return [source.drawn(_BATCH // 2) for source in both]
 
     def _linear(self) -> LinearMotion:
         fit = LinearFit(HISTORY, FUTURE)
@@ -155,15 +187,17 @@ class MotionTraining:
 
         def batches(step: int) -> tuple[torch.Tensor, ...]:
             seed = (self.seed, _SEED_OF["residual"], step)
-            batch = self._source(self.train, seed).drawn(_BATCH)
-            return tuple(
-                torch.from_numpy(part)
-                for part in (
+            parts = [
+                (
                     batch.arms.tokens,
                     intents(self.intent, batch),
                     linear.displacement(batch.arms.joints[:, :, :3]).astype(np.float32),
                     batch.displacement.astype(np.float32),
                 )
+                for batch in self._drawn(seed)
+            ]
+            return tuple(
+                torch.from_numpy(np.concatenate(part)) for part in zip(*parts, strict=True)
             )
 
         def loss(w: Mapping[str, torch.Tensor], batch: Any) -> torch.Tensor:
@@ -186,6 +220,8 @@ class MotionTraining:
             )
 
         first = network.motion_weights(np.random.default_rng(self.seed))
+        if self.start is not None:
+            first = {name: self.start[name] for name in first}
         return train(
             first, batches, loss, validation, self.residual, _file(folder, "residual"), report, stop
         )
@@ -266,8 +302,9 @@ class MotionTraining:
 
     def _familiar(self) -> Arrays:
         tokens = [
-            self._source(self.train, (self.seed, _SEED_OF["contexts"], k, 1)).drawn(_BATCH)
+            batch
             for k in range(self.familiar_batches)
+            for batch in self._drawn((self.seed, _SEED_OF["contexts"], k, 1))
         ]
         return familiar_weights(np.concatenate([batch.arms.tokens for batch in tokens]))
 

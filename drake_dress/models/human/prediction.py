@@ -180,9 +180,31 @@ def resampled(samples: FloatArray, newest: FloatArray, age: float) -> FloatArray
     return np.concatenate([past, newest[None]])
 
 
+def _ridge() -> MotionPredictor:
+    # what is learned is read only where it is wanted
+    from drake_dress.models.human.learned.weights import ridge_predictor
+
+    return ridge_predictor()
+
+
+def _recurrent() -> MotionPredictor:
+    from drake_dress.models.human.learned.weights import recurrent_predictor
+
+    return recurrent_predictor()
+
+
+def _learned() -> PersonPredictor:
+    from drake_dress.models.human.learned.weights import learned_predictor
+
+    return learned_predictor()
+
+
 _OWN: dict[str, Callable[[], MotionPredictor | PersonPredictor]] = {
     "still": StillPredictor,
     "constant_velocity": ConstantVelocityPredictor,
+    "ridge": _ridge,
+    "recurrent": _recurrent,
+    "learned": _learned,
 }
 _predictors = dict(_OWN)
 PREDICTORS: Mapping[str, Callable[[], MotionPredictor | PersonPredictor]] = MappingProxyType(

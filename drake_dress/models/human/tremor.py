@@ -76,6 +76,28 @@ class Wandering:
         return float(self._size * np.sum(np.sin(self._omega * time + self._phase) / self._omega))
 
 
+class Wanderings:
+    """Independent functions as `Wandering`, evaluated together.
+
+    Args:
+        rng: draws frequencies and phases.
+        count: number of functions.
+    """
+
+    def __init__(self, rng: np.random.Generator, count: int) -> None:
+        drawn = [
+            (rng.uniform(_SLOWEST, _FASTEST, _TONES), rng.random(_TONES)) for _ in range(count)
+        ]
+        self._omega = 2.0 * np.pi * np.array([tones for tones, _ in drawn])
+        self._phase = 2.0 * np.pi * np.array([phases for _, phases in drawn])
+
+    def value(self, time: float) -> FloatArray:
+        """Returns the functions (count,) at `time`, s."""
+        tones = np.cos(self._omega * time + self._phase)
+        value: FloatArray = np.sqrt(2.0 / _TONES) * tones.sum(axis=1)
+        return value
+
+
 class TremorWave:
     """Tremor of one arm over time, with mean amplitude 1.
 

@@ -11,8 +11,8 @@ from drake_dress.learning.evaluation.baselines import (
     constant_velocity,
     damped_velocity,
     last_velocity,
+    mean_of,
     plain_baselines,
-    ridge,
     still,
 )
 from drake_dress.models.human.learned.forecast import PersonHistory
@@ -87,4 +87,4 @@ def test_hidden_joints_are_filled_in(name: str) -> None:
 def test_ridge_is_the_shipped_predictor_at_its_own_step() -> None:
     joints = drawn_scene(2).joints
     expected = RIDGE.predict(joints, PERIOD, FUTURE)
-    np.testing.assert_array_equal(ridge(RIDGE)(history(joints)), expected)
+    np.testing.assert_array_equal(mean_of(RIDGE)(history(joints)), expected)

@@ -51,10 +51,16 @@ def test_a_sleeve_on_an_arm_surrounds_it_and_one_off_it_is_before_the_hand() -> 
 
 
 def test_grippers_hold_the_sleeves_from_nearby() -> None:
-    for start in starts():
+    for start in starts(Reach(0.45, (0.5, 0.5), (0.12, 0.12), 9.0)):
         off = np.linalg.norm(start.gripper - start.center, axis=1)
         np.testing.assert_allclose(off, 0.9 * 0.12)
         np.testing.assert_allclose(np.linalg.norm(start.direction, axis=1), 1.0)
+
+
+def test_grippers_are_within_the_coats_reach_of_each_other() -> None:
+    apart = [np.linalg.norm(s.gripper[0] - s.gripper[1]) for s in starts()]
+    assert max(apart) <= 0.95 * REACH.between_grippers + 1e-12
+    assert min(apart) < 0.9 * REACH.between_grippers
 
 
 def test_starts_do_not_change_each_other() -> None:

@@ -130,8 +130,10 @@ def test_regions_hold_what_they_should_of_validation_windows() -> None:
 
 
 def test_what_is_trained_on_is_familiar() -> None:
+    found = replace(training(), familiar_batches=40).run()
+    assert found is not None
     batch = WindowSource(made("free", 4), 3, noise=0.004).drawn(60)
-    assert (distance(trained(), batch.arms.tokens) < 1.0).mean() > 0.95
+    assert (distance(found, batch.arms.tokens) < 1.0).mean() > 0.95
 
 
 def test_errors_are_distances_of_the_mean_from_the_truth() -> None:
@@ -197,3 +199,28 @@ def test_without_sleeves_none_is_seen() -> None:
         assert not batch.arms.tokens[:, :, SLEEVE_COLUMNS].any()
     source = replace(training(), with_sleeves=False)._source(made("active", 1), (1, 2))
     assert not source.drawn(8).arms.tokens[:, :, SLEEVE_COLUMNS].any()
+
+
+def test_recordings_are_added_to_weights_that_there_are() -> None:
+    """Half of each batch is of recordings; the linear map and the diffusion stay."""
+    base = training()
+    recorded = carried(30, 6, 101)
+    adapting = replace(
+        base,
+        start=trained(),
+        recorded=recorded,
+        residual=replace(base.residual, steps=60, rate=3e-3, every=20),
+        validation={"recorded": carried(90, 4, 101)},
+        familiar_batches=20,
+    )
+    found = adapting.run()
+    assert found is not None
+    assert set(found) == set(trained())
+    changed = {name for name in found if not np.array_equal(found[name], trained()[name])}
+    assert "displacement.weight" in changed
+    assert not {n for n in changed if n.startswith(("linear", "latent", "denoise", "start"))}
+    other = validation_windows(carried(200, 6, 101))
+    after, before = (
+        np.mean([errors(w, INTENT, batch).mean() for batch in other]) for w in (found, trained())
+    )
+    assert after < 0.9 * before

@@ -8,6 +8,7 @@ from drake_dress.models.human.tremor import (
     TremorParameters,
     TremorWave,
     Wandering,
+    Wanderings,
     tremor_torque,
 )
 
@@ -75,3 +76,11 @@ def test_unusable_parameters_are_told() -> None:
         TremorParameters(amplitude=-0.1)
     with pytest.raises(UserError, match=r"frequency: is 0\.0 Hz"):
         TremorParameters(frequency=0.0)
+
+
+def test_wandering_functions_have_variance_one_and_do_not_know_of_each_other() -> None:
+    together = Wanderings(np.random.default_rng(8), 5)
+    values = np.array([together.value(t) for t in np.arange(0.0, 4000.0, 1.7)])
+    spread = values.T @ values / len(values)
+    np.testing.assert_allclose(spread, np.eye(5), atol=0.12)
+    assert np.abs(values.mean(axis=0)).max() < 0.05

@@ -98,7 +98,10 @@ def _elbow_between(
     way = hand - shoulder
     apart = np.maximum(_length(way), 1e-6)
     axis = way / apart
-    reach = np.clip(apart, np.abs(upper - fore) + 1e-6, upper + fore)
+    # a hand that is seen beyond reach stretches both limbs alike
+    stretched = np.maximum(1.0, apart / (upper + fore))
+    upper, fore = stretched * upper, stretched * fore
+    reach = np.maximum(apart, np.abs(upper - fore) + 1e-6)
     along = (upper**2 - fore**2 + reach**2) / (2.0 * reach)
     radius = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     off = held - shoulder

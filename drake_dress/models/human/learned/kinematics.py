@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.learned.arm_frame import facing
 from drake_dress.models.human.prediction import LIMBS
 
@@ -31,12 +31,21 @@ class Lengths:
     limbs: FloatArray
 
     @classmethod
-    def of(cls, joints: FloatArray) -> Lengths:
-        """Returns the medians over histories of joints (B,T,6,3), m, without gaps."""
-        found = [
-            np.median(np.linalg.norm(joints[:, :, b] - joints[:, :, a], axis=2), axis=1)
-            for a, b in ((0, 3), *LIMBS)
-        ]
+    def of(cls, joints: FloatArray, seen: BoolArray | None = None) -> Lengths:
+        """Returns the medians over histories.
+
+        Args:
+            joints: (B,T,6,3) m, without gaps.
+            seen: (B,T,6) which joints were observed; all if None. What is filled in only counts
+                for a limb of which both ends were never seen at once.
+        """
+        seen = np.ones(joints.shape[:3], dtype=bool) if seen is None else seen
+        found = []
+        for a, b in ((0, 3), *LIMBS):
+            length = np.linalg.norm(joints[:, :, b] - joints[:, :, a], axis=2)
+            both = seen[:, :, a] & seen[:, :, b]
+            both[~both.any(axis=1)] = True
+            found.append(np.nanmedian(np.where(both, length, np.nan), axis=1))
         return cls(found[0], np.stack(found[1:], axis=1))
 
 
@@ -99,6 +108,18 @@ def limb_directions(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     px, py, pz = np.sin(k) * np.cos(r), np.sin(k) * np.sin(r), -np.cos(k)
     qx, qz = ce * px + se * pz, -se * px + ce * pz
     return upper, np.stack([qx, ca * py - sa * qz, sa * py + ca * qz], axis=-1)
+
+
+def beyond_limits(upper: FloatArray, fore: FloatArray) -> FloatArray:
+    """Returns (N,) by how much the joints of left arms pass their limits, in all, rad.
+
+    Args:
+        upper: (N,3) from shoulder to elbow, in the direction that the person faces, of any length.
+        fore: (N,3) likewise, from elbow to hand.
+    """
+    angles = _near_limits(arm_angles_of(_direction(upper), _direction(fore)))
+    off: FloatArray = np.abs(np.clip(angles, *LIMITS) - angles).sum(axis=-1).min(axis=0)
+    return off
 
 
 def _limited(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drake_dress.machine import one_thread
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.history import Sampling
 from drake_dress.models.human.learned import diffusion, network
@@ -102,6 +103,12 @@ class LearnedPredictor:
         self, history: PersonHistory, memory: PredictorMemory
     ) -> tuple[Forecast, PredictorMemory]:
         """Returns the forecast from the last sample on; see `PersonPredictor`."""
+        with one_thread():
+            return self._forecast(history, memory)
+
+    def _forecast(
+        self, history: PersonHistory, memory: PredictorMemory
+    ) -> tuple[Forecast, PredictorMemory]:
         known = memory.experts.compared(history.time, history.joints[-1], PERIOD, self.experts)
         oldest = self._pose_at(memory, history.time - (HISTORY - 1) * PERIOD)
         joints, seen = filled(history.joints[None], oldest)
@@ -112,7 +119,7 @@ class LearnedPredictor:
         )
         linear = self.networks.linear.displacement(arms.joints[:, :, :3])
         found = self._arms(arms, arms.joints[:, -1:, :3] + linear, intent)
-        lengths = Lengths.of(joints)
+        lengths = Lengths.of(joints, seen)
         now, tail = joints[0, -1], joints[0, -self._damped.history_length :]
         experts = np.stack(
             [

@@ -100,6 +100,8 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
 
 
 TOKEN_SIZE = 56
+# Columns of upper arm, forearm, and the way to the other shoulder.
+LIMB_COLUMNS = (slice(3, 6), slice(6, 9), slice(9, 12))
 # Columns that tell of sleeves.
 SLEEVE_COLUMNS = slice(37, 56)
 

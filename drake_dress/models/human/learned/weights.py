@@ -16,9 +16,12 @@ from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import FAMILIAR_SHAPES
 from drake_dress.models.human.learned.intent import intent_weights
 from drake_dress.models.human.learned.network import FUTURE, HISTORY
-from drake_dress.models.human.learned.predictor import Networks
+from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
+from drake_dress.models.human.learned.recurrent import RecurrentPredictor, recurrent_weights
+from drake_dress.models.human.learned.ridge import RidgePredictor
 
-INTENT, MOTION = "intent.safetensors", "motion.safetensors"
+SHIPPED = Path(__file__).parent / "shipped"
+INTENT, MOTION, RECURRENT = (f"{name}.safetensors" for name in ("intent", "motion", "recurrent"))
 Arrays = dict[str, np.ndarray]
 
 
@@ -78,8 +81,8 @@ def motion_shapes() -> dict[str, tuple[int, ...]]:
 
 
 @lru_cache
-def networks(folder: Path) -> Networks:
-    """Returns the networks in a folder.
+def networks(folder: Path = SHIPPED) -> Networks:
+    """Returns the networks in a folder, or those of the package.
 
     Raises:
         UserError: a file is missing or unusable.
@@ -88,6 +91,27 @@ def networks(folder: Path) -> Networks:
         read_weights(folder / INTENT, intent_shapes()),
         read_weights(folder / MOTION, motion_shapes()),
     )
+
+
+def learned_predictor(folder: Path = SHIPPED) -> LearnedPredictor:
+    """Returns the predictor with the weights in a folder, or with those of the package."""
+    return LearnedPredictor(networks(folder))
+
+
+def ridge_predictor() -> RidgePredictor:
+    """Returns the linear predictor of the package."""
+    return RidgePredictor(networks().linear)
+
+
+def recurrent_shapes() -> dict[str, tuple[int, ...]]:
+    """Returns names and shapes of the recurrent network's weights."""
+    return _shapes(recurrent_weights(np.random.default_rng(0)))
+
+
+@lru_cache
+def recurrent_predictor(folder: Path = SHIPPED) -> RecurrentPredictor:
+    """Returns the recurrent predictor with the weights in a folder, or those of the package."""
+    return RecurrentPredictor(read_weights(folder / RECURRENT, recurrent_shapes()))
 
 
 def _shapes(weights: Mapping[str, np.ndarray]) -> dict[str, tuple[int, ...]]:

@@ -109,7 +109,7 @@ def drawn_networks(seed: int = 0, limit: float = 1e3) -> Networks:
     motion = network.motion_weights(rng) | diffusion.denoiser_weights(rng)
     motion |= diffusion.initialiser_weights(rng)
     motion |= {name: 0.1 * rng.normal(size=shape) for name, shape in FAMILIAR_SHAPES.items()}
-    motion["familiar.limit"] = np.array([limit])
+    motion["familiar.limit"] = np.full(FAMILIAR_SHAPES["familiar.limit"], limit)
     motion["linear.map"] = 0.03 * rng.normal(size=(3, HISTORY - 1, FUTURE))
     motion["latent.latent"] = np.eye(diffusion.VALUES, diffusion.LATENT)
     motion["latent.motion"] = np.eye(diffusion.LATENT, diffusion.VALUES)

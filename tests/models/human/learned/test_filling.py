@@ -108,16 +108,17 @@ def test_hidden_elbow_is_as_near_as_lengths_allow_to_where_it_was_held(seed: int
     assert (distance >= np.linalg.norm(elbow - before[0, 1]) - 1e-9).all()
 
 
-def test_hand_farther_than_the_arm_reaches_straightens_it() -> None:
+def test_hand_farther_than_the_arm_reaches_straightens_it_and_stretches_both_limbs_alike() -> None:
     before = drawn_scene(0, 1).joints
     now = before.copy()
     now[0, 2] = now[0, 0] + 2.0 * (now[0, 2] - now[0, 0])
     seen = np.ones((1, 6), dtype=bool)
     seen[:, 1] = False
     shoulder, elbow, hand = filled_pose(now, seen, before)[0, :3]
-    way = (hand - shoulder) / np.linalg.norm(hand - shoulder)
     upper = np.linalg.norm(before[0, 1] - before[0, 0])
-    np.testing.assert_allclose(elbow, shoulder + upper * way, atol=1e-4)
+    fore = np.linalg.norm(before[0, 2] - before[0, 1])
+    share = upper / (upper + fore)
+    np.testing.assert_allclose(elbow, shoulder + share * (hand - shoulder), atol=1e-4)
 
 
 @pytest.mark.parametrize("rising", [-0.6, 0.0, 0.9])

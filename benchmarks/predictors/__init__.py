@@ -1,0 +1,1 @@
+"""Dressings of active persons with each predictor of their motion."""
