@@ -544,8 +544,8 @@ def _dataset_motion(options: argparse.Namespace) -> int:
 
 def _train(options: argparse.Namespace) -> int:
     from drake_dress.learning.recordings import RecordingOptions
-    from drake_dress.learning.training.commands import FIGURES, FILES, TrainOptions, train_command
-    from drake_dress.models.human.learned.weights import SHIPPED
+    from drake_dress.learning.training.commands import FIGURES, TrainOptions, train_command
+    from drake_dress.models.human.learned.weights import FILES, SHIPPED
 
     if options.recordings and options.network != "motion":
         raise UserError("train", "--recordings", "are learned from by motion alone")

@@ -114,7 +114,7 @@ BAD_YAML = {
     ),
     "unknown predictor": (
         "controller: {predictor: oracle}",
-        ["controller.predictor", "still, constant_velocity, ridge, recurrent or learned"],
+        ["controller.predictor", "still or constant_velocity or ridge or recurrent or learned"],
     ),
     "unknown preset": ("garment: {coat: {preset: cape}}", ["garment.coat.preset", "jacket"]),
     "unknown station": ("station: {kind: moon}", ["station.kind", "simulated"]),

@@ -108,12 +108,15 @@ class IntentScore:
 
     Attributes:
         accuracy: share of right answers.
+        balanced: mean of the shares of right answers where the arm moves by will and where it does
+            not; most windows of the latter would be right if the answer were always no.
         area: area under the curve of hits over false alarms.
         count: number of arms' windows.
         willed: share of them by will.
     """
 
     accuracy: float
+    balanced: float
     area: float
     count: int
     willed: float
@@ -130,8 +133,11 @@ def intent_score(
         found.append(logits(weights, batch, steps)[chosen])
         wanted.append(batch.intent[chosen] > 0)
     logit, true = np.concatenate(found), np.concatenate(wanted)
+    right = (logit > 0.0) == true
+    of_both = [float(right[which].mean()) for which in (true, ~true) if which.any()]
     return IntentScore(
-        float(np.mean((logit > 0.0) == true)),
+        float(np.mean(right)),
+        float(np.mean(of_both)),
         area_under_curve(logit, true),
         len(true),
         float(true.mean()),

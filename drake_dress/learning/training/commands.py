@@ -30,9 +30,8 @@ from drake_dress.learning.training.motion import ADAPTING, MotionTraining, short
 from drake_dress.learning.training.recurrent import RecurrentTraining, recurrent_errors
 from drake_dress.models.human.learned.predictor import Networks
 from drake_dress.models.human.learned.weights import (
+    FILES,
     INTENT,
-    MOTION,
-    RECURRENT,
     SHIPPED,
     intent_shapes,
     networks,
@@ -41,8 +40,6 @@ from drake_dress.models.human.learned.weights import (
 )
 
 FIGURES = "figures.json"
-NAMES = ("intent", "motion", "recurrent")
-FILES = {"intent": INTENT, "motion": MOTION, "recurrent": RECURRENT}
 _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _KINDS: tuple[Kind, ...] = ("passive", "active", "free")
 _NOISES = (0.004, 0.0)

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 
 from drake_dress.learning.training.checkpoint import Checkpoint
+from drake_dress.machine import one_thread
 
 # A batch by its number; arrays or tensors by name.
 Batches = Callable[[int], Any]
@@ -102,7 +103,8 @@ def train(
     state.load_moments(optimiser, tensors)
     best = _Best(dict(state.best), state.error, state.misses)
     total, count, step = 0.0, 0, state.step
-    with ThreadPoolExecutor(1) as ahead:
+    # the next batch is made beside: two threads each would wait for each other
+    with one_thread(), ThreadPoolExecutor(1) as ahead:
         coming = ahead.submit(batches, step)
         while step < schedule.steps and best.misses < schedule.patience:
             batch = coming.result()

@@ -16,7 +16,7 @@ from drake_dress.learning.training.motion import NOISE, validation_windows
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned.recurrent import recurrent_motion, recurrent_weights
 
-SCHEDULE = Schedule(steps=8000, rate=2e-3, every=500, patience=8)
+SCHEDULE = Schedule(steps=5000, rate=2e-3, every=500, patience=8)
 _BATCH = 256
 
 

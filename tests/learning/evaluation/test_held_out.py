@@ -8,8 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drake_dress.learning.evaluation.held_out import area_under_curve, held_out_batches, plain
+from drake_dress.learning.evaluation.held_out import (
+    area_under_curve,
+    held_out_batches,
+    intent_score,
+    plain,
+)
+from drake_dress.models.human.learned.intent import intent_weights
 from drake_dress.models.human.learned.linear import LinearMotion
+from tests.learning.made import Data, carried
 
 
 @dataclass
@@ -65,3 +72,21 @@ def test_area_is_the_share_of_pairs_in_the_right_order(rows: list[tuple[int, boo
 
 def test_area_without_both_is_not_known() -> None:
     assert np.isnan(area_under_curve(np.zeros(3), np.ones(3, dtype=bool)))
+
+
+def test_intent_is_right_by_half_if_the_answer_is_always_no() -> None:
+    """Told of both intents alike; of all windows the share that is not by will."""
+    weights = intent_weights(np.random.default_rng(0))
+    never = {k: np.zeros_like(v) for k, v in weights.items()} | {"intent.bias": np.array([-1.0])}
+    data = carried(3, 12)
+    batches = held_out_batches(Data(data.joint_position, data.sleeve, steady(data.intent)), 0.0)
+    score = intent_score(batches, never, 10)
+    assert score.balanced == 0.5
+    assert score.accuracy == pytest.approx(1.0 - score.willed)
+    assert 0.0 < score.willed < 0.5
+
+
+def steady(intent: np.ndarray) -> np.ndarray:
+    """Returns intents that are the same throughout: will in one sequence of four."""
+    by_will = np.arange(len(intent)) % 4 == 0
+    return np.broadcast_to(by_will[:, None, None], intent.shape).astype(np.int64)

@@ -30,13 +30,20 @@ def filled(joints: FloatArray, first: FloatArray | None = None) -> tuple[FloatAr
         first: (B,6,3) what is known of joints before the history, m, NaN where nothing is.
     """
     seen: BoolArray = np.all(np.isfinite(joints), axis=3)
-    if seen.all():
+    gaps = ~seen.all(axis=(1, 2))
+    if not gaps.any():
         return joints, seen
+    result = joints.copy()
+    result[gaps] = _without_gaps(joints[gaps], seen[gaps], None if first is None else first[gaps])
+    return result, seen
+
+
+def _without_gaps(joints: FloatArray, seen: BoolArray, first: FloatArray | None) -> FloatArray:
     before = _first_poses(joints, seen, first)
     result = np.empty_like(joints)
     for t in range(joints.shape[1]):
         before = result[:, t] = filled_pose(joints[:, t], seen[:, t], before)
-    return result, seen
+    return result
 
 
 def filled_pose(pose: FloatArray, seen: BoolArray, before: FloatArray) -> FloatArray:

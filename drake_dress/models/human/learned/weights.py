@@ -22,6 +22,8 @@ from drake_dress.models.human.learned.ridge import RidgePredictor
 
 SHIPPED = Path(__file__).parent / "shipped"
 INTENT, MOTION, RECURRENT = (f"{name}.safetensors" for name in ("intent", "motion", "recurrent"))
+# Files by the network that `drake-dress train` names.
+FILES = {"intent": INTENT, "motion": MOTION, "recurrent": RECURRENT}
 Arrays = dict[str, np.ndarray]
 
 
