@@ -638,20 +638,6 @@ def _between(low: float, high: float) -> Callable[[str], float]:
     return number
 
 
-def _between(low: float, high: float) -> Callable[[str], float]:
-    """Returns a parser of numbers from `low` to `high`."""
-
-    def parsed(text: str) -> float:
-        value = float(_number(text))
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(
-                f"{text} is out of range, expected {low:g} to {high:g}"
-            )
-        return value
-
-    return parsed
-
-
 def _whole(text: str) -> int:
     value = _number(text)
     if not isinstance(value, int):

@@ -103,7 +103,6 @@ def train(
     state.load_moments(optimiser, tensors)
     best = _Best(dict(state.best), state.error, state.misses)
     total, count, step = 0.0, 0, state.step
-    # the next batch is made beside: two threads each would wait for each other
     with one_thread(), ThreadPoolExecutor(1) as ahead:
         coming = ahead.submit(batches, step)
         while step < schedule.steps and best.misses < schedule.patience:
