@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -147,9 +147,10 @@ class Study:
     def intent(self) -> tuple[list[Table], list[Figure]]:
         """Intent on held-out sequences."""
         data = self._data(*_DRESSED)
+        batches = {noise: held_out_batches(data, noise) for noise in _NOISES}
         scores = {
-            (n, noise): intent_score(held_out_batches(data, noise), self._networks.intent, n)
-            for noise in _NOISES
+            (n, noise): intent_score(windows, self._networks.intent, n)
+            for noise, windows in batches.items()
             for n in (20, 10)
         }
         rows = [
@@ -265,8 +266,7 @@ class Study:
             at_least(f"trained on other persons, below {name} by", 100 * gain(told, name), "%", 15)
             for name in (SHIPPED_RIDGE, OWN_RIDGE)
         ]
-        names = list(told[0].first)
-        header = ["recording", "arms", *names, "best of 20", "90 % region, %", "linear, %"]
+        header = _header("recording", told[0].first)
         return [Table("Recordings, learned from those of other persons", header, rows)], figures
 
     def speed(self) -> tuple[list[Table], list[Figure]]:
@@ -294,15 +294,7 @@ class Study:
         return read_motion(self._options.data, kinds, "test")
 
     def _header(self, what: str) -> list[str]:
-        return [
-            what,
-            "arms",
-            *self._baselines,
-            "learned",
-            "best of 20",
-            "90 % region, %",
-            "linear, %",
-        ]
+        return _header(what, [*self._baselines, "learned"])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -333,6 +325,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=output_file, metavar="FILE")
     add_into_option(parser, _NAME)
     return parser
+
+
+def _header(what: str, predictors: Iterable[str]) -> list[str]:
+    return [what, "arms", *predictors, "best of 20", "90 % region, %", "linear, %"]
 
 
 def _motions(data: Sequences, name: str = "sequence") -> list[TimedMotion]:

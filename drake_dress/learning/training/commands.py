@@ -22,7 +22,7 @@ from drake_dress.learning.evaluation.held_out import compared, held_out_batches,
 from drake_dress.learning.motion.dataset import MotionData, Part, read_motion
 from drake_dress.learning.motion.sequence import Kind
 from drake_dress.learning.recordings import RecordingOptions, read_recording
-from drake_dress.learning.recordings.pieces import Pieces
+from drake_dress.learning.recordings.pieces import LENGTH, Pieces
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.intent import IntentTraining
 from drake_dress.learning.training.loop import Report, Schedule
@@ -103,12 +103,7 @@ def _intent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
     training = IntentTraining(
         data["training"], data["validation"], options.seed, with_sleeves=options.with_sleeves
     )
-    if options.steps is not None:
-        training = replace(training, schedule=_at_most(training.schedule, options.steps))
-    checkpoint = options.out / "intent.checkpoint.safetensors"
-    with _progress() as said:
-        report = said("intent", training.schedule.steps)
-        weights = training.run(checkpoint, report, stop.is_set)
+    weights = _carried_out("intent", training, options, stop)
     if weights is None:
         return None, {}
     batches = held_out_batches(data["test"], _NOISES[0], options.with_sleeves)
@@ -152,12 +147,7 @@ def _recurrent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, d
         options.seed,
         with_sleeves=options.with_sleeves,
     )
-    if options.steps is not None:
-        training = replace(training, schedule=_at_most(training.schedule, options.steps))
-    checkpoint = options.out / "recurrent.checkpoint.safetensors"
-    with _progress() as said:
-        report = said("recurrent", training.schedule.steps)
-        weights = training.run(checkpoint, report, stop.is_set)
+    weights = _carried_out("recurrent", training, options, stop)
     if weights is None:
         return None, {}
     test = {kind: read_motion(options.data, (kind,), "test") for kind in _KINDS}
@@ -174,14 +164,32 @@ def _recurrent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, d
     }
 
 
+def _carried_out(
+    name: str,
+    training: IntentTraining | RecurrentTraining,
+    options: TrainOptions,
+    stop: Interrupt,
+) -> Arrays | None:
+    """Trains one network with progress and a checkpoint; returns None if it was stopped."""
+    if options.steps is not None:
+        training = replace(training, schedule=_at_most(training.schedule, options.steps))
+    with _progress() as said:
+        report = said(name, training.schedule.steps)
+        return training.run(options.out / f"{name}.checkpoint.safetensors", report, stop.is_set)
+
+
 def with_recordings(
     training: MotionTraining, start: Mapping[str, np.ndarray], motions: Sequence[TimedMotion]
 ) -> MotionTraining:
     """Returns a training that goes on from the weights `start` with recordings.
 
-    The last fifth of each recording is for validation, and counts as much as all else.
+    The last fifth of each recording is for validation, and at least one piece; a recording that is
+    not twice as long as a piece is learned from alone.
+
+    Raises:
+        UserError: the recordings are too short.
     """
-    cut = [float(np.quantile(m.time, 1.0 - _HELD_BACK)) for m in motions]
+    cut = [_cut_of(m) for m in motions]
     early = Pieces.of(m.between(-np.inf, t) for m, t in zip(motions, cut, strict=True))
     late = Pieces.of(m.between(t, np.inf) for m, t in zip(motions, cut, strict=True))
     return replace(
@@ -191,6 +199,14 @@ def with_recordings(
         residual=ADAPTING,
         validation={**training.validation, "recorded": late},
     )
+
+
+def _cut_of(motion: TimedMotion) -> float:
+    """Returns the time, s, from which a recording is for validation."""
+    begin, end = float(motion.time[0]), float(motion.time[-1])
+    if end - begin < 2.0 * LENGTH:
+        return np.inf
+    return end - max(LENGTH, _HELD_BACK * (end - begin))
 
 
 def _recordings(options: TrainOptions) -> list[TimedMotion]:

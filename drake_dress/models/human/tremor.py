@@ -23,6 +23,7 @@ _WANDERING_AMPLITUDE = 0.15  # standard deviation, relative
 _WANDERING_FREQUENCY = 0.02  # likewise
 _SLOWEST, _FASTEST = 0.1, 0.5  # of the drift, Hz
 _TONES = 8
+_SIZE = np.sqrt(2.0 / _TONES)  # of a tone, so that the variance is 1
 
 
 @dataclass(frozen=True)
@@ -58,22 +59,25 @@ class Wandering:
     Source: Rice (1944), representation of Gaussian noise by tones. The value depends on the time
     alone, not on earlier calls.
 
+    Attributes:
+        omega: (n,) of the tones, rad/s.
+        phase: (n,) of the tones, rad.
+
     Args:
         rng: draws frequencies and phases.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self._omega = 2.0 * np.pi * rng.uniform(_SLOWEST, _FASTEST, _TONES)
-        self._phase = rng.uniform(0.0, 2.0 * np.pi, _TONES)
-        self._size = np.sqrt(2.0 / _TONES)
+        self.omega = 2.0 * np.pi * rng.uniform(_SLOWEST, _FASTEST, _TONES)
+        self.phase = rng.uniform(0.0, 2.0 * np.pi, _TONES)
 
     def value(self, time: float) -> float:
         """Returns the function at `time`, s."""
-        return float(self._size * np.sum(np.cos(self._omega * time + self._phase)))
+        return float(_SIZE * np.sum(np.cos(self.omega * time + self.phase)))
 
     def integral(self, time: float) -> float:
         """Returns the integral from a fixed time to `time`, s."""
-        return float(self._size * np.sum(np.sin(self._omega * time + self._phase) / self._omega))
+        return float(_SIZE * np.sum(np.sin(self.omega * time + self.phase) / self.omega))
 
 
 class Wanderings:
@@ -85,16 +89,13 @@ class Wanderings:
     """
 
     def __init__(self, rng: np.random.Generator, count: int) -> None:
-        drawn = [
-            (rng.uniform(_SLOWEST, _FASTEST, _TONES), rng.random(_TONES)) for _ in range(count)
-        ]
-        self._omega = 2.0 * np.pi * np.array([tones for tones, _ in drawn])
-        self._phase = 2.0 * np.pi * np.array([phases for _, phases in drawn])
+        each = [Wandering(rng) for _ in range(count)]
+        self._omega = np.stack([w.omega for w in each])
+        self._phase = np.stack([w.phase for w in each])
 
     def value(self, time: float) -> FloatArray:
         """Returns the functions (count,) at `time`, s."""
-        tones = np.cos(self._omega * time + self._phase)
-        value: FloatArray = np.sqrt(2.0 / _TONES) * tones.sum(axis=1)
+        value: FloatArray = _SIZE * np.cos(self._omega * time + self._phase).sum(axis=1)
         return value
 
 

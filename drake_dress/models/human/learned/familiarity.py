@@ -20,6 +20,7 @@ _STEPS = [0, 10, 19]
 _COORDINATES = 60
 # Share of training inputs that are below the limit of one coordinate, and the factor on it.
 _SHARE, _FACTOR = 0.9999, 1.3
+_SHORTEST = 1e-3  # length that is added to those of limbs, in scaled units
 _SMALLEST = 1e-3  # variance of a coordinate that counts as none
 
 _FLAT = len(_STEPS) * TOKEN_SIZE
@@ -60,10 +61,13 @@ def _off(features: FloatArray, mean: FloatArray, coordinates: FloatArray) -> Flo
 
 
 def _features(tokens: np.ndarray) -> FloatArray:
-    """Returns (N,`_FLAT`+`_MORE`): tokens of some steps; lengths and bend beyond limits now."""
+    """Returns (N,`_FLAT`+`_MORE`): tokens of some steps; lengths and bend beyond limits now.
+
+    Lengths are compared by their logarithms: half as long is as unlike as twice as long.
+    """
     now = tokens[:, -1].astype(np.float64)
     limbs = [now[:, columns] for columns in LIMB_COLUMNS]
     upper, fore, _ = limbs
-    lengths = [np.linalg.norm(limb, axis=1) for limb in limbs]
+    lengths = [np.log(np.linalg.norm(limb, axis=1) + _SHORTEST) for limb in limbs]
     more = np.stack([*lengths, beyond_limits(upper, fore)], axis=1)
     return np.concatenate([tokens[:, _STEPS].reshape(len(tokens), -1), more], axis=1)
