@@ -344,7 +344,7 @@ def _add_dataset_motion(kinds: _Verbs) -> None:
     for kind, count, meaning in (
         ("passive", 2000, "persons who follow the garment"),
         ("active", 2000, "persons who also move by will"),
-        ("free", 800, "persons without a garment"),
+        ("free", 1600, "persons without a garment"),
     ):
         motion.add_argument(
             f"--{kind}",

@@ -39,9 +39,13 @@ from drake_dress.errors import UserError
 from drake_dress.learning.evaluation.baselines import mean_of, plain_baselines
 from drake_dress.learning.evaluation.held_out import (
     HeldOut,
+    Which,
+    begins,
     compared,
+    goes_on,
     held_out_batches,
     intent_score,
+    rests,
 )
 from drake_dress.learning.evaluation.stream import followed
 from drake_dress.learning.motion.dataset import MotionData, read_dressings, read_motion
@@ -70,6 +74,12 @@ _NOISES = (0.004, 0.0)
 _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _HIDDEN_SEQUENCES, _HIDDEN = 60, (1.0, 3.0)  # of each kind, s
 _CALLS = 200
+# Arms of active persons by what they will do: the first cannot be known.
+_ACTING: dict[str, Which] = {
+    "begins a movement within 2 s": begins,
+    "goes on with one": goes_on,
+    "follows or rests": rests,
+}
 _SEEN_WITHIN = 0.5  # s
 
 
@@ -137,6 +147,10 @@ class Study:
                 if kind in _DRESSED:
                     both[noise].append(found)
                 rows.append(_held_out_row(f"{kind}, {1e3 * noise:g} mm", found))
+        windows = held_out_batches(self._data("active"), _NOISES[0])
+        for name, which in _ACTING.items():
+            found = compared(windows, self._networks, self._more, which)
+            rows.append(_held_out_row(f"active, {1e3 * _NOISES[0]:g} mm: {name}", found))
         for noise, found_of in both.items():
             rows.append(_held_out_row(f"both, {1e3 * noise:g} mm", _together(found_of)))
         figures = _held_out_figures(_together(both[_NOISES[0]]))

@@ -28,7 +28,7 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
 _NAME = "predictors"
-PREDICTORS = ("learned", "still", "constant_velocity", "damped_velocity", "ridge")
+PREDICTORS = ("learned", "still", "constant_velocity", "damped_velocity", "ridge", "recurrent")
 # Settings of each; a velocity that hardly decays is what is called constant in tables.
 _SETTINGS = {
     "learned": ["controller.predictor=learned"],
@@ -39,6 +39,7 @@ _SETTINGS = {
     ],
     "damped_velocity": ["controller.predictor=constant_velocity"],
     "ridge": ["controller.predictor=ridge"],
+    "recurrent": ["controller.predictor=recurrent"],
 }
 _HEADER = ["runs", "dressed", "90 % interval, %", "time to dress, s", "force 99 %, N", "peak, N"]
 _BESIDE = [

@@ -62,8 +62,17 @@ def test_a_fault_is_answered_as_stated(kind: str, tmp_path: Path) -> None:
     if kind == "random":
         kind = str(np.random.default_rng(seed).choice(list(REACTIONS)))
     print(f"kind {kind}, seed {seed}")
-    result = inject(kind, seed, SCENARIO, tmp_path, rate=0.5)
-    assert result["wrong"] == []
+    assert kept_up(kind, seed, tmp_path)["wrong"] == []
+
+
+def kept_up(kind: str, seed: int, out: Path) -> dict[str, Any]:
+    """Returns what came of a fault, at the highest rate that this machine keeps up with."""
+    try:
+        return inject(kind, seed, SCENARIO, out / "half", rate=0.5)
+    except RuntimeError as error:
+        if "a slower rate may be kept" not in str(error):
+            raise
+        return inject(kind, seed, SCENARIO, out / "fifth", rate=0.2)
 
 
 def test_memory_is_that_of_a_process_and_of_those_it_started() -> None:

@@ -14,13 +14,15 @@ from drake_dress.learning.motion.windows import Batch, Sequences, WindowSource
 from drake_dress.learning.training.intent import logits
 from drake_dress.learning.training.motion import predicted
 from drake_dress.models.arrays import BoolArray, FloatArray
-from drake_dress.models.human.learned import diffusion
+from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.linear import LinearMotion
 from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.predictor import Networks
 
 # Displacements (2B,F+1,3,3), m, that a baseline predicts for the arms of a batch.
 Baseline = Callable[[Batch], FloatArray]
+# Which of the arms (2B,) of a batch are looked at.
+Which = Callable[[Batch], BoolArray]
 EVERY = 0.5  # s, between windows
 _TOGETHER, _SEED = 1200, 9
 _WINDOW = 5  # samples of a velocity
@@ -57,38 +59,67 @@ def held_out_batches(data: Sequences, noise: float, with_sleeves: bool = True) -
     return source.every(EVERY, _TOGETHER)
 
 
-def compared(batches: Sequence[Batch], networks: Networks, more: Mapping[str, Baseline]) -> HeldOut:
+def begins(batch: Batch) -> BoolArray:
+    """Returns whether each arm begins a movement by will within the horizon."""
+    willed = batch.willed[:, HISTORY - 1 :] > 0
+    found: BoolArray = np.any(willed[:, 1:] & ~willed[:, :-1], axis=1)
+    return found
+
+
+def goes_on(batch: Batch) -> BoolArray:
+    """Returns whether each arm moves by will, and begins no other movement within the horizon."""
+    found: BoolArray = (batch.intent > 0) & ~begins(batch)
+    return found
+
+
+def rests(batch: Batch) -> BoolArray:
+    """Returns whether each arm moves by will neither now nor within the horizon."""
+    found: BoolArray = (batch.intent == 0) & ~begins(batch)
+    return found
+
+
+def compared(
+    batches: Sequence[Batch],
+    networks: Networks,
+    more: Mapping[str, Baseline],
+    which: Which | None = None,
+) -> HeldOut:
     """Returns the errors of the learned predictor and of all baselines.
 
     Args:
         batches: windows.
         networks: weights.
         more: baselines in addition to the plain ones.
+        which: arms that are looked at; None: all. NaN if there are none.
     """
     baselines = plain(networks.linear) | dict(more)
     errors: dict[str, list[FloatArray]] = {name: [] for name in (*baselines, "learned")}
     best, covered = [], []
     for batch in batches:
+        chosen = slice(None) if which is None else which(batch)
         z, mean, scale = predicted(networks.motion, networks.intent, batch)
         off = np.linalg.norm(mean - batch.displacement, axis=3)
-        errors["learned"].append(off[:, 1:].mean(axis=2))
+        errors["learned"].append(off[chosen, 1:].mean(axis=2))
         for name, of in baselines.items():
             away = np.linalg.norm(of(batch) - batch.displacement, axis=3)
-            errors[name].append(away[:, 1:].mean(axis=2))
-        covered.append((off <= scale * networks.motion["region.factor"])[:, 1:])
-        best.append(_best(networks.motion, z, mean, scale, batch))
+            errors[name].append(away[chosen, 1:].mean(axis=2))
+        covered.append((off <= network.radius(networks.motion, z))[chosen, 1:])
+        best.append(_best(networks.motion, z, mean, scale, batch)[chosen])
     return HeldOut(
         {
             name: {
-                label: float(np.concatenate(rows)[:, :steps].mean())
-                for label, steps in _HORIZONS.items()
+                label: _mean(np.concatenate(rows)[:, :steps]) for label, steps in _HORIZONS.items()
             }
             for name, rows in errors.items()
         },
-        float(np.concatenate(best).mean()),
-        float(np.concatenate(covered).mean()),
-        sum(len(batch.intent) for batch in batches),
+        _mean(np.concatenate(best)),
+        _mean(np.concatenate(covered)),
+        sum(len(rows) for rows in best),
     )
+
+
+def _mean(values: FloatArray | BoolArray) -> float:
+    return float(values.mean()) if values.size else float("nan")
 
 
 def plain(linear: LinearMotion) -> dict[str, Baseline]:

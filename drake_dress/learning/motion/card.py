@@ -54,7 +54,8 @@ _CONTENT = f"""\
 
 The direction of an armhole is that from the cuff to it. Without a garment, `sleeve` is NaN.
 `intent` is 1 while will moves the arm, not while the hand pauses in a movement or is held where it
-was drawn; and for both arms while the body turns, leans, steps or walks.
+was drawn; and for both arms while the body turns, leans, steps or walks. It is 0 where the hand is
+slower than 2 cm/s.
 """
 
 _LIMITS = """\

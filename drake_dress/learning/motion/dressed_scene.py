@@ -8,7 +8,7 @@ from drake_dress.learning.motion.bodies import draw_reach
 from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axes_of
 from drake_dress.learning.motion.movements import Armhole
 from drake_dress.learning.motion.moving_person import MovingPerson
-from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
+from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence, is_moving
 from drake_dress.learning.motion.torso import draw_turn
 from drake_dress.learning.motion.will import Will
 from drake_dress.models.arrays import FloatArray
@@ -44,14 +44,16 @@ class DressedScene:
 
     def run(self) -> Sequence:
         """Moves for the whole duration; returns the samples."""
-        made, sleeves = Sequence.empty(), self._sleeves
+        made, sleeves, hands = Sequence.empty(), self._sleeves, np.empty((COUNT, 2, 3))
         for k in range(COUNT):
             time = k * PERIOD
             made.joints[k] = self._mover.trembling(time)
+            hands[k] = [axis.G(0.0) for axis in self._axes]
             made.sleeves[k] = np.hstack([sleeves.center, sleeves.direction])
             made.intent[k], made.on[k] = self._mover.intent(time), sleeves.on
             self._advance(k, time)
         _interpolate(made.sleeves)
+        made.intent[~is_moving(hands)] = 0
         return made
 
     def _drawn_will(self, i: int) -> Will:

@@ -10,7 +10,7 @@ import numpy as np
 
 from drake_dress.learning.motion.gait import Gait
 from drake_dress.learning.motion.moving_person import MovingPerson
-from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence
+from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence, is_moving
 from drake_dress.learning.motion.strokes import Stroke, draw_stroke
 from drake_dress.learning.motion.torso import draw_turn
 from drake_dress.learning.motion.will import Will
@@ -53,12 +53,13 @@ class FreeScene:
 
     def run(self) -> Sequence:
         """Moves for the whole duration; returns the samples."""
-        made, mover = Sequence.empty(), self._mover
+        made, mover, hands = Sequence.empty(), self._mover, np.empty((COUNT, 2, 3))
         for k in range(COUNT):
             time = k * PERIOD
             gait = self._gait
             swing = None if gait is None else gait.arm_angles(time)
             made.joints[k] = self._walked(mover.trembling(time, swing), time)
+            hands[k] = self._walked(mover.joints(time, swing), time)[[2, 5]]
             made.intent[k] = mover.intent(time) | (gait is not None and gait.share(time) > 0.0)
             if k % round(_DECIDES / PERIOD) == 0:
                 self._decide(time)
@@ -68,6 +69,7 @@ class FreeScene:
                 else:
                     arm.follow(None, 0.0, PERIOD)
             self._walk(time)
+        made.intent[~is_moving(hands)] = 0
         return made
 
     def _walk(self, time: float) -> None:

@@ -74,26 +74,30 @@ class MovingPerson:
         way = sum((s.way for s in strokes), np.zeros(3))
         self.torso.strokes.append(draw_lean(self._rng, time, end - time, way))
 
-    def joints(self, time: float) -> FloatArray:
-        """Returns the joints (6,3), m, world, without tremor."""
-        return self._placed([arm.angles for arm in self.arms], time)
-
-    def trembling(self, time: float, more: FloatArray | None = None) -> FloatArray:
-        """Returns the joints (6,3), m, world.
+    def joints(self, time: float, more: FloatArray | None = None) -> FloatArray:
+        """Returns the joints (6,3), m, world, without tremor.
 
         Args:
             time: s.
             more: (2,4) angles that are added, rad.
         """
-        angles = [arm.angles.copy() for arm in self.arms]
+        added = np.zeros((2, 4)) if more is None else more
+        return self._placed([arm.angles + a for arm, a in zip(self.arms, added, strict=True)], time)
+
+    def trembling(self, time: float, more: FloatArray | None = None) -> FloatArray:
+        """Returns the joints (6,3), m, world, with tremor.
+
+        Args:
+            time: s.
+            more: (2,4) angles that are added, rad.
+        """
+        shaken = np.zeros((2, 4)) if more is None else more.copy()
         if self._tremor is not None:
             amplitude, waves = self._tremor
             for i, wave in enumerate(waves):
                 # about the upper arm's axis and at the elbow
-                angles[i][2:] += amplitude / self.person.measures.forearm_length * wave.value(time)
-        if more is not None:
-            angles = [a + b for a, b in zip(angles, more, strict=True)]
-        return self._placed(angles, time)
+                shaken[i, 2:] += amplitude / self.person.measures.forearm_length * wave.value(time)
+        return self.joints(time, shaken)
 
     def _placed(self, angles: list[FloatArray], time: float) -> FloatArray:
         """Returns the joints (6,3), m, world, of both arms with `angles`."""

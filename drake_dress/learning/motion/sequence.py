@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 
 # Kinds of sequences: the person follows the garment; moves by will in it; moves without a garment,
 # and with the whole body.
@@ -16,6 +16,9 @@ KINDS: tuple[Kind, ...] = ("passive", "active", "free")
 DURATION = 20.0  # s
 PERIOD = 0.05  # s, between samples
 COUNT = round(DURATION / PERIOD) + 1
+RESTS = 0.02  # m/s
+# A hand that moves within this time of a moment is not at rest then, s: a wave turns around.
+_TURNS_AROUND = 0.2
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Sequence:
         sleeves: (T,2,6) centre, m, and unit direction from cuff to armhole of left and right
             armhole; NaN without a garment.
         intent: (T,2) 1 where will moves the arm, by itself or with the torso; 0 where it rests, is
-            held, or follows.
+            held, or follows. A hand slower than `RESTS` rests.
         on: (T,2) 1 where the arm is in its sleeve.
     """
 
@@ -45,3 +48,13 @@ class Sequence:
             np.zeros((COUNT, 2), dtype=np.int64),
             np.zeros((COUNT, 2), dtype=np.int64),
         )
+
+
+def is_moving(hands: FloatArray) -> BoolArray:
+    """Returns (T,2) whether each hand, (T,2,3) m, `PERIOD` apart, moves about that time."""
+    speed = np.linalg.norm(np.diff(hands, axis=0), axis=2) / PERIOD
+    fast = np.concatenate([speed[:1], np.maximum(speed[1:], speed[:-1]), speed[-1:]]) > RESTS
+    around = round(_TURNS_AROUND / PERIOD)
+    padded = np.pad(fast, ((around, around), (0, 0)))
+    moving: BoolArray = np.any([padded[k : k + len(fast)] for k in range(2 * around + 1)], axis=0)
+    return moving

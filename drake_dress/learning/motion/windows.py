@@ -62,14 +62,14 @@ class Augmentation:
     noise: float = 0.004
     sleeve_noise: float = 1.5
     noiseless: float = 0.2
-    paced: float = 0.5
+    paced: float = 0.4
     pace: tuple[float, float] = (-0.4, 0.8)
     turned: float = 0.2
     hidden: float = 0.25
     lost: float = 0.015
-    one_armed: float = 0.08
-    late: float = 0.15
-    bare: float = 0.25
+    one_armed: float = 0.05
+    late: float = 0.12
+    bare: float = 0.15
 
 
 @dataclass(frozen=True)

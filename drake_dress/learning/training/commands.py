@@ -85,7 +85,7 @@ def train_command(name: str, options: TrainOptions) -> int:
             print(f"stopped; the same command goes on from {options.out}", flush=True)
             return stop.status
         told = {
-            "command": f"drake-dress train {name} --seed {options.seed}",
+            "command": _command(name, options),
             "version": __version__,
             "data": _told_of(options.data),
         }
@@ -96,6 +96,18 @@ def train_command(name: str, options: TrainOptions) -> int:
         write_text(options.out / FIGURES, json.dumps(kept, indent=1) + "\n")
     print(f"weights and figures: {options.out}")
     return 0
+
+
+def _command(name: str, options: TrainOptions) -> str:
+    """Returns the command as it may be given again, with files by their names alone."""
+    words = ["drake-dress train", name, f"--seed {options.seed}"]
+    if options.steps is not None:
+        words.append(f"--steps {options.steps}")
+    if not options.with_sleeves:
+        words.append("--no-sleeves")
+    if options.recordings:
+        words.append(" ".join(["--recordings", *(path.name for path in options.recordings)]))
+    return " ".join(words)
 
 
 def _intent(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict[str, Any]]:

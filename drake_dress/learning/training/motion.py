@@ -30,18 +30,16 @@ from drake_dress.models.human.learned.familiarity import familiar_weights
 from drake_dress.models.human.learned.intent import intent_logit
 from drake_dress.models.human.learned.layers import logistic
 from drake_dress.models.human.learned.linear import LinearFit, LinearMotion
-from drake_dress.models.human.learned.network import FUTURE, HISTORY
+from drake_dress.models.human.learned.network import COVERED, FUTURE, HISTORY
 
-RESIDUAL = Schedule(steps=12000, rate=2e-3, every=1000, patience=12)
+RESIDUAL = Schedule(steps=12000, rate=3e-3, every=1000, patience=12)
 DENOISER = Schedule(steps=4000, rate=2e-3, every=500, patience=6)
 INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
 ADAPTING = Schedule(steps=3000, rate=5e-4, every=250, patience=6)
-COVERED = 0.9
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
 _BATCH, _SMALLER_BATCH = 256, 64
 _LINEAR_BATCH = 1024
-_SCALE_SHARE = 0.01  # of the scale's loss in the whole
 # Share of the free sequences' error in the validation's: they move five times as far.
 _FREE_SHARE = 0.1
 _HELD_OUT_BATCHES = 12  # of validation data for the diffusion
@@ -206,10 +204,14 @@ class MotionTraining:
             z = network.context(w, tokens, intent)
             off = base + network.residual(w, z) - wanted
             error = (off.square().sum(-1) + 1e-8).sqrt()
-            # the scale is fitted to the error that there is, and does not change it
+            # Scale and radius are fitted to the error that there is, without a say in the features.
+            # An error counts by its expected size: else a person who walks would outweigh ten who
+            # are being dressed.
             scale = network.error_scale(w, z.detach())
-            likely = (scale.log() + error.detach() / scale).mean()
-            return error.mean() + _SCALE_SHARE * likely
+            beyond = error.detach() - network.quantile(w, z.detach())
+            quantile = torch.maximum(COVERED * beyond, (COVERED - 1.0) * beyond)
+            likely = scale.log() + error / scale
+            return (likely + quantile / scale.detach()).mean()
 
         def validation(w: Mapping[str, torch.Tensor]) -> float:
             arrays = {k: v.detach().cpu().numpy() for k, v in w.items()} | weights
@@ -286,15 +288,13 @@ class MotionTraining:
         return _Stage(first, batches, loss, fixed, self.initialiser)
 
     def regions(self, weights: Arrays) -> Arrays:
-        """Returns the factors (F+1,3) on the error's scale with which regions cover `COVERED`."""
+        """Returns the factors (F+1,3) on the learned radii with which regions cover `COVERED`."""
         ratios = []
-        for kind, data in self.validation.items():
-            if kind == "free":
-                continue
+        for data in self.validation.values():
             for batch in validation_windows(data, self.with_sleeves):
-                _, mean, scale = predicted(weights, self.intent, batch)
+                z, mean, _ = predicted(weights, self.intent, batch)
                 off = np.linalg.norm(batch.displacement - mean, axis=3)
-                ratios.append(off / scale)
+                ratios.append(off / network.quantile(weights, z))
         every = np.concatenate(ratios)
         level = min(1.0, COVERED * (1.0 + 1.0 / len(every)))
         factor = np.quantile(every, level, axis=0)

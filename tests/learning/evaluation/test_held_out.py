@@ -10,13 +10,18 @@ from hypothesis import strategies as st
 
 from drake_dress.learning.evaluation.held_out import (
     area_under_curve,
+    begins,
+    compared,
+    goes_on,
     held_out_batches,
     intent_score,
     plain,
+    rests,
 )
 from drake_dress.models.human.learned.intent import intent_weights
 from drake_dress.models.human.learned.linear import LinearMotion
 from tests.learning.made import Data, carried
+from tests.models.human.learned.drawn import drawn_networks
 
 
 @dataclass
@@ -68,6 +73,45 @@ def test_area_is_the_share_of_pairs_in_the_right_order(rows: list[tuple[int, boo
     gap = score[true][:, None] - score[~true][None]
     expected = float(np.mean((gap > 0.0) + 0.5 * (gap == 0.0)))
     assert area_under_curve(score, true) == pytest.approx(expected)
+
+
+def willing() -> Moving:
+    """Persons at rest but for one arm, whose intent is told to last from 2.5 s to 4 s."""
+    data = moving(0.0)
+    data.intent[:, 50:80, 0] = 1
+    return data
+
+
+def test_each_arm_begins_or_goes_on_or_rests() -> None:
+    (batch,) = held_out_batches(willing(), 0.0)
+    groups = np.stack([which(batch) for which in (begins, goes_on, rests)])
+    np.testing.assert_array_equal(groups.sum(axis=0), 1)
+    assert groups.any(axis=1).all()
+    # left arms come first, by person and time; now is from 1.9 s on, every 0.5 s
+    times = np.tile(1.9 + 0.5 * np.arange(len(batch.intent) // 4), 2)
+    left = groups[:, : len(batch.intent) // 2]
+    np.testing.assert_array_equal(left[0], times < 2.5)
+    np.testing.assert_array_equal(left[1], times >= 2.5)
+    assert groups[2, len(batch.intent) // 2 :].all()
+
+
+def test_only_what_is_chosen_is_compared() -> None:
+    networks = drawn_networks(0)
+    batches = held_out_batches(willing(), 0.01)
+    parts = [compared(batches, networks, {}, which) for which in (begins, goes_on, rests)]
+    whole = compared(batches, networks, {})
+    counts = [part.count for part in parts]
+    assert sum(counts) == whole.count
+    for of in (
+        lambda found: found.errors["learned"]["1 s"],
+        lambda found: found.best,
+        lambda found: found.covered,
+    ):
+        mean = np.average([of(part) for part in parts], weights=counts)
+        assert of(whole) == pytest.approx(float(mean))
+    none = compared(batches, networks, {}, lambda batch: batch.intent > 1)
+    assert none.count == 0
+    assert np.isnan(none.best)
 
 
 def test_area_without_both_is_not_known() -> None:

@@ -38,19 +38,17 @@ def test_limbs_keep_their_lengths_and_nobody_leaps(kind: Kind) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints_stay_within_their_limits(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
     beyond, seen = [], []
-    joints = MovingPerson.joints
 
-    def looked(mover: MovingPerson, time: float) -> np.ndarray:
+    def looked(mover: MovingPerson) -> None:
         angles = np.array([arm.angles for arm in mover.arms])
         limits = mover.person.limits
         beyond.append(np.maximum(limits[:, 0] - angles, angles - limits[:, 1]).max())
         seen.append(angles)
-        return joints(mover, time)
 
     trembling = MovingPerson.trembling
 
     def watched(mover: MovingPerson, time: float, more: np.ndarray | None = None) -> np.ndarray:
-        looked(mover, time)
+        looked(mover)
         return trembling(mover, time, more)
 
     monkeypatch.setattr(MovingPerson, "trembling", watched)
@@ -63,6 +61,18 @@ def test_joints_stay_within_their_limits(kind: Kind, monkeypatch: pytest.MonkeyP
 def test_a_passive_person_moves_without_intent() -> None:
     assert not any(s.intent.any() for s in few("passive"))
     assert all(np.ptp(s.joints[:, [2, 5]], axis=0).max() > 0.005 for s in few("passive"))
+
+
+@pytest.mark.parametrize("kind", ["active", "free"])
+def test_a_hand_at_rest_does_not_move_by_will(kind: Kind) -> None:
+    for s in few(kind):
+        speed = np.linalg.norm(np.diff(s.joints[:, [2, 5]], axis=0), axis=-1) / PERIOD
+        slow = np.concatenate([speed, speed[-1:]]) < 0.005
+        # at rest, as a person with a tremor never is, for half a second
+        long = np.array(
+            [[slow[max(0, k - 5) : k + 5, i].all() for i in (0, 1)] for k in range(COUNT)]
+        )
+        assert not s.intent[long].any()
 
 
 @pytest.mark.parametrize("kind", ["active", "free"])

@@ -249,7 +249,7 @@ def test_shares_of_arms_and_beginnings_that_are_not_seen_are_as_told(name: str) 
 
 def test_made_sequences_give_finite_windows_of_the_kinds_that_networks_take() -> None:
     batch = WindowSource(made("free", 3), 1, Augmentation()).drawn(64)
-    assert batch.arms.tokens.shape == (128, HISTORY, 56)
+    assert batch.arms.tokens.shape == (128, HISTORY, 64)
     assert batch.arms.tokens.dtype == np.float32
     for part in (batch.arms.tokens, batch.displacement, batch.arms.joints):
         assert np.isfinite(part).all()

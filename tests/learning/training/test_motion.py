@@ -15,7 +15,6 @@ from drake_dress.learning.motion.windows import WindowSource
 from drake_dress.learning.training import motion as module
 from drake_dress.learning.training.loop import Report
 from drake_dress.learning.training.motion import (
-    COVERED,
     MotionTraining,
     errors,
     intents,
@@ -23,10 +22,10 @@ from drake_dress.learning.training.motion import (
     shortened,
     validation_windows,
 )
-from drake_dress.models.human.learned import diffusion
+from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import distance
 from drake_dress.models.human.learned.intent import intent_weights
-from drake_dress.models.human.learned.network import FUTURE, WIDTH
+from drake_dress.models.human.learned.network import COVERED, FUTURE, WIDTH
 from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
 from drake_dress.models.human.learned.tokens import SLEEVE_COLUMNS
 from drake_dress.models.human.learned.weights import motion_shapes, read_weights, write_weights
@@ -117,12 +116,12 @@ def test_linear_map_of_persons_at_constant_velocity_goes_on() -> None:
 
 def test_regions_hold_what_they_should_of_validation_windows() -> None:
     weights = trained()
-    factor = weights["region.factor"]
     inside = []
-    for batch in validation_windows(made("active", 1)):
-        _, mean, scale = predicted(weights, INTENT, batch)
+    every = [made("free", 2), made("active", 1)]
+    for batch in (batch for data in every for batch in validation_windows(data)):
+        z, mean, _ = predicted(weights, INTENT, batch)
         off = np.linalg.norm(batch.displacement - mean, axis=3)
-        inside.append(off <= scale * factor * (1.0 + 1e-6))
+        inside.append(off <= network.radius(weights, z) * (1.0 + 1e-6))
     share = np.concatenate(inside).mean(axis=0)
     count = len(np.concatenate(inside))
     assert (share >= COVERED).all()

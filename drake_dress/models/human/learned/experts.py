@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.human.learned.network import COVERED
 from drake_dress.models.immutable import Immutable
 
 # Horizons that have weights of their own: rows up to these.
 GROUPS = (5, 10, 20)
-COVERED = 0.9  # share of joints that the regions should hold
 
 
 @dataclass(frozen=True)

@@ -45,5 +45,5 @@ def intent_logit(weights: Weights, tokens: Array, hidden: Array) -> Array:
     """
     z = dense(weights, "enter", tokens) + weights["place"]
     for name in _BLOCKS:
-        z = block(weights, name, z, _HEADS, hidden)
+        z = block(weights, name, z, _HEADS, hidden, newest=name == _BLOCKS[-1])
     return dense(weights, "intent", normalised(weights, "last", z[:, -1]))[:, 0]

@@ -62,7 +62,9 @@ def normalised(weights: Weights, name: str, x: Array) -> Array:
     return scaled * weights[f"{name}.scale"] + weights[f"{name}.shift"]
 
 
-def attention(weights: Weights, name: str, x: Array, heads: int, hidden: Array) -> Array:
+def attention(
+    weights: Weights, name: str, x: Array, heads: int, hidden: Array, newest: bool = False
+) -> Array:
     """Returns each step's mixture of all steps that are not hidden (self-attention).
 
     Args:
@@ -71,28 +73,35 @@ def attention(weights: Weights, name: str, x: Array, heads: int, hidden: Array) 
         x: (B,T,c).
         heads: number of heads, a divisor of c.
         hidden: (B,T) 1 where a step is to be left out, else 0.
+        newest: whether only the newest step's is wanted, (B,1,c).
     """
     xp = namespace(x)
-    batch, steps, width = x.shape
+    batch, _, width = x.shape
     size = width // heads
 
-    def split(part: str) -> Array:
-        rows = dense(weights, f"{name}.{part}", x).reshape(batch, steps, heads, size)
-        return xp.swapaxes(rows, 1, 2)
+    def split(part: str, rows: Array) -> Array:
+        made = dense(weights, f"{name}.{part}", rows).reshape(batch, -1, heads, size)
+        return xp.swapaxes(made, 1, 2)
 
-    query, key, value = split("query"), split("key"), split("value")
+    query = split("query", x[:, -1:] if newest else x)
+    key, value = split("key", x), split("value", x)
     score = query @ xp.swapaxes(key, 2, 3) / size**0.5 - 1e4 * hidden[:, None, None, :]
     share = xp.exp(score - xp.amax(score, -1)[..., None])
     share = share / share.sum(axis=-1, keepdims=True)
-    mixed = xp.swapaxes(share @ value, 1, 2).reshape(batch, steps, width)
+    mixed = xp.swapaxes(share @ value, 1, 2).reshape(batch, -1, width)
     return dense(weights, f"{name}.output", mixed)
 
 
-def block(weights: Weights, name: str, x: Array, heads: int, hidden: Array) -> Array:
-    """Returns a transformer's layer of x (B,T,c): attention, then two dense layers (pre-norm)."""
-    x = x + attention(
-        weights, f"{name}.attention", normalised(weights, f"{name}.first", x), heads, hidden
-    )
+def block(
+    weights: Weights, name: str, x: Array, heads: int, hidden: Array, newest: bool = False
+) -> Array:
+    """Returns a transformer's layer of x (B,T,c): attention, then two dense layers (pre-norm).
+
+    With `newest`, only the newest step's, (B,1,c).
+    """
+    entering = normalised(weights, f"{name}.first", x)
+    mixed = attention(weights, f"{name}.attention", entering, heads, hidden, newest)
+    x = (x[:, -1:] if newest else x) + mixed
     inner = swish(dense(weights, f"{name}.wide", normalised(weights, f"{name}.second", x)))
     return x + dense(weights, f"{name}.narrow", inner)
 

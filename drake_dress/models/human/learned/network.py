@@ -1,9 +1,11 @@
 """The residual network: what the linear predictor misses, and how far off the sum may be.
 
 Each channel of the tokens is reduced to a few learned averages over time; residual dense layers
-follow. Two heads give the displacement that is added to the linear predictor's, and the scale of
-the error that is left, for each joint and step. Where all joints are seen, row 0 takes the noise of
-the newest observation back; where one is hidden, it corrects its filled-in place.
+follow. Three heads give the displacement that is added to the linear predictor's, the scale of the
+error that is left, and the radius that nine of ten errors stay within, for each joint and step: an
+arm that may or may not begin to move has a small error mostly, and a wide region. Where all joints
+are seen, row 0 takes the noise of the newest observation back; where one is hidden, it corrects its
+filled-in place.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from drake_dress.models.human.learned.tokens import TOKEN_SIZE
 
 HISTORY, FUTURE = 20, 20  # samples
 PERIOD = 0.1  # s
+COVERED = 0.9  # share of errors in the regions
 AVERAGES = 8
 WIDTH = 256
 _BLOCKS = ("first", "second", "third", "fourth")
@@ -45,7 +48,8 @@ def motion_weights(rng: np.random.Generator) -> dict[str, np.ndarray]:
         weights |= norm_weights(f"{name}.norm", WIDTH)
         weights |= dense_weights(rng, f"{name}.dense", WIDTH, WIDTH)
     weights |= dense_weights(rng, "displacement", WIDTH, (FUTURE + 1) * _JOINTS * 3, 0.01)
-    return weights | dense_weights(rng, "scale", WIDTH, (FUTURE + 1) * _JOINTS, 0.01)
+    weights |= dense_weights(rng, "scale", WIDTH, (FUTURE + 1) * _JOINTS, 0.01)
+    return weights | dense_weights(rng, "radius", WIDTH, (FUTURE + 1) * _JOINTS, 0.01)
 
 
 def context(weights: Weights, tokens: Array, intent: Array) -> Array:
@@ -72,5 +76,24 @@ def residual(weights: Weights, z: Array) -> Array:
 
 def error_scale(weights: Weights, z: Array) -> Array:
     """Returns the expected size of the error (N,F+1,3), m, of each joint and step."""
-    rows = dense(weights, "scale", z).reshape(z.shape[0], FUTURE + 1, _JOINTS)
-    return _SMALLEST + 0.1 * softplus(rows - 1.0) * like(_GROWTH, z)[:, None]
+    return _size(dense(weights, "scale", z))
+
+
+def radius(weights: Weights, z: Array) -> Array:
+    """Returns the radius (N,F+1,3), m, of the region of each joint and step.
+
+    A factor on the learned quantile makes it hold on sequences that nothing was trained on, too
+    (conformal quantile regression, Romano, Patterson, Candès 2019).
+    """
+    return quantile(weights, z) * weights["region.factor"]
+
+
+def quantile(weights: Weights, z: Array) -> Array:
+    """Returns what `COVERED` of the errors (N,F+1,3), m, stay within, as it was learned."""
+    return 2.0 * _size(dense(weights, "radius", z))
+
+
+def _size(rows: Array) -> Array:
+    """Returns sizes of errors (N,F+1,3), m, of what a head returned (N,(F+1)·3)."""
+    rows = rows.reshape(rows.shape[0], FUTURE + 1, _JOINTS)
+    return _SMALLEST + 0.1 * softplus(rows - 1.0) * like(_GROWTH, rows)[:, None]

@@ -170,8 +170,7 @@ class LearnedPredictor:
         latent = diffusion.samples(weights, z)
         motion = diffusion.motion_of(weights, latent) * scale[:, None, 1:, :, None]
         motion = np.concatenate([np.zeros_like(motion[:, :, :1]), motion], axis=2)
-        radius = scale * weights["region.factor"]
-        return _Arms(mean, radius, mean[:, None] + motion)
+        return _Arms(mean, network.radius(weights, z), mean[:, None] + motion)
 
     @staticmethod
     def _pose_at(memory: PredictorMemory, time: float) -> FloatArray | None:

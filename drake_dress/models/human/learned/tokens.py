@@ -5,7 +5,9 @@ All lengths are brought to about 1 by fixed scales, so that no scale depends on 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from drake_dress.models.human.learned.arm_frame import ArmFrames, swapped_sides
 # Scales, 1/m: of limbs, of motion within the history, of the other arm, of sleeves; s/m of speeds.
 _LIMB, _MOTION, _OTHER, _SLEEVE = 3.0, 3.0, 1.5, 3.0
 _JOINT_SPEED, _SLEEVE_SPEED = 2.0, 5.0
+# Scale, 1/m, of a sleeve's way from the arm's axis; below this distance, m, it has no direction.
+_BESIDE, _CLOSE = 20.0, 0.01
 # What is farther or faster than this, in scaled units, tells nothing more.
 _MOST = 3.0
 
@@ -70,7 +74,10 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     shoulder, elbow, hand, other_shoulder, _, other_hand = np.moveaxis(joints, 2, 0)
     own, other = center[:, :, 0], center[:, :, 1]
     period = windows.period
-    progress, distance = place_on_arm(own, shoulder, elbow, hand)
+    place = place_on_arm(own, shoulder, elbow, hand)
+    off, moved = own - place.point, rates(own, period)
+    carried = place.of([rates(p, period) for p in (hand, elbow, shoulder)])
+    toward = off / (_CLOSE + place.distance)[..., None]
     on_own, on_other = known[:, :, :1], known[:, :, 1:]
     lasting = known * np.concatenate([known[:, :1], known[:, :-1]], axis=1)
     parts = [
@@ -88,8 +95,13 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
         seen[:, :, [0, 1, 2, 5]].astype(np.float64),
         on_own * np.clip(_SLEEVE * (own - hand), -_MOST, _MOST),
         on_own * direction[:, :, 0],
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * rates(own, period), -_MOST, _MOST),
-        on_own * np.stack([progress, np.minimum(5.0 * distance, _MOST)], axis=2),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * moved, -_MOST, _MOST),
+        on_own * np.stack([place.progress, np.minimum(5.0 * place.distance, _MOST)], axis=2),
+        # who leads whom: the sleeve beside the arm's axis, and how each moves in that direction
+        on_own * np.clip(_BESIDE * off, -_MOST, _MOST),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * (moved - carried), -_MOST, _MOST),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * _along(moved, toward), -_MOST, _MOST),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * _along(carried, toward), -_MOST, _MOST),
         on_own,
         on_other * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
         lasting[:, :, 1:] * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
@@ -99,11 +111,11 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     return ArmTokens(frames, joints, np.clip(tokens, -2.0 * _MOST, 2.0 * _MOST))
 
 
-TOKEN_SIZE = 56
+TOKEN_SIZE = 64
 # Columns of upper arm, forearm, and the way to the other shoulder.
 LIMB_COLUMNS = (slice(3, 6), slice(6, 9), slice(9, 12))
 # Columns that tell of sleeves.
-SLEEVE_COLUMNS = slice(37, 56)
+SLEEVE_COLUMNS = slice(37, 64)
 
 
 def swapped_sides_of_frames(pairs: FloatArray) -> FloatArray:
@@ -119,14 +131,42 @@ def rates(points: FloatArray, period: float) -> FloatArray:
     return moved
 
 
+class PlaceOnArm(NamedTuple):
+    """Where points are nearest on arms.
+
+    Attributes:
+        progress: (…) 0 hand, 1 elbow, 2 shoulder.
+        distance: (…) from the arm, m.
+        point: (…,3) nearest point of the arm, m.
+    """
+
+    progress: FloatArray
+    distance: FloatArray
+    point: FloatArray
+
+    def of(self, joints: Sequence[FloatArray]) -> FloatArray:
+        """Returns (…,3) at these places what is given (…,3) at hand, elbow and shoulder."""
+        hand, elbow, shoulder = joints
+        lower = np.clip(self.progress, 0.0, 1.0)[..., None]
+        upper = np.clip(self.progress - 1.0, 0.0, 1.0)[..., None]
+        return hand + lower * (elbow - hand) + upper * (shoulder - elbow)
+
+
 def place_on_arm(
     points: FloatArray, shoulder: FloatArray, elbow: FloatArray, hand: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Returns progress, 0 hand to 2 shoulder, and distance, m, of points (…,3) on arms (…,3)."""
+) -> PlaceOnArm:
+    """Returns where points (…,3) are nearest on arms with joints (…,3), m."""
     lower, off_lower = _on_limb(points, hand, elbow)
     upper, off_upper = _on_limb(points, elbow, shoulder)
     nearer = off_lower <= off_upper
-    return np.where(nearer, lower, 1.0 + upper), np.where(nearer, off_lower, off_upper)
+    progress = np.where(nearer, lower, 1.0 + upper)
+    place = PlaceOnArm(progress, np.where(nearer, off_lower, off_upper), points)
+    return place._replace(point=place.of((hand, elbow, shoulder)))
+
+
+def _along(vectors: FloatArray, directions: FloatArray) -> FloatArray:
+    """Returns the parts (…,1) of vectors (…,3) along directions (…,3)."""
+    return (vectors * directions).sum(axis=-1, keepdims=True)
 
 
 def _on_limb(

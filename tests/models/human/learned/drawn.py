@@ -113,5 +113,5 @@ def drawn_networks(seed: int = 0, limit: float = 1e3) -> Networks:
     motion["linear.map"] = 0.03 * rng.normal(size=(3, HISTORY - 1, FUTURE))
     motion["latent.latent"] = np.eye(diffusion.VALUES, diffusion.LATENT)
     motion["latent.motion"] = np.eye(diffusion.LATENT, diffusion.VALUES)
-    motion["region.factor"] = np.ones((FUTURE + 1, 3))
+    motion["region.factor"] = np.ones((FUTURE + 1, 3), dtype=np.float32)
     return Networks(intent_weights(rng), {k: v.astype(np.float32) for k, v in motion.items()})

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.human.learned.experts import (
-    COVERED,
     GROUPS,
     ExpertMemory,
     ExpertSettings,
 )
+from drake_dress.models.human.learned.network import COVERED
 
 ROWS, STEP, LASTING = 21, 0.1, 2.0
 SETTINGS = ExpertSettings()

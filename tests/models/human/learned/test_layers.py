@@ -120,6 +120,14 @@ def test_normalised_has_mean_0_and_variance_1_whatever_scale_and_shift_come(
     np.testing.assert_allclose(found, layers.normalised(weights, "some", x), rtol=2e-3, atol=1e-6)
 
 
+@given(seeds)
+def test_newest_step_alone_is_that_of_all(seed: int) -> None:
+    weights, x, hidden = drawn(seed)
+    every = layers.block(weights, "some", x, HEADS, hidden)
+    newest = layers.block(weights, "some", x, HEADS, hidden, newest=True)
+    np.testing.assert_allclose(newest, every[:, -1:], rtol=1e-4, atol=1e-5)
+
+
 def test_block_whose_outputs_are_zero_changes_nothing() -> None:
     weights, x, hidden = drawn(0)
     for name in ("some.attention.output", "some.narrow"):

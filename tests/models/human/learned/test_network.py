@@ -31,7 +31,7 @@ def test_numpy_and_torch_agree(seed: int) -> None:
     z = network.context(WEIGHTS, tokens, intent)
     other = network.context(TENSORS, torch.from_numpy(tokens), torch.from_numpy(intent))
     np.testing.assert_allclose(z, other.numpy(), rtol=1e-3, atol=1e-4)
-    for head in (network.residual, network.error_scale):
+    for head in (network.residual, network.error_scale, network.radius):
         found, again = head(WEIGHTS, z), head(TENSORS, torch.from_numpy(z))
         assert found.dtype == np.float32
         np.testing.assert_allclose(found, again.numpy(), rtol=1e-3, atol=1e-6)
@@ -51,12 +51,14 @@ def test_shapes_are_as_told_and_each_arm_is_on_its_own(seed: int, count: int) ->
 
 @given(seeds)
 @settings(max_examples=15)
-def test_scale_of_the_error_is_positive_and_grows_with_the_horizon(seed: int) -> None:
+def test_sizes_of_errors_are_positive_and_grow_with_the_horizon(seed: int) -> None:
     """Of fresh weights, whose outputs are about zero."""
-    scale = network.error_scale(WEIGHTS, network.context(WEIGHTS, *drawn(seed)))
-    assert (scale > 0.001).all()
-    by_row = scale[:, [0, 5, 10, 20]].mean(axis=2)
-    assert (np.diff(by_row, axis=1) > 0.001).all()
+    z = network.context(WEIGHTS, *drawn(seed))
+    for head in (network.error_scale, network.radius):
+        size = head(WEIGHTS, z)
+        assert (size > 0.001).all()
+        by_row = size[:, [0, 5, 10, 20]].mean(axis=2)
+        assert (np.diff(by_row, axis=1) > 0.001).all()
 
 
 def test_fresh_weights_add_about_nothing_to_the_linear_prediction() -> None:

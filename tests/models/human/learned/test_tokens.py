@@ -168,7 +168,8 @@ def test_place_on_arm_counts_from_hand_to_shoulder(seed: int, at: float, off: fl
     size = np.linalg.norm(across)
     aside = off * across / size if size > 1e-9 else np.zeros(3)
     point = ends[limb] + (at - limb) * way + aside
-    progress, distance = place_on_arm(point, *arm)
+    progress, distance, nearest = place_on_arm(point, *arm)
+    np.testing.assert_allclose(np.linalg.norm(point - nearest), distance, atol=1e-12)
     assert distance <= np.linalg.norm(aside) + 1e-12
     # a point beside one limb of a bent arm may be as near to the other
     if distance > np.linalg.norm(aside) - 1e-9:
@@ -180,6 +181,55 @@ def test_place_on_arm_counts_from_hand_to_shoulder(seed: int, at: float, off: fl
 def test_beyond_hand_and_shoulder_progress_ends_and_distance_goes_on() -> None:
     arm = np.array([[0.0, 0.0, 0.6], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
     points = np.array([[0.0, 0.0, -0.2], [0.0, 0.1, 1.0]])
-    progress, distance = place_on_arm(points, *np.tile(arm[:, None], (1, 2, 1)))
+    joints = np.tile(arm[:, None], (1, 2, 1))
+    progress, distance, nearest = place_on_arm(points, *joints)
+    np.testing.assert_allclose(nearest, [arm[2], arm[0]])
     np.testing.assert_allclose(progress, [0.0, 2.0])
     np.testing.assert_allclose(distance, [0.2, np.hypot(0.1, 0.4)])
+
+
+# Columns of a sleeve beside its arm: way from the axis, velocity less the arm's, and how fast
+# sleeve and arm move in the direction of that way.
+OFF, APART, SLEEVE, ARM = slice(48, 51), slice(51, 54), 54, 55
+
+
+def led(sleeve: np.ndarray, arm: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Returns the tokens of a left arm in a sleeve, both moving at constant velocities, m/s."""
+    time = PERIOD * np.arange(20)[:, None]
+    scene = drawn_scene(4, 1)
+    joints = scene.joints + (time * arm)[:, None]
+    middle = 0.5 * (scene.joints[0, 1] + scene.joints[0, 2])
+    sleeves = np.tile(scene.sleeves, (20, 1, 1))
+    sleeves[:, 0, :3] = middle + beside + time * sleeve
+    found: np.ndarray = tokens_of(Scene(joints, sleeves)).tokens[0]
+    return found
+
+
+def beside_the_forearm() -> np.ndarray:
+    """Returns a way of 3 cm across the left forearm, m."""
+    joints = drawn_scene(4, 1).joints[0]
+    across = np.cross(joints[1] - joints[2], [0.0, 0.0, 1.0])
+    way: np.ndarray = 0.03 * across / np.linalg.norm(across)
+    return way
+
+
+def test_sleeve_that_leads_and_arm_that_leads_have_other_signs() -> None:
+    beside = beside_the_forearm()
+    velocity = beside / 0.3
+    leads = led(velocity, np.zeros(3), beside)
+    # 0.1 m/s away from the axis, at 3 cm and more: most of 5 · 0.1
+    assert 0.3 < leads[1, SLEEVE] < 0.5
+    assert abs(leads[1, ARM]) < 1e-6
+    follows = led(np.zeros(3), velocity, beside)
+    assert follows[1, ARM] > 0.2
+    assert abs(follows[1, SLEEVE]) < 1e-6
+    withdraws = led(np.zeros(3), -velocity, beside)
+    assert withdraws[1, ARM] < -0.3
+
+
+def test_sleeve_that_goes_along_with_its_arm_does_not_move_beside_it() -> None:
+    beside, velocity = beside_the_forearm(), np.array([0.1, -0.05, 0.2])
+    tokens = led(velocity, velocity, beside)
+    np.testing.assert_allclose(tokens[1:, APART], 0.0, atol=1e-6)
+    np.testing.assert_allclose(tokens[1:, SLEEVE], tokens[1:, ARM], atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(tokens[:, OFF], axis=1), 20.0 * 0.03, atol=1e-5)
