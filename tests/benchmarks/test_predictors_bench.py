@@ -74,6 +74,7 @@ def test_runs_differ_in_the_predictor_alone(monkeypatch: pytest.MonkeyPatch) -> 
         "constant_velocity": "constant_velocity",
         "damped_velocity": "constant_velocity",
         "ridge": "ridge",
+        "recurrent": "recurrent",
     }
     decays = {s.controller.constant_velocity.decay_time for s in given.values()}
     assert len(decays) == 2
