@@ -205,6 +205,10 @@ class _Injected:
         ]
 
 
+class LabTooSlowError(RuntimeError):
+    """The lab did not keep up with the requested rate on this machine."""
+
+
 def inject(
     kind: str,
     seed: int,
@@ -227,8 +231,9 @@ def inject(
         report: Whether lab and run write report and replay, too.
 
     Raises:
-        RuntimeError: Lab or run did not start, or the lab did not keep up with the rate, so that
-            the reaction cannot be judged.
+        RuntimeError: Lab or run did not start.
+        LabTooSlowError: The lab did not keep up with the rate, so that the reaction cannot be
+            judged.
     """
     rng = np.random.default_rng([seed, *kind.encode()])
     stated = REACTIONS[kind].at(rate)
@@ -239,7 +244,7 @@ def inject(
     outcome = play_usable(plan)
     kept = read_summary(out / "lab" / "summary.json")["realtime_factor"]
     if kept < KEPT_UP * rate:
-        raise RuntimeError(
+        raise LabTooSlowError(
             f"the lab played {kept:.2f} of time, expected {rate:g}; a slower rate may be kept"
         )
     found = _judged(kind, stated, start, stated.lasting, out)

@@ -39,7 +39,6 @@ from drake_dress.errors import UserError
 from drake_dress.learning.evaluation.baselines import mean_of, plain_baselines
 from drake_dress.learning.evaluation.held_out import (
     HeldOut,
-    Which,
     begins,
     compared,
     goes_on,
@@ -56,7 +55,7 @@ from drake_dress.learning.recordings import RecordingOptions, read_recording
 from drake_dress.learning.recordings.reading import UPS
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.motion import MotionTraining
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.learned.forecast import PersonHistory
 from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
 from drake_dress.models.human.learned.recurrent import recurrent_motion
@@ -75,7 +74,7 @@ _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _HIDDEN_SEQUENCES, _HIDDEN = 60, (1.0, 3.0)  # of each kind, s
 _CALLS = 200
 # Arms of active persons by what they will do: the first cannot be known.
-_ACTING: dict[str, Which] = {
+_ACTING: dict[str, Callable[[Batch], BoolArray]] = {
     "begins a movement within 2 s": begins,
     "goes on with one": goes_on,
     "follows or rests": rests,
@@ -136,21 +135,23 @@ class Study:
 
     def held_out(self) -> tuple[list[Table], list[Figure]]:
         """Errors on held-out sequences."""
-        rows, figures = [], []
+        rows, acting = [], []
         both: dict[float, list[HeldOut]] = {noise: [] for noise in _NOISES}
         kinds: tuple[Kind, ...] = (*_DRESSED, "free")
         for kind in kinds:
             for noise in _NOISES:
-                found = compared(
-                    held_out_batches(self._data(kind), noise), self._networks, self._more
-                )
+                batches = held_out_batches(self._data(kind), noise)
+                windows = compared(batches, self._networks, self._more)
+                found, name = windows.mean(), f"{kind}, {1e3 * noise:g} mm"
                 if kind in _DRESSED:
                     both[noise].append(found)
-                rows.append(_held_out_row(f"{kind}, {1e3 * noise:g} mm", found))
-        windows = held_out_batches(self._data("active"), _NOISES[0])
-        for name, which in _ACTING.items():
-            found = compared(windows, self._networks, self._more, which)
-            rows.append(_held_out_row(f"active, {1e3 * _NOISES[0]:g} mm: {name}", found))
+                rows.append(_held_out_row(name, found))
+                if (kind, noise) != ("active", _NOISES[0]):
+                    continue
+                for what, which in _ACTING.items():
+                    chosen = np.concatenate([which(batch) for batch in batches])
+                    acting.append(_held_out_row(f"{name}: {what}", windows.mean(chosen)))
+        rows += acting
         for noise, found_of in both.items():
             rows.append(_held_out_row(f"both, {1e3 * noise:g} mm", _together(found_of)))
         figures = _held_out_figures(_together(both[_NOISES[0]]))

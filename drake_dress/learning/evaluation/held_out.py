@@ -21,8 +21,6 @@ from drake_dress.models.human.learned.predictor import Networks
 
 # Displacements (2B,F+1,3,3), m, that a baseline predicts for the arms of a batch.
 Baseline = Callable[[Batch], FloatArray]
-# Which of the arms (2B,) of a batch are looked at.
-Which = Callable[[Batch], BoolArray]
 EVERY = 0.5  # s, between windows
 _TOGETHER, _SEED = 1200, 9
 _WINDOW = 5  # samples of a velocity
@@ -78,43 +76,57 @@ def rests(batch: Batch) -> BoolArray:
     return found
 
 
+@dataclass(frozen=True)
+class WindowErrors:
+    """Results on each of N windows of an arm.
+
+    Attributes:
+        errors: by predictor: (N,F) mean error of the joints at each step, m.
+        best: (N,) mean error of the best of all samples, m.
+        covered: (N,F,3) whether steps and joints are in the regions.
+    """
+
+    errors: Mapping[str, FloatArray]
+    best: FloatArray
+    covered: BoolArray
+
+    def mean(self, chosen: BoolArray | None = None) -> HeldOut:
+        """Returns the means over the `chosen` (N,) windows, or over all; NaN if there are none."""
+        which = slice(None) if chosen is None else chosen
+        errors = {
+            name: {label: _mean(rows[which, :steps]) for label, steps in _HORIZONS.items()}
+            for name, rows in self.errors.items()
+        }
+        best = self.best[which]
+        return HeldOut(errors, _mean(best), _mean(self.covered[which]), len(best))
+
+
 def compared(
-    batches: Sequence[Batch],
-    networks: Networks,
-    more: Mapping[str, Baseline],
-    which: Which | None = None,
-) -> HeldOut:
+    batches: Sequence[Batch], networks: Networks, more: Mapping[str, Baseline]
+) -> WindowErrors:
     """Returns the errors of the learned predictor and of all baselines.
 
     Args:
         batches: windows.
         networks: weights.
         more: baselines in addition to the plain ones.
-        which: arms that are looked at; None: all. NaN if there are none.
     """
     baselines = plain(networks.linear) | dict(more)
     errors: dict[str, list[FloatArray]] = {name: [] for name in (*baselines, "learned")}
     best, covered = [], []
     for batch in batches:
-        chosen = slice(None) if which is None else which(batch)
         z, mean, scale = predicted(networks.motion, networks.intent, batch)
         off = np.linalg.norm(mean - batch.displacement, axis=3)
-        errors["learned"].append(off[chosen, 1:].mean(axis=2))
+        errors["learned"].append(off[:, 1:].mean(axis=2))
         for name, of in baselines.items():
             away = np.linalg.norm(of(batch) - batch.displacement, axis=3)
-            errors[name].append(away[chosen, 1:].mean(axis=2))
-        covered.append((off <= network.radius(networks.motion, z))[chosen, 1:])
-        best.append(_best(networks.motion, z, mean, scale, batch)[chosen])
-    return HeldOut(
-        {
-            name: {
-                label: _mean(np.concatenate(rows)[:, :steps]) for label, steps in _HORIZONS.items()
-            }
-            for name, rows in errors.items()
-        },
-        _mean(np.concatenate(best)),
-        _mean(np.concatenate(covered)),
-        sum(len(rows) for rows in best),
+            errors[name].append(away[:, 1:].mean(axis=2))
+        covered.append((off <= network.radius(networks.motion, z))[:, 1:])
+        best.append(_best(networks.motion, z, mean, scale, batch))
+    return WindowErrors(
+        {name: np.concatenate(rows) for name, rows in errors.items()},
+        np.concatenate(best),
+        np.concatenate(covered),
     )
 
 

@@ -12,8 +12,8 @@ from drake_dress.learning.motion.dataset import (
     MotionSet,
     part_range,
 )
-from drake_dress.learning.motion.figures import AT_REST, Figures
-from drake_dress.learning.motion.sequence import COUNT, DURATION, KINDS, PERIOD
+from drake_dress.learning.motion.figures import Figures
+from drake_dress.learning.motion.sequence import AT_REST, COUNT, DURATION, KINDS, PERIOD
 
 _MADE = f"""\
 Sequences of {DURATION:g} s at {1 / PERIOD:g} Hz ({COUNT} samples): the joints of a person's arms,
@@ -55,7 +55,7 @@ _CONTENT = f"""\
 The direction of an armhole is that from the cuff to it. Without a garment, `sleeve` is NaN.
 `intent` is 1 while will moves the arm, not while the hand pauses in a movement or is held where it
 was drawn; and for both arms while the body turns, leans, steps or walks. It is 0 where the hand is
-slower than 2 cm/s.
+slower than {100 * AT_REST:g} cm/s.
 """
 
 _LIMITS = """\

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.learning.motion.motion_file import MotionArrays
-from drake_dress.learning.motion.sequence import PERIOD
+from drake_dress.learning.motion.sequence import AT_REST, PERIOD, speeds
 from drake_dress.models.arrays import FloatArray
 
-AT_REST = 0.02  # m/s, speed of a hand below which it counts as at rest
 _SHOULDERS, _HANDS = [0, 3], [2, 5]
 _QUANTILES = 0.5, 0.95
 
@@ -44,7 +43,7 @@ class Figures:
 def figures_of(parts: Sequence[MotionArrays]) -> Figures:
     """Returns the figures of all sequences of all parts, which may differ in length."""
     joints = [p.joint_position.astype(np.float64) for p in parts]
-    speed = np.concatenate([_speed(j[:, :, _HANDS]).ravel() for j in joints])
+    speed = np.concatenate([speeds(j[:, :, _HANDS]).ravel() for j in joints])
     return Figures(
         count=sum(len(p) for p in parts),
         time=PERIOD * sum(len(j) * (j.shape[1] - 1) for j in joints),
@@ -57,12 +56,6 @@ def figures_of(parts: Sequence[MotionArrays]) -> Figures:
         ),
         on=float(np.mean(np.concatenate([p.on.ravel() for p in parts]))),
     )
-
-
-def _speed(points: FloatArray) -> FloatArray:
-    """Returns the speed (n,T-1,k), m/s, of points (n,T,k,3), m."""
-    speed: FloatArray = np.linalg.norm(np.diff(points, axis=1), axis=-1) / PERIOD
-    return speed
 
 
 def _travel(points: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ KINDS: tuple[Kind, ...] = ("passive", "active", "free")
 DURATION = 20.0  # s
 PERIOD = 0.05  # s, between samples
 COUNT = round(DURATION / PERIOD) + 1
-RESTS = 0.02  # m/s
+AT_REST = 0.02  # m/s, speed of a hand below which it counts as at rest
 # A hand that moves within this time of a moment is not at rest then, s: a wave turns around.
 _TURNS_AROUND = 0.2
 
@@ -30,7 +30,7 @@ class Sequence:
         sleeves: (T,2,6) centre, m, and unit direction from cuff to armhole of left and right
             armhole; NaN without a garment.
         intent: (T,2) 1 where will moves the arm, by itself or with the torso; 0 where it rests, is
-            held, or follows. A hand slower than `RESTS` rests.
+            held, or follows. A hand slower than `AT_REST` rests.
         on: (T,2) 1 where the arm is in its sleeve.
     """
 
@@ -50,10 +50,16 @@ class Sequence:
         )
 
 
+def speeds(points: FloatArray) -> FloatArray:
+    """Returns the speeds (…,T-1,k), m/s, of points (…,T,k,3), m, `PERIOD` apart."""
+    speed: FloatArray = np.linalg.norm(np.diff(points, axis=-3), axis=-1) / PERIOD
+    return speed
+
+
 def is_moving(hands: FloatArray) -> BoolArray:
     """Returns (T,2) whether each hand, (T,2,3) m, `PERIOD` apart, moves about that time."""
-    speed = np.linalg.norm(np.diff(hands, axis=0), axis=2) / PERIOD
-    fast = np.concatenate([speed[:1], np.maximum(speed[1:], speed[:-1]), speed[-1:]]) > RESTS
+    speed = speeds(hands)
+    fast = np.concatenate([speed[:1], np.maximum(speed[1:], speed[:-1]), speed[-1:]]) > AT_REST
     around = round(_TURNS_AROUND / PERIOD)
     padded = np.pad(fast, ((around, around), (0, 0)))
     moving: BoolArray = np.any([padded[k : k + len(fast)] for k in range(2 * around + 1)], axis=0)

@@ -99,7 +99,7 @@ def train_command(name: str, options: TrainOptions) -> int:
 
 
 def _command(name: str, options: TrainOptions) -> str:
-    """Returns the command as it may be given again, with files by their names alone."""
+    """Returns the command without folders and without what is said of the recordings."""
     words = ["drake-dress train", name, f"--seed {options.seed}"]
     if options.steps is not None:
         words.append(f"--steps {options.steps}")
@@ -239,7 +239,7 @@ def motion_figures(
     """Returns the results on held-out sequences, by kind and noise."""
     return {
         f"{kind}, noise {1e3 * noise:g} mm": vars(
-            compared(held_out_batches(data, noise, with_sleeves), networks, {})
+            compared(held_out_batches(data, noise, with_sleeves), networks, {}).mean()
         )
         for kind, data in test.items()
         for noise in _NOISES

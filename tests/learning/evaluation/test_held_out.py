@@ -98,8 +98,9 @@ def test_each_arm_begins_or_goes_on_or_rests() -> None:
 def test_only_what_is_chosen_is_compared() -> None:
     networks = drawn_networks(0)
     batches = held_out_batches(willing(), 0.01)
-    parts = [compared(batches, networks, {}, which) for which in (begins, goes_on, rests)]
-    whole = compared(batches, networks, {})
+    windows = compared(batches, networks, {})
+    groups = [np.concatenate([w(b) for b in batches]) for w in (begins, goes_on, rests)]
+    parts, whole = [windows.mean(chosen) for chosen in groups], windows.mean()
     counts = [part.count for part in parts]
     assert sum(counts) == whole.count
     for of in (
@@ -109,7 +110,7 @@ def test_only_what_is_chosen_is_compared() -> None:
     ):
         mean = np.average([of(part) for part in parts], weights=counts)
         assert of(whole) == pytest.approx(float(mean))
-    none = compared(batches, networks, {}, lambda batch: batch.intent > 1)
+    none = windows.mean(np.zeros_like(groups[0]))
     assert none.count == 0
     assert np.isnan(none.best)
 

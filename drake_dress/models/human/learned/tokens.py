@@ -75,9 +75,12 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     own, other = center[:, :, 0], center[:, :, 1]
     period = windows.period
     place = place_on_arm(own, shoulder, elbow, hand)
-    off, moved = own - place.point, rates(own, period)
-    carried = place.of([rates(p, period) for p in (hand, elbow, shoulder)])
+    velocities = [rates(p, period) for p in (hand, elbow, shoulder)]
+    off, moved = own - place.of((hand, elbow, shoulder)), rates(own, period)
+    carried = place.of(velocities)
     toward = off / (_CLOSE + place.distance)[..., None]
+    along = [(v * toward).sum(axis=-1, keepdims=True) for v in (moved, carried)]
+    leading = np.concatenate([moved - carried, *along], axis=2)
     on_own, on_other = known[:, :, :1], known[:, :, 1:]
     lasting = known * np.concatenate([known[:, :1], known[:, :-1]], axis=1)
     parts = [
@@ -86,9 +89,7 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
         _LIMB * (hand - elbow),
         _OTHER * (other_shoulder - shoulder),
         _OTHER * (other_hand - shoulder),
-        _JOINT_SPEED * rates(shoulder, period),
-        _JOINT_SPEED * rates(elbow, period),
-        _JOINT_SPEED * rates(hand, period),
+        *(_JOINT_SPEED * velocity for velocity in reversed(velocities)),
         0.5 * _JOINT_SPEED * rates(other_hand, period),
         _MOTION * (hand - hand[:, -1:]),
         _MOTION * (elbow - elbow[:, -1:]),
@@ -99,9 +100,7 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
         on_own * np.stack([place.progress, np.minimum(5.0 * place.distance, _MOST)], axis=2),
         # who leads whom: the sleeve beside the arm's axis, and how each moves in that direction
         on_own * np.clip(_BESIDE * off, -_MOST, _MOST),
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * (moved - carried), -_MOST, _MOST),
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * _along(moved, toward), -_MOST, _MOST),
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * _along(carried, toward), -_MOST, _MOST),
+        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * leading, -_MOST, _MOST),
         on_own,
         on_other * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
         lasting[:, :, 1:] * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
@@ -137,12 +136,10 @@ class PlaceOnArm(NamedTuple):
     Attributes:
         progress: (…) 0 hand, 1 elbow, 2 shoulder.
         distance: (…) from the arm, m.
-        point: (…,3) nearest point of the arm, m.
     """
 
     progress: FloatArray
     distance: FloatArray
-    point: FloatArray
 
     def of(self, joints: Sequence[FloatArray]) -> FloatArray:
         """Returns (…,3) at these places what is given (…,3) at hand, elbow and shoulder."""
@@ -159,14 +156,7 @@ def place_on_arm(
     lower, off_lower = _on_limb(points, hand, elbow)
     upper, off_upper = _on_limb(points, elbow, shoulder)
     nearer = off_lower <= off_upper
-    progress = np.where(nearer, lower, 1.0 + upper)
-    place = PlaceOnArm(progress, np.where(nearer, off_lower, off_upper), points)
-    return place._replace(point=place.of((hand, elbow, shoulder)))
-
-
-def _along(vectors: FloatArray, directions: FloatArray) -> FloatArray:
-    """Returns the parts (…,1) of vectors (…,3) along directions (…,3)."""
-    return (vectors * directions).sum(axis=-1, keepdims=True)
+    return PlaceOnArm(np.where(nearer, lower, 1.0 + upper), np.where(nearer, off_lower, off_upper))
 
 
 def _on_limb(

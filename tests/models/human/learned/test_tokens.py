@@ -168,7 +168,9 @@ def test_place_on_arm_counts_from_hand_to_shoulder(seed: int, at: float, off: fl
     size = np.linalg.norm(across)
     aside = off * across / size if size > 1e-9 else np.zeros(3)
     point = ends[limb] + (at - limb) * way + aside
-    progress, distance, nearest = place_on_arm(point, *arm)
+    place = place_on_arm(point, *arm)
+    progress, distance = place
+    nearest = place.of(list(arm[::-1]))
     np.testing.assert_allclose(np.linalg.norm(point - nearest), distance, atol=1e-12)
     assert distance <= np.linalg.norm(aside) + 1e-12
     # a point beside one limb of a bent arm may be as near to the other
@@ -182,8 +184,9 @@ def test_beyond_hand_and_shoulder_progress_ends_and_distance_goes_on() -> None:
     arm = np.array([[0.0, 0.0, 0.6], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
     points = np.array([[0.0, 0.0, -0.2], [0.0, 0.1, 1.0]])
     joints = np.tile(arm[:, None], (1, 2, 1))
-    progress, distance, nearest = place_on_arm(points, *joints)
-    np.testing.assert_allclose(nearest, [arm[2], arm[0]])
+    place = place_on_arm(points, *joints)
+    progress, distance = place
+    np.testing.assert_allclose(place.of(list(joints[::-1])), [arm[2], arm[0]])
     np.testing.assert_allclose(progress, [0.0, 2.0])
     np.testing.assert_allclose(distance, [0.2, np.hypot(0.1, 0.4)])
 
