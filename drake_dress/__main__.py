@@ -396,7 +396,7 @@ def _add_train(verbs: _Verbs) -> None:
         "--recordings",
         nargs="+",
         default=[],
-        metavar="FILE",
+        metavar="FILE[:KEY=VALUE,…]",
         help="motion: go on from trained weights with recordings of people, see docs/prediction.md",
     )
     train.add_argument(
@@ -543,12 +543,14 @@ def _dataset_motion(options: argparse.Namespace) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
-    from drake_dress.learning.recordings import RecordingOptions
+    from drake_dress.learning.recordings import RecordingOptions, listed
     from drake_dress.learning.training.commands import FIGURES, TrainOptions, train_command
     from drake_dress.models.human.learned.weights import FILES, SHIPPED
 
     if options.recordings and options.network != "motion":
         raise UserError("train", "--recordings", "are learned from by motion alone")
+    common = RecordingOptions(options.rate, options.up, options.unit)
+    recordings = tuple(listed(text, common) for text in options.recordings)
     results = (FIGURES, FILES[options.network])
     out = _directory(options.out, Path(), results, [])
     return train_command(
@@ -559,8 +561,7 @@ def _train(options: argparse.Namespace) -> int:
             options.seed,
             options.steps,
             options.sleeves,
-            tuple(map(Path, options.recordings)),
-            RecordingOptions(options.rate, options.up, options.unit),
+            recordings,
             SHIPPED if options.start is None else Path(options.start),
         ),
     )

@@ -2,7 +2,7 @@
 
     drake-dress dataset motion --out out/motion --dressings 40
     drake-dress bench prediction --data out/motion --into docs/prediction.md
-    drake-dress bench prediction --recordings recordings/*.csv
+    drake-dress bench prediction --recordings recordings/*.csv reach.npz:up=y,rate=30
     drake-dress bench prediction --data out/motion --recordings persons/*/*.csv --only persons
 
 Held-out sequences are those of the set that nothing was trained on; whole dressings come from the
@@ -51,7 +51,8 @@ from drake_dress.learning.motion.dataset import MotionData, read_dressings, read
 from drake_dress.learning.motion.sequence import KINDS, Kind
 from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
 from drake_dress.learning.motion.windows import Batch, Sequences
-from drake_dress.learning.recordings import RecordingOptions, read_recording
+from drake_dress.learning.recordings import Listed, RecordingOptions, listed, read_all
+from drake_dress.learning.recordings.listed import FORM, RATES, UNITS
 from drake_dress.learning.recordings.reading import UPS
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.motion import MotionTraining
@@ -247,8 +248,7 @@ class Study:
     def recordings(self) -> tuple[list[Table], list[Figure]]:
         """Recordings of people."""
         rows, figures, everything = [], [], Told()
-        for path in self._options.recordings:
-            motion = self._recording(path)
+        for motion in read_all(self._recordings(), _note):
             told = Told()
             found = list(followed(motion, self._predictor, self._baselines))
             told.add(found)
@@ -265,9 +265,10 @@ class Study:
 
     def persons(self) -> tuple[list[Table], list[Figure]]:
         """Recordings of some persons, predicted by what learned from others."""
-        paths: list[Path] = self._options.recordings
-        motions = [self._recording(path) for path in paths]
-        parts = folds(paths, [float(m.time[-1] - m.time[0]) for m in motions])
+        files = self._recordings()
+        motions = read_all(files, _note)
+        durations = [float(m.time[-1] - m.time[0]) for m in motions]
+        parts = folds([file.path for file in files], durations)
         base = MotionTraining(
             read_motion(self._options.data, KINDS, "training"),
             {kind: read_motion(self._options.data, (kind,), "validation") for kind in KINDS},
@@ -301,9 +302,9 @@ class Study:
         table = Table("One call, both arms", ["", "ms"], [["median", median], ["95 %", p95]])
         return [table], [at_most("one call, both arms, median", median, "ms", 10.0)]
 
-    def _recording(self, path: Path) -> TimedMotion:
-        how = RecordingOptions(self._options.rate, self._options.up, self._options.unit)
-        return read_recording(path, how, lambda line: print(f"note: {line}", flush=True))
+    def _recordings(self) -> list[Listed]:
+        common = RecordingOptions(self._options.rate, self._options.up, self._options.unit)
+        return [listed(text, common) for text in self._options.recordings]
 
     def _data(self, *kinds: Kind) -> MotionData:
         return read_motion(self._options.data, kinds, "test")
@@ -317,10 +318,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="set of drake-dress dataset motion"
     )
-    parser.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE")
-    parser.add_argument("--rate", type=number_between(1.0, 2000.0), metavar="HZ")
+    parser.add_argument(
+        "--recordings",
+        nargs="+",
+        default=[],
+        metavar=FORM,
+        help="of people; KEY: up, rate or unit of this file, else those that follow",
+    )
+    parser.add_argument("--rate", type=number_between(*RATES), metavar="HZ")
     parser.add_argument("--up", choices=UPS, help="axis of the recordings that points up")
-    parser.add_argument("--unit", type=number_between(1e-6, 10.0), metavar="M", help="in metres")
+    parser.add_argument("--unit", type=number_between(*UNITS), metavar="M", help="in metres")
     parser.add_argument(
         "--weights",
         type=Path,
@@ -340,6 +347,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=output_file, metavar="FILE")
     add_into_option(parser, _NAME)
     return parser
+
+
+def _note(line: str) -> None:
+    print(f"note: {line}", flush=True)
 
 
 def _header(what: str, predictors: Iterable[str]) -> list[str]:

@@ -21,7 +21,7 @@ from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.learning.evaluation.held_out import compared, held_out_batches, intent_score
 from drake_dress.learning.motion.dataset import MotionData, Part, read_motion
 from drake_dress.learning.motion.sequence import Kind
-from drake_dress.learning.recordings import RecordingOptions, read_recording
+from drake_dress.learning.recordings import Listed, read_all
 from drake_dress.learning.recordings.pieces import LENGTH, Pieces
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.intent import IntentTraining
@@ -56,8 +56,7 @@ class TrainOptions:
         seed: of weights and batches.
         steps: largest number of steps of each part; None: as scheduled.
         with_sleeves: whether the networks see sleeves.
-        recordings: files of people that the motion is learned from, too.
-        how: what the user says of them.
+        recordings: of people that the motion is learned from, too.
         start: folder of the weights that recordings are added to.
     """
 
@@ -66,8 +65,7 @@ class TrainOptions:
     seed: int = 0
     steps: int | None = None
     with_sleeves: bool = True
-    recordings: tuple[Path, ...] = ()
-    how: RecordingOptions = RecordingOptions()
+    recordings: tuple[Listed, ...] = ()
     start: Path = SHIPPED
 
 
@@ -106,7 +104,7 @@ def _command(name: str, options: TrainOptions) -> str:
     if not options.with_sleeves:
         words.append("--no-sleeves")
     if options.recordings:
-        words.append(" ".join(["--recordings", *(path.name for path in options.recordings)]))
+        words.append(" ".join(["--recordings", *(file.path.name for file in options.recordings)]))
     return " ".join(words)
 
 
@@ -138,7 +136,8 @@ def _motion(options: TrainOptions, stop: Interrupt) -> tuple[Arrays | None, dict
         options.with_sleeves,
     )
     if start is not None:
-        training = with_recordings(training, start.motion, _recordings(options))
+        motions = read_all(options.recordings, lambda line: print(f"note: {line}", flush=True))
+        training = with_recordings(training, start.motion, motions)
     if options.steps is not None:
         training = shortened(training, options.steps)
     schedules = {name: getattr(training, name).steps for name in _STAGES}
@@ -219,13 +218,6 @@ def _cut_of(motion: TimedMotion) -> float:
     if end - begin < 2.0 * LENGTH:
         return np.inf
     return end - max(LENGTH, _HELD_BACK * (end - begin))
-
-
-def _recordings(options: TrainOptions) -> list[TimedMotion]:
-    return [
-        read_recording(path, options.how, lambda line: print(f"note: {line}", flush=True))
-        for path in options.recordings
-    ]
 
 
 _HELD_BACK = 0.2  # share of a recording
