@@ -3,6 +3,7 @@
     drake-dress dataset motion --out out/motion --dressings 40
     drake-dress bench prediction --data out/motion --into docs/prediction.md
     drake-dress bench prediction --recordings recordings/*.csv reach.npz:up=y,rate=30
+    drake-dress bench prediction --data out/motion --only sleeves --sleeveless out/sleeveless
     drake-dress bench prediction --data out/motion --recordings persons/*/*.csv --only persons
 
 Held-out sequences are those of the set that nothing was trained on; whole dressings come from the
@@ -33,6 +34,7 @@ from benchmarks.parser import (
 )
 from benchmarks.prediction.hidden import ELBOW, HAND, hidden_errors
 from benchmarks.prediction.persons import OWN_RIDGE, SHIPPED_RIDGE, across_persons, folds, gain
+from benchmarks.prediction.sleeves import told_by_sleeves, ways_to_see
 from benchmarks.prediction.streams import Told, delays_of
 from benchmarks.section import add_into_option, around, write_between
 from drake_dress.errors import UserError
@@ -69,7 +71,16 @@ from drake_dress.models.human.learned.weights import (
 )
 
 _NAME = "prediction"
-SECTIONS = ("held_out", "intent", "hidden", "dressings", "recordings", "persons", "speed")
+SECTIONS = (
+    "held_out",
+    "intent",
+    "sleeves",
+    "hidden",
+    "dressings",
+    "recordings",
+    "persons",
+    "speed",
+)
 _NOISES = (0.004, 0.0)
 _DRESSED: tuple[Kind, ...] = ("passive", "active")
 _HIDDEN_SEQUENCES, _HIDDEN = 60, (1.0, 3.0)  # of each kind, s
@@ -88,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.into is not None:
         around(options.into, _NAME)
-    needs = {"held_out", "intent", "hidden", "dressings", "persons"}
+    needs = {"held_out", "intent", "sleeves", "hidden", "dressings", "persons"}
     only = options.only or [
         s
         for s in SECTIONS
@@ -197,6 +208,12 @@ class Study:
             )
         ]
         return [Table("Intent on held-out sequences", header, rows)], figures
+
+    def sleeves(self) -> tuple[list[Table], list[Figure]]:
+        """What sleeves tell: held-out sequences with and without them."""
+        without = self._options.sleeveless
+        ways = ways_to_see(self._networks, None if without is None else networks(without))
+        return told_by_sleeves({kind: self._data(kind) for kind in _DRESSED}, ways, _NOISES[0])
 
     def hidden(self) -> tuple[list[Table], list[Figure]]:
         """Hidden joints on held-out sequences."""
@@ -334,6 +351,12 @@ def _parser() -> argparse.ArgumentParser:
         default=SHIPPED,
         metavar="DIR",
         help="of drake-dress train; default: those of the package",
+    )
+    parser.add_argument(
+        "--sleeveless",
+        type=Path,
+        metavar="DIR",
+        help="sleeves: weights of drake-dress train --no-sleeves, to be compared, too",
     )
     parser.add_argument(
         "--only", type=some_of(SECTIONS), metavar="NAME,…", help=", ".join(SECTIONS)

@@ -20,7 +20,7 @@ from drake_dress.diagrams.own_parts import NOTHING, OwnParts, own_controller
 from drake_dress.diagrams.person import Person, add_person
 from drake_dress.diagrams.planning import ControlSetup
 from drake_dress.diagrams.prediction import Predictor
-from drake_dress.diagrams.sections.controller import local_setup, predictor
+from drake_dress.diagrams.sections.controller import local_setup
 from drake_dress.diagrams.sections.hardware import hardware_parameters
 from drake_dress.diagrams.setup import Garments, Setup
 from drake_dress.diagrams.station import (
@@ -154,7 +154,7 @@ def planned_arms(p: StationParameters, person: Person) -> ArmSetup:
 
 def person_predictor(p: Parts) -> Predictor:
     """Returns the predictor of the person: the user's own, or the scenario's."""
-    return p.own.predictor or predictor(p.setup.scenario.controller)
+    return p.own.predictor or p.setup.predictor
 
 
 def control_setup(p: Parts, record: list[LocalProblem] | None = None) -> ControlSetup:

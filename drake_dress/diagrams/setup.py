@@ -9,8 +9,9 @@ from pathlib import Path
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.person import Person, person_model
 from drake_dress.diagrams.planning import Rates
+from drake_dress.diagrams.prediction import Predictor
 from drake_dress.diagrams.scenario import Scenario
-from drake_dress.diagrams.sections.controller import controller_policy, solve_budget
+from drake_dress.diagrams.sections.controller import controller_policy, predictor, solve_budget
 from drake_dress.diagrams.sections.effects import effects
 from drake_dress.diagrams.sections.person import arms, behaviour, joints, measures, posture
 from drake_dress.diagrams.sections.safety import safety_limits
@@ -43,6 +44,7 @@ class Setup:
         station: parameters of the simulated station.
         limits: of the safety governor.
         rates: periods and delays.
+        predictor: of the person.
     """
 
     scenario: Scenario
@@ -51,6 +53,7 @@ class Setup:
     station: StationParameters
     limits: SafetyLimits
     rates: Rates
+    predictor: Predictor
 
     def as_estimated(self) -> Setup:
         """Returns the setup for an unknown true garment, which the controller's replaces."""
@@ -84,8 +87,10 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
         source: its file, for messages and relative paths.
 
     Raises:
-        UserError: the garment cannot be used, or hangs outside the grippers' limits at the start.
+        UserError: the garment cannot be used, or hangs outside the grippers' limits at the start;
+            or the predictor's weights cannot be used.
     """
+    foreseen = predictor(scenario.controller, source.parent)
     plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
     station = station_parameters(scenario, plant)
@@ -93,7 +98,8 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
     broken = limits.broken_at(start_grippers(station))
     if broken is not None:
         raise UserError(str(source), "safety", f"{broken} at the start")
-    return Setup(scenario, source, Garments(plant, belief), station, limits, rates(scenario))
+    garments = Garments(plant, belief)
+    return Setup(scenario, source, garments, station, limits, rates(scenario), foreseen)
 
 
 def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParameters:

@@ -103,6 +103,28 @@ def test_persons_are_predicted_by_what_learned_from_others(
         main([*words, "--recordings", str(files[0])])
 
 
+def test_sleeves_that_are_not_shown_change_the_predictions_of_persons_in_them(
+    trained: tuple[Path, Path], tmp_path: Path
+) -> None:
+    data, out = trained
+    told = tmp_path / "told.json"
+    words = ["--data", str(data), "--only", "sleeves", "--sleeveless", str(out)]
+    assert main([*words, "--json", str(told)]) == 0
+    kept = json.loads(told.read_text())
+    found = {figure["name"]: figure for figure in kept["figures"]}
+    not_seen = found["passive, sleeves not seen: error higher by"]
+    assert not_seen["value"] != 0.0
+    assert not_seen["asked"] == 20.0
+    assert found["active, sleeves not seen: error higher by"]["asked"] is None
+    # the weights of the fixture have hardly learned
+    assert found["passive, sleeves never seen in training: error higher by"]["value"] > 20.0
+    (table,) = kept["tables"]
+    assert [row[0] for row in table["rows"]][:2] == [
+        "passive, sleeves seen",
+        "passive, sleeves not seen",
+    ]
+
+
 def test_folders_are_dealt_out_by_their_duration() -> None:
     paths = [Path(f"/rec/{name}.npz") for name in ("a/1", "a/2", "b/1", "c/1", "d/1")]
     assert folds(paths, [5.0, 5.0, 8.0, 2.0, 1.0]) == [[0, 1], [2], [3, 4]]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from safetensors.numpy import load_file, save_file
 
 from drake_dress.diagrams.behaviour import Behaviour
 from drake_dress.diagrams.scenario import (
@@ -28,8 +29,14 @@ from drake_dress.diagrams.sections.safety import safety_limits
 from drake_dress.errors import UserError
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.learned.forecast import PersonHistory, PersonPredictor
+from drake_dress.models.human.learned.weights import SHIPPED
 from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
-from drake_dress.models.human.prediction import ConstantVelocityPredictor, StillPredictor
+from drake_dress.models.human.prediction import (
+    PREDICTORS,
+    ConstantVelocityPredictor,
+    StillPredictor,
+)
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES
 
@@ -68,6 +75,7 @@ controller:
   material: {stretch_stiffness: 80}
   global_mpc: {period: 1.0, delay: 0.3, time_step: 0.1, horizon: 4, weights: {direction: 0.1}}
   predictor: constant_velocity
+  weights: mine
   command_rate: 200.0
 safety:
   force_limit: 15.0
@@ -291,9 +299,34 @@ def test_behaviour_of_a_scenario_is_what_the_person_gets(tmp_path: Path) -> None
 def test_who_is_said_nothing_of_is_a_dummy_that_is_believed_to_stay(tmp_path: Path) -> None:
     scenario = load_scenario(write(tmp_path, "seed: 0"))
     assert behaviour(scenario.person.behaviour, scenario.seed) == Behaviour()
-    assert isinstance(predictor(scenario.controller), StillPredictor)
+    assert isinstance(predictor(scenario.controller, tmp_path), StillPredictor)
     other = load_scenario(write(tmp_path, "controller: {predictor: constant_velocity}"))
-    assert isinstance(predictor(other.controller), ConstantVelocityPredictor)
+    assert isinstance(predictor(other.controller, tmp_path), ConstantVelocityPredictor)
+
+
+@pytest.mark.parametrize("name", ["learned", "ridge", "recurrent"])
+def test_trained_predictors_take_the_weights_that_the_scenario_names(
+    tmp_path: Path, name: str
+) -> None:
+    """The folder is relative to the scenario; what cannot be used there is told."""
+    text = f"controller: {{predictor: {name}, weights: mine}}"
+    controller = load_scenario(write(tmp_path, text)).controller
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(UserError, match=r"mine/\w+.safetensors: no such file"):
+        predictor(controller, tmp_path)
+    for file in SHIPPED.glob("*.safetensors"):
+        weights = {key: 0.5 * array for key, array in load_file(file).items()}
+        save_file(weights, tmp_path / "mine" / file.name)
+    joints = 0.3 * np.random.default_rng(0).normal(size=(20, 6, 3))
+    history = PersonHistory(0.0, joints, np.full((20, 2, 6), np.nan))
+    mine, shipped = predictor(controller, tmp_path), PREDICTORS[name]()
+    if isinstance(mine, PersonPredictor):
+        assert isinstance(shipped, PersonPredictor)
+        found, other = (p.forecast(history, p.begin())[0].radius for p in (mine, shipped))
+    else:
+        assert not isinstance(shipped, PersonPredictor)
+        found, other = (p.predict(joints, 0.1, 5) for p in (mine, shipped))
+    assert np.abs(found - other).max() > 1e-3
 
 
 def test_motions_can_be_given_on_the_command_line(tmp_path: Path) -> None:

@@ -499,6 +499,8 @@ class Controller:
         local: the local controller.
         predictor: how the person's arms are predicted to move.
         constant_velocity: settings of the predictor of that name.
+        weights: folder of `drake-dress train`, relative to the scenario, with the weights of the
+            predictors `learned`, `ridge` and `recurrent`. By default those of the package.
         costs: registered costs of the plan by name, each with its fields.
         command_rate: rate of the grippers' commands, Hz.
     """
@@ -512,6 +514,7 @@ class Controller:
     local: Local = field(default_factory=Local)
     predictor: str = "still"
     constant_velocity: ConstantVelocity = field(default_factory=ConstantVelocity)
+    weights: str | None = None
     costs: ValuesByName = field(default_factory=dict)
     command_rate: float = 100.0
 

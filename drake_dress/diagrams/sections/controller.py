@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import fields
+from pathlib import Path
 
 from drake_dress.diagrams.planning import LocalSetup
 from drake_dress.diagrams.scenario import schema
@@ -20,7 +21,12 @@ from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.learned.forecast import PersonPredictor
-from drake_dress.models.human.prediction import PREDICTORS, MotionPredictor
+from drake_dress.models.human.prediction import (
+    PREDICTORS,
+    TRAINED,
+    MotionPredictor,
+    trained_predictor,
+)
 from drake_dress.solvers.cone_programme import cone_programme
 
 
@@ -93,9 +99,19 @@ def local_setup(c: schema.Controller, policy: DressingPolicy) -> LocalSetup | No
     )
 
 
-def predictor(c: schema.Controller) -> MotionPredictor | PersonPredictor:
-    """Returns the predictor of the person's arms."""
+def predictor(c: schema.Controller, base: Path) -> MotionPredictor | PersonPredictor:
+    """Returns the predictor of the person's arms.
+
+    Args:
+        c: settings.
+        base: directory that the folder of weights is relative to.
+
+    Raises:
+        UserError: the weights cannot be used.
+    """
     if c.predictor == "constant_velocity":
         own: MotionPredictor = model_of(c.constant_velocity)
         return own
+    if c.weights is not None and c.predictor in TRAINED:
+        return trained_predictor(c.predictor, base / c.weights)
     return PREDICTORS[c.predictor]()

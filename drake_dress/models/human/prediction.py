@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
@@ -180,31 +182,32 @@ def resampled(samples: FloatArray, newest: FloatArray, age: float) -> FloatArray
     return np.concatenate([past, newest[None]])
 
 
-def _ridge() -> MotionPredictor:
+def trained_predictor(name: str, folder: Path | None = None) -> MotionPredictor | PersonPredictor:
+    """Returns a predictor that has learned.
+
+    Args:
+        name: one of `TRAINED`.
+        folder: with weights of `drake-dress train`; None for those of the package.
+
+    Raises:
+        UserError: a file in the folder is missing or unusable.
+    """
     # what is learned is read only where it is wanted
-    from drake_dress.models.human.learned.weights import ridge_predictor
+    from drake_dress.models.human.learned import weights
 
-    return ridge_predictor()
-
-
-def _recurrent() -> MotionPredictor:
-    from drake_dress.models.human.learned.weights import recurrent_predictor
-
-    return recurrent_predictor()
-
-
-def _learned() -> PersonPredictor:
-    from drake_dress.models.human.learned.weights import learned_predictor
-
-    return learned_predictor()
+    make: dict[str, Callable[..., MotionPredictor | PersonPredictor]] = {
+        "ridge": weights.ridge_predictor,
+        "recurrent": weights.recurrent_predictor,
+        "learned": weights.learned_predictor,
+    }
+    return make[name]() if folder is None else make[name](folder)
 
 
+TRAINED = ("ridge", "recurrent", "learned")
 _OWN: dict[str, Callable[[], MotionPredictor | PersonPredictor]] = {
     "still": StillPredictor,
     "constant_velocity": ConstantVelocityPredictor,
-    "ridge": _ridge,
-    "recurrent": _recurrent,
-    "learned": _learned,
+    **{name: partial(trained_predictor, name) for name in TRAINED},
 }
 _predictors = dict(_OWN)
 PREDICTORS: Mapping[str, Callable[[], MotionPredictor | PersonPredictor]] = MappingProxyType(

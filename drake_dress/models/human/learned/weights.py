@@ -100,9 +100,9 @@ def learned_predictor(folder: Path = SHIPPED) -> LearnedPredictor:
     return LearnedPredictor(networks(folder))
 
 
-def ridge_predictor() -> RidgePredictor:
-    """Returns the linear predictor of the package."""
-    return RidgePredictor(networks().linear)
+def ridge_predictor(folder: Path = SHIPPED) -> RidgePredictor:
+    """Returns the linear predictor with the map in a folder, or with that of the package."""
+    return RidgePredictor(networks(folder).linear)
 
 
 def recurrent_shapes() -> dict[str, tuple[int, ...]]:
