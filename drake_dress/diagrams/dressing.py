@@ -107,7 +107,7 @@ def make_dressing(
     if writer is not None:
         _add_recorder(w, writer, mesh, control, controllers)
     if meshcat is not None:
-        _add_visualizer(w, meshcat, mesh, controllers.mpc)
+        _add_visualizer(w, meshcat, mesh, controllers)
     diagram = w.builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, controllers.mpc, control.local)
@@ -253,8 +253,10 @@ def _add_recorder(
     _show_grippers(w, recorder, "position", "force")
 
 
-def _add_visualizer(w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, mpc: GlobalMpc) -> None:
-    """Adds the live view of garment, grippers and targets."""
+def _add_visualizer(
+    w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, controllers: _Controllers
+) -> None:
+    """Adds the live view of garment, grippers, targets and what is foreseen of the person."""
     shown = w.add(
         "garment_visualizer", GarmentVisualizer(meshcat, mesh.faces, len(mesh.rest_position))
     )
@@ -264,5 +266,7 @@ def _add_visualizer(w: Wiring, meshcat: Meshcat, mesh: GarmentMesh, mpc: GlobalM
         w.builder.Connect(measured, grippers.get_input_port(i))
     w.builder.Connect(grippers.get_output_port(), shown.GetInputPort("gripper_position"))
     w.connect(w.station, w.true("garment_position"), shown, "garment_position")
-    w.connect(mpc, "target", shown, "targets")
-    w.connect(mpc, "stage", shown, "stage")
+    w.connect(controllers.mpc, "target", shown, "targets")
+    w.connect(controllers.mpc, "stage", shown, "stage")
+    if controllers.forecast is not None:
+        w.builder.Connect(controllers.forecast, shown.GetInputPort("forecast"))

@@ -10,7 +10,7 @@ import numpy as np
 
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
-from drake_dress.report.log_schema import STAGE_NAMES
+from drake_dress.report.log_schema import FORECAST_AHEAD, STAGE_NAMES
 from drake_dress.report.measures import Measures
 from drake_dress.report.page import chart, embedded
 from drake_dress.report.summary import SuccessRules
@@ -70,6 +70,18 @@ class _Course:
         ]
         if any(np.isfinite(self._log.solve_time(name)).any() for name in ("global", "local")):
             charts.append(_Chart("Solve times", "", self._solves))
+        if self._log.forecast is not None:
+            charts.append(
+                _Chart(
+                    "Forecast of the person",
+                    f"Above: how far each hand was from where it had been foreseen "
+                    f"{FORECAST_AHEAD:g} s before; thin: the radius that was to hold it nine times "
+                    "in ten. Below: probability that the arm moves by the person's own will; thin: "
+                    "whether it does. Grey strip: a linear predictor stood in for the network.",
+                    self._forecast,
+                    2,
+                )
+            )
         return charts
 
     def _progress(self, axes: list[Axes]) -> None:
@@ -126,6 +138,32 @@ class _Course:
                 axes[0].plot(self._log.time, solve, ".", color=color, ms=4, label=name)
         axes[0].set_yscale("log")
         axes[0].set_ylabel("solve time, ms")
+
+    def _forecast(self, axes: list[Axes]) -> None:
+        log = self._log
+        foreseen, t = log.forecast, log.time
+        assert foreseen is not None
+        later = t + FORECAST_AHEAD
+        for k, side in enumerate(SIDES):
+            hand = foreseen.joint_position[:, 3 * k + 2]
+            true = np.stack(
+                [np.interp(later, t, log.joint_position[:, 3 * k + 2, c]) for c in range(3)], 1
+            )
+            off = np.where(later <= t[-1], np.linalg.norm(hand - true, axis=1), np.nan)
+            axes[0].plot(later, 1e3 * off, color=_COLOR[side], label=side)
+            radius = 1e3 * foreseen.radius[:, 3 * k + 2]
+            axes[0].plot(later, radius, color=_COLOR[side], lw=0.8, alpha=0.5)
+            axes[1].plot(t, foreseen.intent[:, k], color=_COLOR[side])
+            if log.intent is not None:
+                axes[1].step(
+                    t, log.intent[:, k], color=_COLOR[side], lw=0.8, alpha=0.5, where="post"
+                )
+        axes[0].set_ylim(bottom=0.0)
+        axes[0].set_ylabel("hand off by, mm")
+        axes[1].set_ylim(-0.05, 1.05)
+        axes[1].set_ylabel("by own will")
+        linear = foreseen.is_linear > 0
+        axes[1].fill_between(t, -0.05, 0.0, where=linear, step="post", color="#66727f", lw=0)
 
 
 def _embedded(log: RunLog, drawn: _Chart) -> str:

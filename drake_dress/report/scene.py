@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from pydrake.geometry import Box, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
 
 from drake_dress.drawing import new_figure, pixels, plain_settings
 from drake_dress.models.arrays import FloatArray, IntArray
@@ -16,6 +15,8 @@ OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
 LINING = Rgba(0.87, 0.62, 0.28, 1.0)
 _GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)
 _TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1.0)}
+# Joints whose forecast is shown: elbow and hand of the left, then of the right arm.
+_FORESEEN = {"left": (1, 2), "right": (4, 5)}
 _TEXT = Rgba(0.1, 0.12, 0.15, 1.0)
 _TEXT_HEIGHT = 0.07  # m
 _TEXT_ABOVE = 0.5  # m above the garment, clear of a head
@@ -68,6 +69,21 @@ class DressingScene:
         for side, p in zip(SIDES, position, strict=True):
             self._place(f"{self._path}/target/{side}", Sphere(0.015), _TARGET[side], p)
 
+    def show_forecast(self, joints: FloatArray, radius: FloatArray) -> None:
+        """Draws where elbows and hands are foreseen.
+
+        Args:
+            joints: (6,3) shoulder, elbow, hand of left, then right arm, m; NaN hides one.
+            radius: (6,) of the balls that hold them, m.
+        """
+        for side, rows in _FORESEEN.items():
+            color = _TARGET[side]
+            pale = Rgba(color.r(), color.g(), color.b(), 0.2)
+            for row in rows:
+                name = f"{self._path}/forecast/{side}/{row % 3}"
+                self._place(f"{name}/mean", Sphere(0.01), color, joints[row])
+                self._place(f"{name}/region", Sphere(1.0), pale, joints[row], float(radius[row]))
+
     def show_stage(self, stage: npt.ArrayLike) -> None:
         """Writes the stages (2,) of left and right above the garment's first position."""
         names = [STAGE_NAMES[int(np.clip(s, 0, 2))] for s in np.ravel(np.asarray(stage))]
@@ -87,14 +103,18 @@ class DressingScene:
             path = f"{self._path}/stage/{name}"
             self._meshcat.SetTriangleMesh(path, vertices, triangles, _TEXT, side=side)
 
-    def _place(self, path: str, shape: Box | Sphere, color: Rgba, p: FloatArray) -> None:
+    def _place(
+        self, path: str, shape: Box | Sphere, color: Rgba, p: FloatArray, size: float = 1.0
+    ) -> None:
         visible = bool(np.isfinite(p).all())
         if path not in self._drawn:
             self._meshcat.SetObject(path, shape, color)
             self._drawn.add(path)
         self._meshcat.SetProperty(path, "visible", visible)
         if visible:
-            self._meshcat.SetTransform(path, RigidTransform(p))
+            scaled = np.diag([size, size, size, 1.0])
+            scaled[:3, 3] = p
+            self._meshcat.SetTransform(path, scaled)
 
 
 @plain_settings()

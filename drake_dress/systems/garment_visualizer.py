@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from pydrake.common.value import Value
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from drake_dress.models.arrays import IntArray
+from drake_dress.models.human.learned.forecast import Forecast
+from drake_dress.report.log_schema import FORECAST_AHEAD
 from drake_dress.report.scene import DressingScene
 
 
@@ -21,11 +24,13 @@ class GarmentVisualizer(LeafSystem):
         - targets (optional)
         - stage (optional)
         - gripper_position (optional)
+        - forecast (optional)
         output_ports: []
 
     garment_position: (3n,) row-major (n,3), m. targets: (6,) target positions of the left and
     the right armhole, m; NaN hides one. stage: (2,) 0 prepare, 1 dress, 2 done; written above
-    the garment. gripper_position: (6,) left, right, m. All in the world frame. The person is
+    the garment. gripper_position: (6,) left, right, m. forecast: a `Forecast`, of which
+    elbows and hands `FORECAST_AHEAD` from now are drawn. All in the world frame. The person is
     drawn by Drake's MeshcatVisualizer.
 
     Args:
@@ -51,6 +56,7 @@ class GarmentVisualizer(LeafSystem):
         self._targets = self.DeclareVectorInputPort("targets", 6)
         self._stage = self.DeclareVectorInputPort("stage", 2)
         self._grippers = self.DeclareVectorInputPort("gripper_position", 6)
+        self._forecast = self.DeclareAbstractInputPort("forecast", Value[object](None))
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
         self.DeclareForcedPublishEvent(self._publish)
 
@@ -62,4 +68,8 @@ class GarmentVisualizer(LeafSystem):
             self._scene.show_grippers(self._grippers.Eval(context).reshape(2, 3))
         if self._stage.HasValue(context):
             self._scene.show_stage(self._stage.Eval(context))
+        if self._forecast.HasValue(context):
+            forecast: Forecast = self._forecast.Eval(context)
+            soon = np.array([context.get_time() + FORECAST_AHEAD])
+            self._scene.show_forecast(forecast.mean_at(soon)[0], forecast.radius_at(soon)[0])
         return EventStatus.Succeeded()

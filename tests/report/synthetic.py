@@ -13,7 +13,7 @@ from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_layout import LogContent
-from drake_dress.report.log_writer import RunLogWriter, Sample
+from drake_dress.report.log_writer import ForecastSample, RunLogWriter, Sample
 
 SHOULDER_HEIGHT = 1.4  # m
 ARM_RADIUS = 0.035  # m
@@ -115,6 +115,24 @@ def stretched(sample: Sample, garment: GarmentMesh, factor: float) -> Sample:
     return replace(sample, garment_position=middle + factor * (position - middle))
 
 
+def foreseen(samples: list[Sample]) -> list[Sample]:
+    """Returns samples with forecasts: the left hand is foreseen 10 cm too high, and unlike data."""
+    off = np.zeros((6, 3))
+    off[2, 2] = 0.1
+    return [
+        replace(
+            sample,
+            forecast=ForecastSample(
+                np.asarray(sample.joint_position) + off,
+                np.linspace(0.05, 0.1, 6),
+                np.array([0.9, 0.1]),
+                int(k % 2),
+            ),
+        )
+        for k, sample in enumerate(samples)
+    ]
+
+
 def content(garment: GarmentMesh, **fields: Any) -> LogContent:
     """Returns what a log says about a run of which it says little else than `fields`."""
     return LogContent(garment, "", "", 0, np.ones(6), **fields)
@@ -139,6 +157,7 @@ def write(
             radius=np.full(6, ARM_RADIUS),
             capsule_radius=radius,
             estimate_garment=garment,
+            forecast=bool(samples) and samples[0].forecast is not None,
         ),
     ) as log:
         for sample in samples:

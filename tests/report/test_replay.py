@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 
@@ -35,6 +36,33 @@ def test_slider_chooses_the_sample(path: Path) -> None:
         assert (replay.sample, replay.scene.label) == (4, "left: done   right: done")
         assert _draws(meshcat, log.garment_position(4))
         assert not _draws(meshcat, log.garment_position(0))
+
+
+def test_forecasts_are_drawn_where_there_are_some(tmp_path: Path, path: Path) -> None:
+    garment = synthetic.coat(0.06)
+    samples = synthetic.foreseen(synthetic.dressing(garment, count=5))
+    foreseen = synthetic.write(tmp_path / "foreseen.h5", garment, samples)
+    name = "dressing/forecast/left/2/region"
+    for file, drawn in ((path, False), (foreseen, True)):
+        meshcat = Meshcat(MeshcatParams(host="localhost"))
+        with RunLog.open(file) as log:
+            MeshcatReplay(meshcat, log)
+            assert meshcat.HasPath(name) == drawn
+            if drawn:
+                # a ball about the place that is foreseen, as large as the radius
+                expected = np.diag([*[np.linspace(0.05, 0.1, 6)[2]] * 3, 1.0])
+                expected[:3, 3] = log.joint_position[0, 2] + [0.0, 0.0, 0.1]
+                np.testing.assert_allclose(_transform(meshcat, name), expected)
+
+
+def _transform(meshcat: Meshcat, path: str) -> FloatArray:
+    """Returns the last transform (4,4) that Meshcat sent."""
+    # at the end of the message: 16 numbers, each after a byte that says its type, by columns
+    numbers = np.frombuffer(
+        meshcat._GetPackedTransform(path)[-16 * 9 :], dtype=[("kind", "u1"), ("value", ">f8")]
+    )
+    matrix: FloatArray = numbers["value"].reshape(4, 4).T
+    return matrix
 
 
 def _draws(meshcat: Meshcat, position: FloatArray) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.common.value import Value
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -14,7 +15,9 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.learned.predictor import LearnedPredictor
 from drake_dress.systems.garment_visualizer import GarmentVisualizer
+from tests.models.human.learned.drawn import drawn_networks, drawn_scene
 from tests.report import synthetic
 from tests.report.browser import live_screenshot, needs_chromium
 
@@ -54,6 +57,23 @@ def test_garment_grippers_and_targets_are_drawn(meshcat: Meshcat, garment: Garme
     position = publish(0.2)
     packed = meshcat._GetPackedObject("dressing/garment/outside")
     assert position.astype("<f4").tobytes() in packed
+
+
+def test_forecast_is_drawn_if_it_is_connected(meshcat: Meshcat, garment: GarmentMesh) -> None:
+    system = GarmentVisualizer(meshcat, garment.faces, len(garment.rest_position))
+    context = system.CreateDefaultContext()
+    system.GetInputPort("garment_position").FixValue(context, garment.rest_position.ravel())
+    system.ForcedPublish(context)
+    path = "dressing/forecast/right/2/region"
+    assert not meshcat.HasPath(path)
+    predictor, scene = LearnedPredictor(drawn_networks(0)), drawn_scene(0)
+    forecast, _ = predictor.forecast(scene.history(), predictor.begin())
+    system.GetInputPort("forecast").FixValue(context, Value[object](forecast))
+    system.ForcedPublish(context)
+    for side in ("left", "right"):
+        for joint in (1, 2):
+            assert meshcat.HasPath(f"dressing/forecast/{side}/{joint}/mean")
+    assert meshcat.HasPath(path)
 
 
 def test_stage_is_written_and_follows(meshcat: Meshcat, garment: GarmentMesh) -> None:

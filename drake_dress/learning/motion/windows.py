@@ -16,7 +16,7 @@ import numpy.typing as npt
 from drake_dress.learning.motion.sequence import PERIOD as SAMPLED
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
 from drake_dress.models.human.learned.filling import filled
-from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
+from drake_dress.models.human.learned.network import FEWEST, FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.tokens import ArmTokens, Windows, arm_tokens
 
 _STRIDE = PERIOD / SAMPLED
@@ -230,7 +230,7 @@ class WindowSource:
             joints[b, HISTORY - since[b] :, [arm[b] + k for k in which[kind[b]]]] = np.nan
         for b in np.flatnonzero(rng.random(count) < how.one_armed):
             joints[b, :, 3 - arm[b] : 6 - arm[b]] = np.nan
-        begin = rng.integers(1, HISTORY - 4, size=count)
+        begin = rng.integers(1, HISTORY - FEWEST + 1, size=count)
         for b in np.flatnonzero(rng.random(count) < how.late):
             joints[b, : begin[b]], visible[b, : begin[b]] = np.nan, False
         return first

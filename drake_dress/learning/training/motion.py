@@ -34,16 +34,15 @@ from drake_dress.models.human.learned.network import COVERED, FUTURE, HISTORY
 
 RESIDUAL = Schedule(steps=12000, rate=3e-3, every=1000, patience=12)
 DENOISER = Schedule(steps=4000, rate=2e-3, every=500, patience=6)
-INITIALISER = Schedule(steps=4000, rate=1e-3, every=500, patience=6)
+INITIALISER = Schedule(steps=4000, rate=2e-3, every=500, patience=6)
 ADAPTING = Schedule(steps=3000, rate=5e-4, every=250, patience=6)
 # Noise of joints where nothing else is said, m, and time between windows of validation data, s.
 NOISE, EVERY = 0.004, 0.5
-_BATCH, _SMALLER_BATCH = 256, 64
+_BATCH, _SMALLER_BATCH = 256, 128
 _LINEAR_BATCH = 1024
 # Share of the free sequences' error in the validation's: they move five times as far.
 _FREE_SHARE = 0.1
 _HELD_OUT_BATCHES = 12  # of validation data for the diffusion
-_OTHERS = (1, 3, 6, 10)  # places of the samples that a sample's distance is taken from
 _SEED_OF = {"linear": 1, "residual": 2, "contexts": 3, "denoiser": 4, "validation": 5}
 
 Arrays = dict[str, np.ndarray]
@@ -277,10 +276,8 @@ class MotionTraining:
             both = {k: v.to(device) for k, v in kept.items()} | dict(w)
             found = diffusion.motion_of(both, diffusion.samples(both, z))
             off = _distance(found - wanted[:, None])
-            # each sample and a few others: all pairs would cost five times as much
-            apart = sum(_distance(found - found.roll(k, 1)).mean(1) for k in _OTHERS)
             # the energy score, which the true distribution minimises, and the best of all samples
-            score = off.mean(1) - 0.5 * apart / len(_OTHERS)
+            score = off.mean(1) - 0.5 * _mean_apart(found)
             return (score + off.min(1).values).mean()
 
         fixed = torch.from_numpy(held_out.z[:512]), torch.from_numpy(held_out.motion[:512])
@@ -288,17 +285,25 @@ class MotionTraining:
         return _Stage(first, batches, loss, fixed, self.initialiser)
 
     def regions(self, weights: Arrays) -> Arrays:
-        """Returns the factors (F+1,3) on the learned radii with which regions cover `COVERED`."""
-        ratios = []
+        """Returns what regions that cover `COVERED` need, from validation sequences.
+
+        Returns:
+            the factors (F+1,3) on the learned radii, and the radii (F+1,3), m, about the linear
+            predictor's mean.
+        """
+        linear = LinearMotion(weights["linear.map"].astype(np.float64))
+        ratios, distances = [], []
         for data in self.validation.values():
             for batch in validation_windows(data, self.with_sleeves):
                 z, mean, _ = predicted(weights, self.intent, batch)
                 off = np.linalg.norm(batch.displacement - mean, axis=3)
                 ratios.append(off / network.quantile(weights, z))
-        every = np.concatenate(ratios)
-        level = min(1.0, COVERED * (1.0 + 1.0 / len(every)))
-        factor = np.quantile(every, level, axis=0)
-        return {"region.factor": factor.astype(np.float32)}
+                ahead = linear.displacement(batch.arms.joints[:, :, :3])
+                distances.append(np.linalg.norm(batch.displacement - ahead, axis=3))
+        return {
+            "region.factor": _conformal(np.concatenate(ratios)),
+            "region.linear": _conformal(np.concatenate(distances)),
+        }
 
     def _familiar(self) -> Arrays:
         tokens = [
@@ -354,9 +359,29 @@ def shortened(training: MotionTraining, steps: int) -> MotionTraining:
     return replace(training, **parts, **counts)
 
 
+def _conformal(rows: FloatArray) -> np.ndarray:
+    """Returns the smallest values (…) that hold `COVERED` of the next row of N rows (N,…)."""
+    level = min(1.0, COVERED * (1.0 + 1.0 / len(rows)))
+    return np.quantile(rows, level, axis=0).astype(np.float32)
+
+
 def _distance(off: torch.Tensor) -> torch.Tensor:
     """Returns mean distances (…) of motions (…,F,3,3)."""
     return (off.square().sum(-1) + 1e-8).sqrt().mean((-1, -2))
+
+
+def _mean_apart(samples: torch.Tensor) -> torch.Tensor:
+    """Returns the mean distance (B,) of two of S samples (B,S,F,3,3), drawn independently.
+
+    All pairs count: the distances of some could be made large while the others vanish.
+    """
+    count = samples.shape[1]
+    total = torch.zeros(len(samples), device=samples.device)
+    for k in range(1, count // 2 + 1):
+        # sample and the k-th after it; at half the way round each pair is met twice
+        share = 1.0 if 2 * k == count else 2.0
+        total = total + share * _distance(samples - samples.roll(k, 1)).mean(1)
+    return total / count
 
 
 def _file(folder: Path | None, stage: str) -> Path | None:

@@ -91,15 +91,17 @@ class ConstantVelocityPredictor:
     def predict(self, history: FloatArray, time_step: float, steps: int) -> FloatArray:
         """Returns extrapolated joints; see `MotionPredictor`."""
         now = last_seen(history)
-        velocity = self._velocity(history)
-        ahead = time_step * np.arange(steps + 1)
-        if np.isfinite(self.decay_time):
-            ahead = -self.decay_time * np.expm1(-ahead / self.decay_time)
+        velocity = self.velocity(history)
+        ahead = decayed(time_step * np.arange(steps + 1, dtype=np.float64), self.decay_time)
         moved = now + ahead[:, None, None] * velocity
         return np.stack([now, *(with_lengths(q, now) for q in moved[1:])])
 
-    def _velocity(self, history: FloatArray) -> FloatArray:
-        """Returns (6,3), m/s; zero for a joint that was not observed often enough."""
+    def velocity(self, history: FloatArray) -> FloatArray:
+        """Returns (6,3), m/s; zero for a joint that was not observed often enough.
+
+        Args:
+            history: (T,6,3) m, `sample_period` apart; a joint is NaN where it was not observed.
+        """
         first, second = np.triu_indices(len(history), 1)
         slopes = (history[second] - history[first]) / (
             self.sample_period * (second - first)[:, None, None]
@@ -108,6 +110,14 @@ class ConstantVelocityPredictor:
         velocity = np.where((seen >= self.least_samples)[:, None], _median_of_known(slopes), 0.0)
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         return velocity * np.minimum(1.0, self.max_speed / np.maximum(speed, 1e-12))
+
+
+def decayed(ahead: FloatArray, decay_time: float) -> FloatArray:
+    """Returns the times, s, in which a constant velocity leads as far as one that decays."""
+    if not np.isfinite(decay_time):
+        return ahead
+    shorter: FloatArray = -decay_time * np.expm1(-ahead / decay_time)
+    return shorter
 
 
 def _median_of_known(rows: FloatArray) -> FloatArray:

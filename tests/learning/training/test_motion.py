@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drake_dress.learning.motion.windows import WindowSource
 from drake_dress.learning.training import motion as module
-from drake_dress.learning.training.loop import Report
+from drake_dress.learning.training.loop import Report, Schedule, train
 from drake_dress.learning.training.motion import (
+    Contexts,
     MotionTraining,
     errors,
     intents,
@@ -25,6 +28,7 @@ from drake_dress.learning.training.motion import (
 from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import distance
 from drake_dress.models.human.learned.intent import intent_weights
+from drake_dress.models.human.learned.linear import LinearMotion
 from drake_dress.models.human.learned.network import COVERED, FUTURE, WIDTH
 from drake_dress.models.human.learned.predictor import LearnedPredictor, Networks
 from drake_dress.models.human.learned.tokens import SLEEVE_COLUMNS
@@ -126,6 +130,59 @@ def test_regions_hold_what_they_should_of_validation_windows() -> None:
     count = len(np.concatenate(inside))
     assert (share >= COVERED).all()
     assert (share <= COVERED + 2.0 / count + 0.01).all()
+
+
+def test_regions_of_the_linear_predictor_hold_as_many() -> None:
+    weights, inside = trained(), []
+    linear = LinearMotion(weights["linear.map"].astype(np.float64))
+    for data in (made("free", 2), made("active", 1)):
+        for batch in validation_windows(data):
+            off = linear.displacement(batch.arms.joints[:, :, :3]) - batch.displacement
+            inside.append(
+                np.linalg.norm(off, axis=3) <= network.linear_radius(weights) * (1.0 + 1e-6)
+            )
+    every = np.concatenate(inside)
+    assert (every.mean(axis=0) >= COVERED).all()
+    assert (every.mean(axis=0) <= COVERED + 2.0 / len(every) + 0.01).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 7))
+def test_mean_distance_apart_counts_all_pairs(seed: int, count: int) -> None:
+    """As the energy score takes it: also each sample and itself."""
+    samples = torch.from_numpy(np.random.default_rng(seed).normal(size=(3, count, 4, 3, 3)))
+    found = module._mean_apart(samples)
+    off = samples[:, :, None] - samples[:, None]
+    expected = off.square().sum(-1).sqrt().mean((-1, -2)).mean((1, 2))
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_samples_are_as_far_apart_as_motions_are() -> None:
+    """Contexts tell nothing of normally distributed motions; the samples are spread as these are.
+
+    Their mean distance from a motion is then that of two motions, and so is that of two samples.
+    """
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(4000, WIDTH)).astype(np.float32)
+    latent = rng.normal(size=(4000, diffusion.LATENT))
+    basis = np.linalg.qr(rng.normal(size=(diffusion.VALUES, diffusion.LATENT)))[0]
+    motion = (latent @ basis.T).reshape(-1, FUTURE, 3, 3).astype(np.float32)
+    contexts = Contexts(z, motion)
+    some = replace(
+        training(),
+        denoiser=Schedule(steps=100, rate=2e-3),
+        initialiser=Schedule(steps=150, rate=4e-3),
+    )
+    weights: dict[str, np.ndarray] = diffusion.latent_basis(motion)
+    for part in (some._denoiser, some._initialiser):
+        stage = part(weights, contexts, Contexts(z[:200], motion[:200]))
+        found = train(stage.first, stage.batches, stage.loss, lambda w: 0.0, stage.schedule)
+        assert found is not None
+        weights |= found
+    samples = diffusion.motion_of(weights, diffusion.samples(weights, z[:200]))
+    samples, other = torch.from_numpy(samples), torch.from_numpy(motion[200:220])
+    apart = float(module._mean_apart(samples).mean()) * 20 / 19
+    true = float(module._distance(other[:, None] - other[None]).sum()) / (20 * 19)
+    assert apart == pytest.approx(true, rel=0.3)
 
 
 def test_what_is_trained_on_is_familiar() -> None:

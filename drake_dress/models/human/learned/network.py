@@ -28,6 +28,7 @@ from drake_dress.models.human.learned.tokens import TOKEN_SIZE
 
 HISTORY, FUTURE = 20, 20  # samples
 PERIOD = 0.1  # s
+FEWEST = 5  # samples in which anything was seen, of each history that was trained on
 COVERED = 0.9  # share of errors in the regions
 AVERAGES = 8
 WIDTH = 256
@@ -86,6 +87,11 @@ def radius(weights: Weights, z: Array) -> Array:
     (conformal quantile regression, Romano, Patterson, Candès 2019).
     """
     return quantile(weights, z) * weights["region.factor"]
+
+
+def linear_radius(weights: Weights) -> Array:
+    """Returns the radius (F+1,3), m, of regions about the linear predictor's mean."""
+    return weights["region.linear"]
 
 
 def quantile(weights: Weights, z: Array) -> Array:

@@ -9,14 +9,14 @@ come from leapfrog diffusion. Last, limbs get their lengths, and joints their li
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from drake_dress.machine import one_thread
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.history import Sampling
-from drake_dress.models.human.learned import diffusion, network
+from drake_dress.models.human.learned import diffusion, network, plain_experts
 from drake_dress.models.human.learned.arm_frame import ArmFrames
 from drake_dress.models.human.learned.experts import ExpertMemory, ExpertSettings
 from drake_dress.models.human.learned.familiarity import distance
@@ -28,13 +28,11 @@ from drake_dress.models.human.learned.layers import logistic
 from drake_dress.models.human.learned.linear import LinearMotion
 from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.tokens import ArmTokens, Windows, arm_tokens
-from drake_dress.models.human.prediction import ConstantVelocityPredictor
 from drake_dress.models.immutable import Immutable
 
 SAMPLING = Sampling(HISTORY, PERIOD)
-# Rows of the experts: no motion, decaying velocity, linear, network.
-EXPERTS = ("still", "damped", "linear", "network")
-_NETWORK = 3
+EXPERTS = (*plain_experts.NAMES, "linear", "network")
+_NETWORK = EXPERTS.index("network")
 
 
 @dataclass(frozen=True)
@@ -91,9 +89,6 @@ class LearnedPredictor:
     networks: Networks
     experts: ExpertSettings = ExpertSettings()
     sampling: Sampling = SAMPLING
-    _damped: ConstantVelocityPredictor = field(
-        default_factory=lambda: ConstantVelocityPredictor(history_length=5, sample_period=PERIOD)
-    )
 
     def begin(self) -> PredictorMemory:
         """Returns the memory before the first forecast."""
@@ -118,19 +113,15 @@ class LearnedPredictor:
             intent_logit(self.networks.intent, arms.tokens, hidden.astype(np.float32))
         )
         linear = self.networks.linear.displacement(arms.joints[:, :, :3])
-        found = self._arms(arms, arms.joints[:, -1:, :3] + linear, intent)
+        is_new = np.count_nonzero(seen[0].any(axis=1)) < network.FEWEST
+        is_linear = bool(is_new or np.max(distance(self.networks.motion, arms.tokens)) > 1.0)
+        found = self._arms(arms, arms.joints[:, -1:, :3] + linear, intent, is_linear)
         lengths = Lengths.of(joints, seen)
-        now, tail = joints[0, -1], joints[0, -self._damped.history_length :]
-        experts = np.stack(
-            [
-                np.tile(now, (FUTURE + 1, 1, 1)),
-                self._damped.predict(tail, PERIOD, FUTURE),
-                _in_world(arms.frames, arms.joints[:, -1:, :3] + linear),
-                _in_world(arms.frames, found.mean),
-            ]
-        )
+        mapped = _in_world(arms.frames, arms.joints[:, -1:, :3] + linear)
+        # of a person who was just seen the network says anything, which is not to be remembered
+        learned = mapped if is_new else _in_world(arms.frames, found.mean)
+        experts = np.stack([*plain_experts.plain_experts(joints[0]), mapped, learned])
         experts = person_like(experts[None], lengths, joints[:, -1])[0]
-        is_linear = bool(np.max(distance(self.networks.motion, arms.tokens)) > 1.0)
         allowed = np.ones(len(EXPERTS))
         allowed[_NETWORK] = 0.0 if is_linear else 1.0
         weights = known.weights(self.experts, allowed, FUTURE + 1)
@@ -155,13 +146,17 @@ class LearnedPredictor:
         poses = tuple(p for p in memory.poses if p[0] > history.time - lasting - 0.5 * PERIOD)
         return forecast, PredictorMemory(after, (*poses, (history.time, both[0, 0])))
 
-    def _arms(self, arms: ArmTokens, linear: FloatArray, intent: FloatArray) -> _Arms:
-        """Returns the network's predictions of both arms.
+    def _arms(
+        self, arms: ArmTokens, linear: FloatArray, intent: FloatArray, is_linear: bool
+    ) -> _Arms:
+        """Returns the predictions of both arms.
 
         Args:
             arms: tokens.
             linear: (2,F+1,3,3) the linear predictor's, m, in the arms' frames.
             intent: (2,) probabilities.
+            is_linear: whether the network is not to be believed; radii are then those of the linear
+                predictor, and samples as far apart as these say.
         """
         weights = self.networks.motion
         z = network.context(weights, arms.tokens, intent)
@@ -169,8 +164,12 @@ class LearnedPredictor:
         scale = network.error_scale(weights, z)
         latent = diffusion.samples(weights, z)
         motion = diffusion.motion_of(weights, latent) * scale[:, None, 1:, :, None]
+        radius = network.radius(weights, z)
+        if is_linear:
+            wider = network.linear_radius(weights) / radius
+            motion, radius = motion * wider[:, None, 1:, :, None], wider * radius
         motion = np.concatenate([np.zeros_like(motion[:, :, :1]), motion], axis=2)
-        return _Arms(mean, network.radius(weights, z), mean[:, None] + motion)
+        return _Arms(mean, radius, mean[:, None] + motion)
 
     @staticmethod
     def _pose_at(memory: PredictorMemory, time: float) -> FloatArray | None:

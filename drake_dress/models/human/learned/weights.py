@@ -79,6 +79,7 @@ def motion_shapes() -> dict[str, tuple[int, ...]]:
         "latent.latent": (diffusion.VALUES, diffusion.LATENT),
         "latent.motion": (diffusion.LATENT, diffusion.VALUES),
         "region.factor": (FUTURE + 1, 3),
+        "region.linear": (FUTURE + 1, 3),
     }
 
 

@@ -114,4 +114,5 @@ def drawn_networks(seed: int = 0, limit: float = 1e3) -> Networks:
     motion["latent.latent"] = np.eye(diffusion.VALUES, diffusion.LATENT)
     motion["latent.motion"] = np.eye(diffusion.LATENT, diffusion.VALUES)
     motion["region.factor"] = np.ones((FUTURE + 1, 3), dtype=np.float32)
+    motion["region.linear"] = np.linspace(0.01, 0.5, 3 * (FUTURE + 1)).reshape(FUTURE + 1, 3)
     return Networks(intent_weights(rng), {k: v.astype(np.float32) for k, v in motion.items()})

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drake_dress.models.human.learned import network
 from drake_dress.models.human.learned.diffusion import SAMPLES
 from drake_dress.models.human.learned.experts import ExpertSettings
 from drake_dress.models.human.learned.forecast import Forecast, PersonHistory
@@ -109,7 +110,7 @@ def test_moved_and_turned_scene_has_the_moved_and_turned_forecast(
 @given(seeds, st.floats(-3.0, 3.0), st.floats(0.6, 1.0))
 @settings(max_examples=20)
 def test_what_is_learned_is_turned_by_any_angle(seed: int, yaw: float, share: float) -> None:
-    learned = replace(PREDICTOR, experts=ExpertSettings(trust=(0.1, 0.0, 0.4, 0.5)))
+    learned = replace(PREDICTOR, experts=ExpertSettings(trust=(0.1, 0.0, 0.0, 0.1, 0.4, 0.4)))
     check_turned(learned, partly_seen(seed, share), yaw, 1)
 
 
@@ -149,7 +150,7 @@ def test_hidden_joints_follow_the_network_if_the_input_is_familiar(
     networks = drawn_networks(0, limit)
     motion = dict(networks.motion)
     motion["displacement.bias"] = motion["displacement.bias"] + np.float32(0.1)
-    trust = ExpertSettings(trust=(1.0, 0.0, 0.0, 0.0))
+    trust = ExpertSettings(trust=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     predictor = LearnedPredictor(replace(networks, motion=motion), trust)
     scene = drawn_scene(9)
     joints = scene.joints.copy()
@@ -176,6 +177,30 @@ def test_unfamiliar_input_is_left_to_the_linear_predictor(seed: int) -> None:
     assert np.abs(strange.mean - found.mean).max() > 1e-4
 
 
+@pytest.mark.parametrize("count", [1, network.FEWEST - 1, network.FEWEST])
+def test_who_was_seen_for_a_moment_only_is_left_to_the_linear_predictor(count: int) -> None:
+    """Regions are then its own, and samples as far apart, whatever the network says."""
+    networks = drawn_networks(0)
+    motion = dict(networks.motion)
+    motion["displacement.bias"] = motion["displacement.bias"] + np.float32(0.3)
+    motion["radius.bias"] = motion["radius.bias"] + np.float32(30.0)
+    scene = drawn_scene(2)
+    joints = scene.joints.copy()
+    joints[: HISTORY - count] = np.nan
+    found, other = (
+        LearnedPredictor(n).forecast(Scene(joints, scene.sleeves).history(), PREDICTOR.begin())[0]
+        for n in (networks, replace(networks, motion=motion))
+    )
+    assert found.is_linear == other.is_linear == (count < network.FEWEST)
+    if not found.is_linear:
+        assert other.radius.min() > found.radius.max()
+        return
+    expected = np.tile(network.linear_radius(networks.motion), (1, 2))
+    for forecast in (found, other):
+        np.testing.assert_allclose(forecast.radius, expected, rtol=1e-6)
+    np.testing.assert_allclose(other.mean, found.mean, atol=1e-9)
+
+
 def test_the_same_input_gives_the_same_bits() -> None:
     scene = partly_seen(1, 0.8, HISTORY + 6)
     first, second = (followed(PREDICTOR, scene, 6)[0] for _ in range(2))
@@ -190,24 +215,44 @@ def test_network_is_trusted_first_and_row_0_is_about_now() -> None:
     np.testing.assert_allclose(found.mean[0], scene.joints[-1], atol=0.02)
 
 
-@pytest.mark.parametrize(("moves", "limit"), [(False, 1e3), (False, 1e-6), (True, 1e3)])
-def test_forecasts_follow_the_expert_that_knows_this_person(moves: bool, limit: float) -> None:
-    """What is learned is far off, and loses its weight; of a person at rest the map is right."""
+def far_off(limit: float) -> LearnedPredictor:
+    """Returns a predictor of which all that is learned is far off."""
     networks = drawn_networks(0, limit)
     motion = dict(networks.motion)
     motion["displacement.bias"] = motion["displacement.bias"] + np.float32(0.2)
     motion["linear.map"] = motion["linear.map"] + np.float32(0.2)
-    predictor = LearnedPredictor(replace(networks, motion=motion))
-    scene = drawn_scene(4, HISTORY + 60)
-    if not moves:
-        scene = Scene(np.tile(scene.joints[:1], (80, 1, 1)), np.tile(scene.sleeves[:1], (80, 1, 1)))
-    found, memory = followed(predictor, scene, 60)
+    return LearnedPredictor(replace(networks, motion=motion))
+
+
+@pytest.mark.parametrize("limit", [1e3, 1e-6])
+def test_forecasts_follow_the_expert_that_knows_this_person(limit: float) -> None:
+    """The network is far off, and loses its weight; of a person at rest the map is right."""
+    predictor, scene = far_off(limit), drawn_scene(4)
+    rest = Scene(np.tile(scene.joints[:1], (80, 1, 1)), np.tile(scene.sleeves[:1], (80, 1, 1)))
+    found, memory = followed(predictor, rest, 60)
     weights = memory.experts.weights(predictor.experts, np.ones(len(EXPERTS)), ROWS)
     assert weights[EXPERTS.index("network")].max() < 0.05
-    if moves:
-        assert weights[EXPERTS.index("linear")].max() < 0.05
-    else:
-        assert np.abs(found.mean - scene.joints[0]).max() < 0.03
+    assert np.abs(found.mean - scene.joints[0]).max() < 0.03
+
+
+def test_forecasts_of_a_stranger_err_no_more_than_the_best_expert() -> None:
+    """Network and map are far off, of a person who moves; they are combined with the others."""
+    predictor, scene = far_off(1e3), drawn_scene(4, HISTORY + 80)
+    memory, errors = predictor.begin(), []
+    for k in range(60):
+        now = slice(k, k + HISTORY)
+        history = PersonHistory(k * PERIOD, scene.joints[now], scene.sleeves[now])
+        found, memory = predictor.forecast(history, memory)
+        true = scene.joints[k + HISTORY - 1 : k + HISTORY + FUTURE]
+        ways = np.concatenate([memory.experts.past[-1].positions, found.mean[None]])
+        errors.append(np.linalg.norm(ways - true, axis=3).mean(axis=(1, 2)))
+    *experts, own = np.mean(errors[40:], axis=0)
+    assert own < 1.02 * min(experts)
+    assert own < 0.5 * experts[EXPERTS.index("network")]
+    weights = memory.experts.weights(predictor.experts, np.ones(len(EXPERTS)), ROWS)
+    for name in ("linear", "network"):
+        assert weights[EXPERTS.index(name)].max() < 0.15
+        assert weights[EXPERTS.index(name), 11:].max() < 0.01
 
 
 def test_memory_of_the_pose_tells_where_a_joint_hidden_all_along_was() -> None:
