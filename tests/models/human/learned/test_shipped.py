@@ -49,6 +49,20 @@ def test_names_of_scenarios_make_these_predictors() -> None:
     assert PREDICTORS["recurrent"]() is recurrent_predictor()
 
 
+@pytest.mark.parametrize("count", [1, 2, 4, 5, 10])
+def test_person_who_was_just_seen_is_not_predicted_to_fly_away(count: int) -> None:
+    """The first samples of a run: the network was never trained on fewer than five."""
+    predictor, scene, true = learned_predictor(), resting(0.0), pose(HANGING)
+    joints, sleeves = scene.joints.copy(), scene.sleeves.copy()
+    joints[:-count], sleeves[:-count] = np.nan, np.nan
+    forecast, _ = predictor.forecast(Scene(joints, sleeves).history(), predictor.begin())
+    assert forecast.is_linear == (count < 5)
+    off = np.linalg.norm(forecast.mean - true, axis=2)
+    assert off.max() < 0.05
+    assert (off < forecast.radius).all()
+    assert forecast.radius.max() < 0.8
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.004])
 def test_person_at_rest_is_predicted_to_rest(noise: float) -> None:
     predictor, willed = learned_predictor(), []
