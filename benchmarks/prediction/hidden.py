@@ -11,9 +11,12 @@ from drake_dress.learning.evaluation.stream import followed
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.models.arrays import BoolArray
 from drake_dress.models.human.learned.forecast import PersonPredictor
+from drake_dress.models.human.learned.network import FUTURE, PERIOD
 
 HAND, ELBOW = 2, 1
-_BEGINS = 3.0  # s into a motion
+_SEED = 11  # of the times at which a joint is hidden
+_BEFORE = 3.0  # s for which all joints are seen before
+_AFTER = FUTURE * PERIOD  # s that a forecast goes on beyond what is compared
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,10 @@ def hidden_errors(
     duration: float,
     noise: float,
 ) -> Iterator[Hidden]:
-    """Yields the errors of both arms of each motion, one arm hidden at a time.
+    """Yields the error of an arm of each motion, left and right in turn, hidden at a drawn time.
 
     Args:
-        motions: at least `_BEGINS` + `duration` + 2 s long.
+        motions: at least `_BEFORE` + `duration` + `_AFTER` long.
         predictor: of the person.
         joint: `HAND` or `ELBOW`.
         duration: for which it is hidden, s.
@@ -48,7 +51,10 @@ def hidden_errors(
     for number, motion in enumerate(motions):
         arm = number % 2
         row = 3 * arm + joint
-        since = motion.time[0] + _BEGINS
+        first, last = motion.time[0] + _BEFORE, motion.time[-1] - duration - _AFTER
+        since = float(np.random.default_rng((_SEED, number)).uniform(first, max(first, last)))
+        part = motion.between(since - _BEFORE, since + duration + _AFTER + PERIOD)
+        since = float(part.time[0]) + _BEFORE
         until = since + duration
 
         def hide(time: float, row: int = row, since: float = since) -> BoolArray:
@@ -56,9 +62,9 @@ def hidden_errors(
             hidden[row] = time >= since
             return hidden
 
-        last = motion.joints_at(np.array([since - 1e-6, until]))[:, row]
-        for c in followed(motion, predictor, {}, noise, seed=number, hide=hide):
+        places = motion.joints_at(np.array([since - 1e-6, until]))[:, row]
+        for c in followed(part, predictor, {}, noise, seed=number, hide=hide):
             if c.time >= until - 1e-6:
-                held = float(np.linalg.norm(last[1] - last[0]))
+                held = float(np.linalg.norm(places[1] - places[0]))
                 yield Hidden(float(c.errors["learned"][0, row]), held)
                 break

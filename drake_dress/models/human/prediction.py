@@ -107,7 +107,7 @@ class ConstantVelocityPredictor:
             self.sample_period * (second - first)[:, None, None]
         )
         seen = np.isfinite(history).all(axis=2).sum(axis=0)
-        velocity = np.where((seen >= self.least_samples)[:, None], _median_of_known(slopes), 0.0)
+        velocity = np.where((seen >= self.least_samples)[:, None], median_of_known(slopes), 0.0)
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         return velocity * np.minimum(1.0, self.max_speed / np.maximum(speed, 1e-12))
 
@@ -120,7 +120,7 @@ def decayed(ahead: FloatArray, decay_time: float) -> FloatArray:
     return shorter
 
 
-def _median_of_known(rows: FloatArray) -> FloatArray:
+def median_of_known(rows: FloatArray) -> FloatArray:
     """Returns the median over rows without NaN, and NaN where all rows are NaN.
 
     For a few rows numpy's own function takes five times as long.

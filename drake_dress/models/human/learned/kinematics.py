@@ -12,12 +12,14 @@ import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.learned.arm_frame import facing
-from drake_dress.models.human.prediction import LIMBS
+from drake_dress.models.human.prediction import LIMBS, median_of_known
 
 # Lower and upper limits of abduction, extension, rotation, elbow flexion, rad: the ranges of mobile
 # adults, since nobody knows the person's own.
 LIMITS = np.array([[-1.0, -3.2, -1.9, 0.0], [3.2, 1.4, 1.9, 2.7]])
 _MIDDLE = LIMITS.mean(axis=0)
+# Ends of the shoulder line and of the limbs.
+_PARENTS, _CHILDREN = np.array([(0, 3), *LIMBS]).T
 _MIRROR = np.array([1.0, -1.0, 1.0])
 # A limit is passed by more than this before a pose is changed, rad: rounding is left alone.
 _SLACK = 1e-9
@@ -40,13 +42,11 @@ class Lengths:
                 for a limb of which both ends were never seen at once.
         """
         seen = np.ones(joints.shape[:3], dtype=bool) if seen is None else seen
-        found = []
-        for a, b in ((0, 3), *LIMBS):
-            length = np.linalg.norm(joints[:, :, b] - joints[:, :, a], axis=2)
-            both = seen[:, :, a] & seen[:, :, b]
-            both[~both.any(axis=1)] = True
-            found.append(np.nanmedian(np.where(both, length, np.nan), axis=1))
-        return cls(found[0], np.stack(found[1:], axis=1))
+        length = np.linalg.norm(joints[:, :, _CHILDREN] - joints[:, :, _PARENTS], axis=3)
+        both = seen[:, :, _CHILDREN] & seen[:, :, _PARENTS]
+        both |= ~both.any(axis=1, keepdims=True)
+        median = median_of_known(np.where(both, length, np.nan).swapaxes(0, 1))
+        return cls(median[:, 0], median[:, 1:])
 
 
 def person_like(joints: FloatArray, lengths: Lengths, now: FloatArray) -> FloatArray:
