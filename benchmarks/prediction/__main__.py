@@ -32,7 +32,7 @@ from benchmarks.parser import (
     output_file,
     some_of,
 )
-from benchmarks.prediction.hidden import ELBOW, HAND, hidden_errors
+from benchmarks.prediction.hidden import ELBOW, HAND, hidden_errors, mean_errors
 from benchmarks.prediction.persons import OWN_RIDGE, SHIPPED_RIDGE, across_persons, folds, gain
 from benchmarks.prediction.sleeves import told_by_sleeves, ways_to_see
 from benchmarks.prediction.streams import Told, delays_of
@@ -217,14 +217,20 @@ class Study:
 
     def hidden(self) -> tuple[list[Table], list[Figure]]:
         """Hidden joints on held-out sequences."""
-        rows, figures = [], []
-        motions = [m for kind in _DRESSED for m in _motions(self._data(kind))[:_HIDDEN_SEQUENCES]]
+        rows: list[list[object]] = []
+        figures = []
+        motions = {kind: _motions(self._data(kind))[:_HIDDEN_SEQUENCES] for kind in _DRESSED}
         for joint, name in ((HAND, "hand"), (ELBOW, "elbow")):
             for duration, most in zip(_HIDDEN, (30.0, 40.0), strict=True):
-                found = list(hidden_errors(motions, self._predictor, joint, duration, _NOISES[0]))
-                filled = 1e3 * float(np.mean([h.filled for h in found]))
-                held = 1e3 * float(np.mean([h.held for h in found]))
-                rows.append([f"{name}, {duration:g} s", filled, held, filled / held, len(found)])
+                found = {
+                    kind: list(hidden_errors(some, self._predictor, joint, duration, _NOISES[0]))
+                    for kind, some in motions.items()
+                }
+                both = [hidden for some in found.values() for hidden in some]
+                for kind, some in (*found.items(), ("both", both)):
+                    filled, held = (1e3 * mean for mean in mean_errors(some))
+                    what = f"{name}, {duration:g} s, {kind}"
+                    rows.append([what, filled, held, filled / held, len(some)])
                 what = f"{name} hidden for {duration:g} s"
                 figures += [
                     at_most(what, filled, "mm", most),

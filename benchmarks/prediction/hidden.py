@@ -32,6 +32,11 @@ class Hidden:
     held: float
 
 
+def mean_errors(found: Sequence[Hidden]) -> tuple[float, float]:
+    """Returns the mean errors of the predictor and of the last seen place, m."""
+    return float(np.mean([h.filled for h in found])), float(np.mean([h.held for h in found]))
+
+
 def hidden_errors(
     motions: Sequence[TimedMotion],
     predictor: PersonPredictor,

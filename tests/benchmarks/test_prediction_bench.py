@@ -67,7 +67,7 @@ def test_figures_and_tables_of_all_sections_are_written(
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- bench prediction -->\n<!-- end -->\nafter\n")
     words = ["--data", str(data), "--weights", str(out), "--recordings", str(recording)]
-    words += ["--only", "held_out,intent,recordings,speed", "--json", str(told)]
+    words += ["--only", "held_out,intent,hidden,recordings,speed", "--json", str(told)]
     assert main([*words, "--into", str(page)]) == 0
     kept = json.loads(told.read_text())
     names = [figure["name"] for figure in kept["figures"]]
