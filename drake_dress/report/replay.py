@@ -76,7 +76,6 @@ class MeshcatReplay:
     def __init__(self, meshcat: Meshcat, log: RunLog) -> None:
         self._meshcat = meshcat
         self._log = log
-        self._forecast = log.forecast
         self.scene = DressingScene(meshcat, np.asfortranarray(log.faces.T), "dressing")
         self.sample = -1
         self._playing = False
@@ -148,8 +147,8 @@ class MeshcatReplay:
         self.scene.show_garment(log.garment_position(i))
         self.scene.show_grippers(np.stack([log.gripper_position[side][i] for side in SIDES]))
         self.scene.show_stage(log.stage[i])
-        if self._forecast is not None:
-            self.scene.show_forecast(self._forecast.joint_position[i], self._forecast.radius[i])
+        if log.forecast is not None:
+            self.scene.show_forecast(log.forecast.joint_position[i], log.forecast.radius[i])
         first, second, _ = log.capsules
         for k, (a, b) in enumerate(zip(first[i], second[i], strict=True)):
             axis = b - a

@@ -18,6 +18,7 @@ from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.linear import LinearMotion
 from drake_dress.models.human.learned.network import FUTURE, HISTORY, PERIOD
 from drake_dress.models.human.learned.predictor import Networks
+from drake_dress.models.human.prediction import ConstantVelocityPredictor, decayed
 
 # Displacements (2B,F+1,3,3), m, that a baseline predicts for the arms of a batch.
 Baseline = Callable[[Batch], FloatArray]
@@ -25,7 +26,8 @@ EVERY = 0.5  # s, between windows
 _TOGETHER, _SEED = 1200, 9
 _WINDOW = 5  # samples of a velocity
 _HORIZONS = {"1 s": 10, "2 s": 20}
-_DECAY, _FASTEST = 0.5, 1.0  # s, m/s, as the shipped constant_velocity
+# As the shipped constant_velocity, s and m/s.
+_DECAY, _FASTEST = ConstantVelocityPredictor.decay_time, ConstantVelocityPredictor.max_speed
 
 
 @dataclass(frozen=True)
@@ -225,10 +227,10 @@ def _velocity(batch: Batch, decay: float | None) -> FloatArray:
     first, second = np.triu_indices(_WINDOW, 1)
     apart = (PERIOD * (second - first))[None, :, None, None]
     velocity = np.median((joints[:, second] - joints[:, first]) / apart, axis=1)
-    ahead = PERIOD * np.arange(FUTURE + 1)
+    ahead = PERIOD * np.arange(FUTURE + 1, dtype=np.float64)
     if decay is not None:
         speed = np.linalg.norm(velocity, axis=2, keepdims=True)
         velocity = velocity * np.minimum(1.0, _FASTEST / np.maximum(speed, 1e-12))
-        ahead = -decay * np.expm1(-ahead / decay)
+        ahead = decayed(ahead, decay)
     result: FloatArray = ahead[None, :, None, None] * velocity[:, None]
     return result

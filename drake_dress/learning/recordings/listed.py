@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from drake_dress.errors import UserError
 from drake_dress.learning.recordings.reading import UPS, RecordingOptions, read_recording
@@ -13,6 +14,7 @@ from drake_dress.learning.timed_motion import TimedMotion
 
 # Smallest and largest rate, Hz, and unit, m, that are taken.
 RATES, UNITS = (1.0, 2000.0), (1e-6, 10.0)
+_LIMITS = {"rate": RATES, "unit": UNITS}
 FORM = "FILE[:KEY=VALUE,…]"
 _UNSAID = RecordingOptions()
 _EXPECTED = "expected up, rate or unit, such as walk.csv:up=y,rate=30"
@@ -44,26 +46,24 @@ def listed(text: str, common: RecordingOptions = _UNSAID) -> Listed:
     name, colon, settings = text.rpartition(":")
     if not colon or "=" not in settings or Path(text).exists():
         return Listed(Path(text), common)
-    how = common
+    said: dict[str, Any] = {}
     for setting in settings.split(","):
         key, _, value = setting.partition("=")
         if key == "up":
             if value not in UPS:
                 raise UserError(text, key, f"is {value!r}, expected one of {', '.join(UPS)}")
-            how = replace(how, up=value)
-        elif key == "rate":
-            how = replace(how, rate=_between(text, key, value, RATES))
-        elif key == "unit":
-            how = replace(how, unit=_between(text, key, value, UNITS))
+            said[key] = value
+        elif key in _LIMITS:
+            said[key] = _between(text, key, value, _LIMITS[key])
         else:
             raise UserError(text, key, f"is no setting of a recording, {_EXPECTED}")
-    return Listed(Path(name), how)
+    return Listed(Path(name), replace(common, **said))
 
 
 def read_all(
     files: Sequence[Listed], told: Callable[[str], None] = lambda _: None
 ) -> list[TimedMotion]:
-    """Returns the motions in files; no two files have the same name.
+    """Returns the motions in files; two have the same name only if a file is listed twice.
 
     Args:
         files: of people.
