@@ -33,6 +33,7 @@ from benchmarks.parser import (
     some_of,
 )
 from benchmarks.prediction.hidden import ELBOW, HAND, hidden_errors, mean_errors
+from benchmarks.prediction.likeness import likeness
 from benchmarks.prediction.persons import OWN_RIDGE, SHIPPED_RIDGE, across_persons, folds, gain
 from benchmarks.prediction.sleeves import told_by_sleeves, ways_to_see
 from benchmarks.prediction.streams import Told, delays_of
@@ -77,6 +78,7 @@ SECTIONS = (
     "sleeves",
     "hidden",
     "dressings",
+    "likeness",
     "recordings",
     "persons",
     "speed",
@@ -99,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.into is not None:
         around(options.into, _NAME)
-    needs = {"held_out", "intent", "sleeves", "hidden", "dressings", "persons"}
+    needs = {"held_out", "intent", "sleeves", "hidden", "dressings", "likeness", "persons"}
     only = options.only or [
         s
         for s in SECTIONS
@@ -267,6 +269,12 @@ class Study:
             f"(median {median:.2f} s)"
         )
         return [Table(text, self._header("person"), rows)], figures
+
+    def likeness(self) -> tuple[list[Table], list[Figure]]:
+        """What the networks see of whole dressings, beside held-out sequences."""
+        dressings = [file.data for file in read_dressings(self._options.data)]
+        table, figures = likeness(self._data(*_DRESSED), dressings, _NOISES[0])
+        return [table], figures
 
     def recordings(self) -> tuple[list[Table], list[Figure]]:
         """Recordings of people."""

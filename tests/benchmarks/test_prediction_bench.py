@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 
 from benchmarks.prediction.__main__ import main
 from benchmarks.prediction.hidden import HAND, hidden_errors
+from benchmarks.prediction.likeness import likeness
 from benchmarks.prediction.persons import folds
 from benchmarks.prediction.streams import Told, delays_of, switch_delays
 from drake_dress.errors import UserError
 from drake_dress.learning.evaluation.baselines import plain_baselines
 from drake_dress.learning.evaluation.stream import Compared, followed
 from drake_dress.learning.motion.commands import Wanted, write_motion_set
+from drake_dress.learning.motion.dataset import read_motion
 from drake_dress.learning.motion.making import Workplace
 from drake_dress.learning.timed_motion import TimedMotion
 from drake_dress.learning.training.commands import TrainOptions, train_command
@@ -178,3 +181,22 @@ def test_sums_are_those_of_the_comparisons(trained: tuple[Path, Path]) -> None:
     assert told.mean("constant velocity") < 1e-6
     assert np.isnan(told.area)
     assert not len(delays_of(compared))
+
+
+def test_sequences_are_like_themselves_and_faster_sleeves_are_told(
+    trained: tuple[Path, Path],
+) -> None:
+    data = read_motion(trained[0], ("passive", "active"), "training")
+    sleeve = data.sleeve.copy()
+    sleeve[..., :3] += 5.0 * (sleeve[..., :3] - sleeve[:, :1, :, :3])
+    shares = {}
+    for name, other in (
+        ("same", data),
+        ("fast", SimpleNamespace(**vars(data) | {"sleeve": sleeve})),
+    ):
+        _, figures = likeness(data, [other], 0.0)
+        shares[name] = {figure.name: float(figure.value) for figure in figures}
+    speed, place = "dressings outside, own armhole, speed", "dressings outside, upper arm"
+    assert max(shares["same"].values()) < 2.5
+    assert shares["fast"][speed] > 20.0
+    assert shares["fast"][place] == shares["same"][place]

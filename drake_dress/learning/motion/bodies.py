@@ -20,20 +20,24 @@ _SITTING = 0.35  # share of persons who sit
 # standard deviation, and the number of these at which it is cut off.
 _STATURE = 0.78, 1.18
 _MEASURE, _OUTLIERS = 0.07, 2.5
-# Comfortable poses, rad: abduction, extension, rotation, elbow; arms that hang, that are held back
-# or forward, or that lie in the lap.
-_LOW = np.array([-0.05, -0.7, -0.6, 0.0])
-_HIGH = np.array([0.7, 0.9, 0.6, 1.7])
+# Comfortable poses, rad: abduction, extension, rotation, elbow; arms that hang, that are held
+# forward, or that lie in the lap. A share of persons offer their arms to a coat behind them: nearly
+# straight, and held back.
+_LOW = np.array([-0.15, -0.7, -0.6, 0.0])
+_HIGH = np.array([0.5, 0.9, 0.6, 1.7])
+_OFFERING = 0.4
+_OFFERED_LOW = np.array([-0.15, 0.3, -0.6, 0.0])
+_OFFERED_HIGH = np.array([0.4, 1.2, 0.6, 0.8])
 _UNLIKE = 0.15  # standard deviation of differences between left and right, rad
 # Ranges of an adult's joints, rad, and the largest share of each that a stiffer person lacks.
-_LIMITS = np.array([[-0.6, -2.6, -1.4, 0.0], [2.6, 1.2, 1.4, 2.5]])
+_LIMITS = np.array([[-0.6, -2.6, -1.4, 0.0], [2.6, 1.4, 1.4, 2.5]])
 _STIFFER = 0.15
 _ELBOW = 3
 # Relative effort of moving each joint, and the standard deviation of its logarithm: a shoulder
 # carries the whole arm.
 _EFFORT, _EFFORT_SPREAD = np.array([1.0, 1.0, 0.6, 0.4]), 0.4
 # Size of a coat over that of the preset, and each measure's own largest variation.
-_COAT_SCALE, _COAT_MEASURE = (0.85, 1.15), 0.06
+_COAT_SCALE, _COAT_MEASURE = (0.85, 1.35), 0.06
 _SPACING = 0.06  # m, of the mesh on which a coat's reach is measured
 _ATTEMPTS = 20  # to draw measures that fit each other
 
@@ -71,7 +75,8 @@ def draw_person(rng: np.random.Generator) -> DrawnPerson:
     limits = np.stack([np.stack([low + 0.5 * lacking, high - 0.5 * lacking])] * 2)
     # all elbows can be straight
     limits[:, 0, _ELBOW] = 0.0
-    both = rng.uniform(_LOW, _HIGH)
+    offers = rng.random() < _OFFERING
+    both = rng.uniform(_OFFERED_LOW, _OFFERED_HIGH) if offers else rng.uniform(_LOW, _HIGH)
     comfort = np.clip(both + _UNLIKE * rng.normal(size=(2, 4)), limits[:, 0], limits[:, 1])
     effort = _EFFORT * np.exp(_EFFORT_SPREAD * rng.normal(size=4))
     return DrawnPerson(_draw_measures(rng), posture, comfort, limits, effort)

@@ -24,17 +24,18 @@ was recorded.
 ## How it was made
 
 Each sequence draws a person (body measures, standing or sitting, joint limits, comfortable pose;
-one in five has a tremor) and a coat (measures). It begins in a random phase of a dressing: no arm,
-one arm or both arms in their sleeves.
+one in five has a tremor, one in five does not sway, and two in five hold their arms back toward a
+coat behind them) and a coat (measures). It begins in a random phase of a dressing: no arm, one arm
+or both arms in their sleeves.
 
 - **passive**: the person never moves by will. Two grippers lead the sleeves by the local model of
-  the controller: over the hand, up the arm, aside, about, or nowhere. An arm follows its sleeve
-  with the least effort of its joints, after a lag. Some arms stay where they are led, others return
-  slowly or spring back.
+  the controller: over the hand, which cloth may hinder for a while, up the arm, aside, across to
+  the other hand, about, or nowhere. An arm follows its sleeve with the least effort of its joints,
+  after a lag. Some arms stay where they are led, others return slowly or spring back.
 - **active**: in addition, each hand now and then reaches, returns, fidgets, withdraws or waves, and
-  reaches into its sleeve when the armhole comes near. The body may lean along or turn. Strokes have
-  bell-shaped speed profiles, with hesitations and changes of mind. Between its movements an arm
-  follows its sleeve. A sleeve on an arm that moves by will goes along with it.
+  reaches into its sleeve when the armhole comes near, and goes on after it. The body may lean along
+  or turn. Strokes have bell-shaped speed profiles, with hesitations and changes of mind. Between
+  its movements an arm follows its sleeve. A sleeve on an arm that moves by will goes along with it.
 - **free**: no garment. The person reaches more often and faster, steps, bends, squats, turns or
   walks.
 """

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from drake_dress.learning.motion.bodies import draw_reach
-from drake_dress.learning.motion.garment import STEP, GarmentDraw, Sleeves, axes_of
+from drake_dress.learning.motion.garment import STEP, Sleeves, axes_of
+from drake_dress.learning.motion.garment_draw import GarmentDraw
 from drake_dress.learning.motion.movements import Armhole
 from drake_dress.learning.motion.moving_person import MovingPerson
 from drake_dress.learning.motion.sequence import COUNT, PERIOD, Sequence, is_moving
@@ -14,14 +15,14 @@ from drake_dress.learning.motion.will import Will
 from drake_dress.models.arrays import FloatArray
 
 _SUBSTEPS = round(STEP / PERIOD)
-# A person's first movement by will begins within this time, s.
-_FIRST = 4.0
+# Mean time between a person's movements by will, s: some hardly do more than help with the coat.
+_DWELLS = 4.0, 40.0
 # Share of active persons who reach for the armhole, and the distance at which they do, m.
-_HELPERS, _HELPS = 0.75, (0.15, 0.40)
+_HELPERS, _HELPS = 0.85, (0.15, 0.40)
 _TURNS = 0.04  # 1/s, how often the body turns
 _LEANS = 0.35  # share of movements that the torso goes along with
 _TOGETHER = 0.4  # share of movements that both arms make
-_TOUCH = 0.10  # distance at which an armhole that is not on the arm pushes the hand along, m
+_TOUCH = 0.06  # distance at which an armhole that is not on the arm pushes the hand along, m
 _LOOSER = 0.02  # largest clearance of an arm beyond that at which its sleeve leads it, m
 
 
@@ -37,6 +38,7 @@ class DressedScene:
         self._rng = rng
         of = GarmentDraw.drawn(rng, draw_reach(rng))
         self._mover = MovingPerson(rng, of.beside + rng.uniform(0.0, _LOOSER))
+        self._dwell = float(np.exp(rng.uniform(*np.log(_DWELLS))))
         self._wills = [self._drawn_will(i) for i in (0, 1)] if active else []
         self._axes = axes_of(self._mover.joints(0.0))
         self._before, self._way = self._axes, np.zeros((2, 3))
@@ -58,7 +60,8 @@ class DressedScene:
 
     def _drawn_will(self, i: int) -> Will:
         rng = self._rng
-        will = Will(self._mover.arms[i], self._mover.movements(i), float(rng.uniform(0.0, _FIRST)))
+        first = float(rng.uniform(0.0, self._dwell))
+        will = Will(self._mover.arms[i], self._mover.movements(i), first, dwell=self._dwell)
         if rng.random() < _HELPERS:
             will.helps_within = float(rng.uniform(*_HELPS))
         return will

@@ -23,7 +23,7 @@ from drake_dress.interrupt import Interrupt
 from drake_dress.learning.motion.dataset import DRESSING
 from drake_dress.learning.motion.making import COMMAND, Workplace
 from drake_dress.learning.motion.motion_file import MotionArrays, MotionFile, Origin
-from drake_dress.learning.motion.sequence import PERIOD
+from drake_dress.learning.motion.sequence import PERIOD, is_moving
 from drake_dress.learning.motion.sequence import Sequence as MotionSequence
 from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
@@ -221,6 +221,7 @@ def sequence_of(log: RunLog) -> MotionSequence:
         raise FailedError(f"{log.path}: {message}")
     sleeves, on = _sleeves(log)
     intent = np.zeros((len(log), 2), dtype=np.int64) if log.intent is None else log.intent
+    intent = np.where(is_moving(log.joint_position[:, [2, 5]]), intent, 0)
     return MotionSequence(log.joint_position, sleeves, intent, on)
 
 

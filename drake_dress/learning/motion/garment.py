@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drake_dress.learning.motion.garment_draw import GarmentDraw
 from drake_dress.learning.motion.goals import Goal, draw_goal, place_of, unit
 from drake_dress.learning.motion.sleeve_start import draw_start
 from drake_dress.models.arrays import BoolArray, FloatArray
@@ -27,7 +28,6 @@ from drake_dress.models.control.local_model import (
 )
 from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.dressing.coordinates import ArmAxis
-from drake_dress.models.garment.geodesics import Reach
 from drake_dress.models.human.tremor import Wanderings
 
 ArmAxes = tuple[ArmAxis, ArmAxis]
@@ -35,9 +35,6 @@ ArmAxes = tuple[ArmAxis, ArmAxis]
 
 STEP = 0.1  # s, between solves
 _HORIZON = 8  # steps
-# Ranges of what is drawn of a garment and its robot (`GarmentDraw`).
-_MAX_SPEED, _BESIDE = (0.03, 0.22), (0.01, 0.05)  # m/s (its logarithm is even), m
-_CARRIED, _SHARE, _RATE = (0.0, 0.7), (0.8, 1.0), (0.05, 0.35)  # 1, 1, 1/s
 _SLOWEST_ACROSS = 0.05  # m/s, least bound on the speed of a sleeve across its arm
 _OVER = 0.05  # m, distance of an armhole from the hand at which it is over it
 _FIRST_PROGRESS = 0.02  # s of a sleeve that has just come over its hand
@@ -47,39 +44,12 @@ _TAUT = 0.09  # m, largest distance of an armhole's centre from the axis of an a
 # coarse mesh stretches, and a gripper holds a patch.
 _HELD = 1.4
 _TURNS = 0.4  # s, time constant of a sleeve's direction
-_SWAYS = 0.2  # standard deviation of the sideways part of its unit direction
 # The direction of a sleeve off its arm: that of the forearm near the hand (within this distance,
-# m), toward the hand and a little up, and by this weight toward its gripper.
+# m), a little up, and by this weight toward its gripper.
 _ALIGNS, _LIFTED, _PULLED = 0.2, 0.1, 2.0
+# Share of the pull across of a sleeve that is on its arm.
+_ACROSS_ON = 0.3
 _UP = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True)
-class GarmentDraw:
-    """What is drawn of a garment and of the robot that moves it.
-
-    Attributes:
-        reach: of the coat.
-        max_speed: of the grippers, m/s.
-        beside: largest distance of a sleeve from its arm's axis before it moves it, m.
-        carried: share of an arm's motion along itself that a sleeve on it takes part in.
-        share: share of its gripper's motion that a sleeve takes.
-        rate: progress of a sleeve that is drawn up its arm, 1/s.
-    """
-
-    reach: Reach
-    max_speed: float
-    beside: float
-    carried: float
-    share: float
-    rate: float
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, reach: Reach) -> GarmentDraw:
-        """Returns drawn values for a coat."""
-        speed = float(np.exp(rng.uniform(*np.log(_MAX_SPEED))))
-        ranges = _BESIDE, _CARRIED, _SHARE, _RATE
-        return cls(reach, speed, *(float(rng.uniform(*each)) for each in ranges))
 
 
 @dataclass
@@ -89,10 +59,11 @@ class Sleeves:
     Attributes:
         of: drawn values.
         rng: draws.
-        center, direction, gripper: (2,3), m, unit vectors from cuff to armhole, m.
+        center, gripper: (2,3), m.
         on: (2,) whether each arm is in its sleeve.
         progress: (2,) s of each sleeve on its arm.
         sideways: sway of the components of both directions.
+        direction: (2,3) unit vectors from cuff to armhole.
         goals: what each sleeve is led to.
         coupled: whether the garment between the sleeves is taut.
     """
@@ -100,11 +71,11 @@ class Sleeves:
     of: GarmentDraw
     rng: np.random.Generator
     center: FloatArray
-    direction: FloatArray
     gripper: FloatArray
     on: BoolArray
     progress: FloatArray
     sideways: Wanderings
+    direction: FloatArray = field(init=False)
     goals: list[Goal | None] = field(default_factory=lambda: [None, None])
     coupled: bool = False
 
@@ -112,7 +83,9 @@ class Sleeves:
     def drawn(cls, rng: np.random.Generator, of: GarmentDraw, axes: ArmAxes) -> Sleeves:
         """Returns sleeves in a drawn phase of a dressing of arms with `axes`."""
         start = draw_start(rng, of.reach, axes)
-        return cls(of, rng, **vars(start), sideways=Wanderings(rng, 6))
+        sleeves = cls(of, rng, **vars(start), sideways=Wanderings(rng, 6))
+        sleeves.direction = sleeves._pulled(axes, 0.0)
+        return sleeves
 
     def advance(self, axes: ArmAxes, willed: BoolArray, time: float) -> FloatArray:
         """Moves the sleeves by one `STEP`; returns their motion (2,3), m.
@@ -129,7 +102,9 @@ class Sleeves:
         way: FloatArray = self.of.share * moved[:2]
         self.center = self.center + way
         self.gripper = self.gripper + moved[2:]
-        self._turn(axes, time)
+        share = 1.0 - np.exp(-STEP / _TURNS)
+        turned = (1.0 - share) * self.direction + share * self._pulled(axes, time)
+        self.direction = np.stack([unit(row) for row in turned])
         return way
 
     def meet(self, axes: ArmAxes, before: ArmAxes) -> None:
@@ -137,13 +112,19 @@ class Sleeves:
         for i, axis in enumerate(axes):
             if self.on[i]:
                 self._carry(i, axis, before[i])
-            elif float(np.linalg.norm(axis.G(0.0) - self.center[i])) < _OVER:
+            elif self._goes_over(axis.G(0.0), i):
                 self.on[i], self.progress[i], self.goals[i] = True, _FIRST_PROGRESS, None
         self._hold()
 
+    def _goes_over(self, hand: FloatArray, i: int) -> bool:
+        """Returns whether a sleeve comes to be on the arm whose hand is at `hand` (3,), m."""
+        if np.linalg.norm(hand - self.center[i]) >= _OVER:
+            return False
+        return bool(self.rng.random() < STEP / max(STEP, self.of.hinders))
+
     def _problem(self, axes: ArmAxes, willed: BoolArray, time: float) -> LocalProblem:
         """Returns the local problem whose solution is the sleeves' next motion."""
-        left, right = (self._goal(axes[i], i, bool(willed[i]), time) for i in (0, 1))
+        left, right = (self._goal(axes, i, bool(willed[i]), time) for i in (0, 1))
         nominal = Nominal(
             np.tile(self.center, (_HORIZON + 1, 1, 1)),
             np.tile(self.gripper, (_HORIZON + 1, 1, 1)),
@@ -160,11 +141,13 @@ class Sleeves:
         self.coupled = is_coupled(self.coupled, apart, self.of.reach, p)
         return local_problem(nominal, (left, right), self.coupled, self.of.reach, p)
 
-    def _goal(self, axis: ArmAxis, i: int, willed: bool, time: float) -> SleeveGoal:
+    def _goal(self, axes: ArmAxes, i: int, willed: bool, time: float) -> SleeveGoal:
         """Returns the goal of a sleeve at the times of the horizon; draws one if none holds."""
-        goal, on = self.goals[i], bool(self.on[i])
+        axis, goal, on = axes[i], self.goals[i], bool(self.on[i])
         if goal is None or time >= goal.until:
-            goal = self.goals[i] = draw_goal(self.rng, axis, self.center[i], on, time)
+            waits = None if self.on[1 - i] else axes[1 - i].G(0.0)
+            goal = draw_goal(self.rng, axis, self.center[i], on, time, waits)
+            self.goals[i] = goal
         after = STEP * np.arange(_HORIZON + 1, dtype=np.float64)
         bound, s = on and willed, float(self.progress[i])
         arm = axis.points(np.full(_HORIZON + 1, s))
@@ -186,20 +169,22 @@ class Sleeves:
         target: FloatArray = self.center[i] + share[:, None] * way
         return target
 
-    def _turn(self, axes: ArmAxes, time: float) -> None:
-        """Turns the sleeves' directions by one `STEP` to where arm, hand and gripper pull them."""
-        sway = _SWAYS * self.sideways.value(time).reshape(2, 3)
-        for i, axis in enumerate(axes):
+    def _pulled(self, axes: ArmAxes, time: float) -> FloatArray:
+        """Returns the directions (2,3) to which arm, hand, coat and gripper pull the sleeves."""
+        sway = self.of.sways * self.sideways.value(time).reshape(2, 3)
+        across = self.of.across * unit(self.center[1] - self.center[0])
+        pulled = np.empty((2, 3))
+        for i, (axis, other) in enumerate(zip(axes, (across, -across), strict=True)):
             pull = self.gripper[i] - self.center[i]
             if self.on[i]:
-                wanted = axis.D(float(self.progress[i])) + pull
+                wanted = axis.D(float(self.progress[i])) + _ACROSS_ON * other + pull
             else:
                 to_hand = axis.G(0.0) - self.center[i]
                 near = float(np.exp(-np.linalg.norm(to_hand) / _ALIGNS))
-                wanted = near * axis.D(0.0) + unit(to_hand + _LIFTED * _UP) + _PULLED * pull
-            share = 1.0 - np.exp(-STEP / _TURNS)
-            turned = (1.0 - share) * self.direction[i] + share * unit(wanted + sway[i])
-            self.direction[i] = unit(turned)
+                wanted = near * axis.D(0.0) + self.of.toward * unit(to_hand) + other
+                wanted = wanted + _LIFTED * _UP + _PULLED * pull
+            pulled[i] = unit(unit(wanted) + sway[i])
+        return pulled
 
     def _carry(self, i: int, axis: ArmAxis, old: ArmAxis) -> None:
         """Carries a sleeve along with its arm, which moved from `old` to `axis`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -30,7 +30,9 @@ _FIDGETS = 0.03  # standard deviation of a fidget, m
 _WITHDRAWS, _WITHDRAWS_UP, _HELD = (0.05, 0.25), 0.2, (0.5, 3.0)
 # Reach into a sleeve: distance that the hand aims beyond the armhole, standard deviation of its
 # aim, and the farthest way that a person tries, m.
-_BEYOND, _MISAIMED, _FARTHEST = (-0.05, 0.2), 0.03, 0.6
+_BEYOND, _MISAIMED, _FARTHEST = (-0.05, 0.1), 0.03, 0.6
+# Such a reach is corrected while its armhole moves, if that changes its end by more than this, m.
+_CORRECTED = 0.03
 # Targets lie in a shell about the shoulder, in shares of the arm's length.
 _NEAREST_TARGET, _FARTHEST_TARGET = 0.35, 0.98
 # Exponents of the beta distribution of a target pose within the joints' limits: rarely at a limit.
@@ -78,6 +80,11 @@ class Movement:
         if self.wave is not None:
             return self.wave.start < time < self.wave.end
         return any(stroke.is_seen(time) for stroke in self.strokes)
+
+    @property
+    def goal(self) -> FloatArray:
+        """Where its strokes end (3,), in the torso's frame, m."""
+        return self.base + sum((s.way for s in self.strokes), np.zeros(3))
 
     def position(self, time: float) -> FloatArray:
         """Returns the hand's place (3,) at `time`, s, in the torso's frame, m."""
@@ -139,6 +146,17 @@ class Movements:
             held = strokes[-1].end + self.rng.uniform(*_HELD)
             strokes.append(draw_stroke(self.rng, held, -way, slower))
         return Movement(hand, tuple(strokes))
+
+    def corrected(self, movement: Movement, time: float, armhole: Armhole) -> Movement:
+        """Returns a reach for an armhole with a further stroke to where that is now.
+
+        A reach that is near enough to it, or cannot get there, stays what it is.
+        """
+        way = self._into(armhole, movement.goal)
+        if way is None or np.linalg.norm(way) < _CORRECTED:
+            return movement
+        stroke = draw_stroke(self.rng, time, way, self.pace)
+        return replace(movement, strokes=(*movement.strokes, stroke))
 
     def _way(
         self, kind: MovementKind, hand: FloatArray, armhole: Armhole | None

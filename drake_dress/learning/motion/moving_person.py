@@ -7,7 +7,7 @@ import numpy as np
 from drake_dress.learning.motion.arms import Following, MovingArm
 from drake_dress.learning.motion.bodies import DrawnPerson, draw_person
 from drake_dress.learning.motion.movements import Movements
-from drake_dress.learning.motion.strokes import PACES
+from drake_dress.learning.motion.strokes import CALM, PACES
 from drake_dress.learning.motion.torso import Torso, draw_lean
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.human.body import shoulder_joint
@@ -16,7 +16,8 @@ from drake_dress.models.sides import SIDES
 
 _TREMBLES = 0.2  # share of persons with a tremor
 _TREMOR, _TREMOR_FREQUENCY = (0.001, 0.006), (4.0, 7.0)  # m, Hz
-# Shoulder joints move in the trunk: standard deviation, m, and largest share of the hand's motion.
+# Shoulder joints move in the trunk: standard deviation at a sway of size 1, m, and largest share of
+# the hand's motion.
 _GIRDLE, _GIRDLE_SHARE = 0.002, 0.08
 # Height of the pelvis below the shoulders, as a share of the trunk.
 _PELVIS = 0.85
@@ -48,7 +49,7 @@ class MovingPerson:
         self._girdle_share = _GIRDLE_SHARE * rng.random()
         self._shifted = (-1.0, np.zeros((2, 3)))
         self._tremor = self._drawn_tremor()
-        self._pace = float(np.exp(PACES * rng.normal()))
+        self._pace = float(np.exp(PACES * rng.normal() + CALM))
 
     def movements(self, i: int) -> Movements:
         """Returns what draws the movements of left (0) or right (1) arm."""
@@ -103,7 +104,8 @@ class MovingPerson:
         """Returns the joints (6,3), m, world, of both arms with `angles`."""
         rotation, origin = self.torso.pose(time)
         if self._shifted[0] != time:
-            self._shifted = (time, _GIRDLE * self._girdle.value(time).reshape(2, 3))
+            wander = _GIRDLE * self.torso.size * self._girdle.value(time)
+            self._shifted = (time, wander.reshape(2, 3))
         points = []
         for i, arm in enumerate(self.arms):
             own = arm.arm.points(angles[i])

@@ -13,12 +13,11 @@ from drake_dress.models.garment.geodesics import Reach
 
 # Phases of a dressing, which arms are in their sleeves, and their shares.
 _PHASES = np.array([[False, False], [True, False], [False, True], [True, True]])
-_SHARES = 0.2, 0.2, 0.2, 0.4
+_SHARES = 0.4, 0.2, 0.2, 0.2
 _PROGRESS = 0.05, 1.9  # s of a sleeve on its arm: past the hand, before the shoulder
-# A sleeve off its arm is at this distance from the hand, m, before it and lower, in a direction
-# with this standard deviation of each component.
-_AWAY, _SPREAD, _LOWER = (0.08, 0.45), 0.7, 0.3
-_TURNED = 0.2  # standard deviation of the components of its own direction toward the hand
+# A sleeve off its arm is at this distance from the hand, m, before it and higher, since the coat is
+# held at its shoulders, in a direction with this standard deviation of each component.
+_AWAY, _SPREAD, _HIGHER = (0.08, 0.55), 0.9, 0.5
 _STRETCH = 0.95  # share of the coat's reach that sleeves, and grippers, are apart at most
 # Grippers are at this share of their reach from their armholes, above, in a direction with this
 # standard deviation of each component.
@@ -31,13 +30,12 @@ class SleeveStart:
     """State of both sleeves and grippers at the start.
 
     Attributes:
-        center, direction, gripper: (2,3), m, unit vectors from cuff to armhole, m.
+        center, gripper: (2,3), m.
         on: (2,) whether each arm is in its sleeve.
         progress: (2,) s of each sleeve on its arm; 0 off it.
     """
 
     center: FloatArray
-    direction: FloatArray
     gripper: FloatArray
     on: BoolArray
     progress: FloatArray
@@ -55,21 +53,19 @@ def draw_start(
     """
     on = _PHASES[rng.choice(len(_PHASES), p=_SHARES)].copy()
     progress = np.where(on, rng.uniform(*_PROGRESS, 2), 0.0)
-    center, direction = np.zeros((2, 3)), np.zeros((2, 3))
+    center = np.zeros((2, 3))
     for i, axis in enumerate(axes):
         if on[i]:
-            center[i], direction[i] = axis.G(progress[i]), axis.D(progress[i])
+            center[i] = axis.G(progress[i])
             continue
-        hand = axis.G(0.0)
-        away = unit(-axis.D(0.0) + _SPREAD * rng.normal(size=3) - _LOWER * _UP)
-        center[i] = hand + rng.uniform(*_AWAY) * away
-        direction[i] = unit(hand - center[i] + _TURNED * rng.normal(size=3))
+        away = unit(-axis.D(0.0) + _SPREAD * rng.normal(size=3) + _HIGHER * _UP)
+        center[i] = axis.G(0.0) + rng.uniform(*_AWAY) * away
     _bring_within_reach(center, on, reach.between_sleeves)
     near = np.array(reach.to_near_gripper)[:, None]
     above = np.stack([unit(_UP + _HELD_SPREAD * rng.normal(size=3)) for _ in (0, 1)])
     gripper = center + _HELD * near * above
     _bring_within_reach(gripper, np.zeros(2, dtype=bool), reach.between_grippers)
-    return SleeveStart(center, direction, gripper, on, progress)
+    return SleeveStart(center, gripper, on, progress)
 
 
 def _bring_within_reach(places: FloatArray, bound: BoolArray, reach: float) -> None:

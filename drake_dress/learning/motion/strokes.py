@@ -25,8 +25,9 @@ _BOW = 0.06
 _TYPICAL_TIME, _TYPICAL_LENGTH, _GROWTH, _SPREAD = 1.4, 0.3, 0.4, 0.12
 _FASTEST = 0.9  # m/s, largest mean speed
 _SHORTEST, _LONGEST = 0.35, 4.0  # s, duration of a stroke
-# Persons differ more from each other: standard deviation of the logarithm of their pace.
-PACES = 0.3
+# Persons differ more from each other: standard deviation and mean of the logarithm of their pace.
+# Who is dressed moves calmly.
+PACES, CALM = 0.4, 0.25
 # Share of its way before which a stroke has hardly begun, and that is left where it has nearly
 # ended.
 _UNSEEN = 0.02

@@ -14,14 +14,16 @@ from drake_dress.models.rotation import rotation_about
 # Standard deviations of quiet stance: of its sway, m, and of yaw, roll and pitch, rad.
 _SWAY = np.array([0.004, 0.003, 0.0005])
 _TILT = np.array([0.006, 0.004, 0.006])
-# The sway of a person has a log-normal size: mean and standard deviation of its logarithm.
+# The sway of a person has a log-normal size: mean and standard deviation of its logarithm. This
+# share does not sway: a back leans on a chair, or is a dummy's.
 _SIZE, _SIZE_SPREAD = -0.3, 0.6
+_STILL = 0.2
 _ROOM = 1.0  # m, half the width of the square on which persons stand
 # Turn of the whole body: angle, rad; median over turns of the mean rate, rad/s, and the standard
 # deviation of its logarithm; duration, s; standard deviation of the small step with it, m.
 _TURN = 0.1, 1.2
-_TURN_RATE, _TURN_RATE_SPREAD = 0.35, 0.4
-_TURN_TIME, _TURN_STEP = (0.6, 4.0), 0.06
+_TURN_RATE, _TURN_RATE_SPREAD = 0.25, 0.7
+_TURN_TIME, _TURN_STEP = (0.6, 6.0), 0.06
 # Lean with a hand: it is at most this share of the hand's way (small shares are more frequent: the
 # drawn share is raised to this power).
 _LEAN_SHARE, _LEAN_POWER = 0.6, 1.5
@@ -57,9 +59,10 @@ class Torso:
     @classmethod
     def drawn(cls, rng: np.random.Generator, pelvis: float) -> Torso:
         """Returns a torso at a drawn place, with a drawn heading and sway."""
+        sways = rng.random() >= _STILL
         return cls(
             pelvis,
-            float(np.exp(_SIZE_SPREAD * rng.normal() + _SIZE)),
+            float(np.exp(_SIZE_SPREAD * rng.normal() + _SIZE)) if sways else 0.0,
             rng.uniform(-_ROOM, _ROOM, 2),
             float(rng.uniform(-np.pi, np.pi)),
             Wanderings(rng, 6),

@@ -11,7 +11,9 @@ from drake_dress.learning.motion.movements import SHARES, Armhole, MovementKind,
 
 _DWELL = 5.0  # s, mean time between two movements
 # Reach for an armhole: time of reaction to its coming near, and least time until the next, s.
-_REACTION, _AGAIN = (0.15, 0.45), 3.0
+_REACTION, _AGAIN = (0.15, 0.45), (0.5, 4.0)
+# Time between corrections of such a reach, and after which it is given up, s.
+_CORRECTS, _GIVES_UP = (0.3, 0.8), 5.0
 
 
 @dataclass
@@ -25,6 +27,8 @@ class Will:
         helps_within: distance of the armhole from the hand at which the person reaches for it, m.
         sleeve_at: time at which the next reach for the armhole begins, s.
         not_before: earliest time of the next reach for the armhole, s.
+        dwell: mean time between two movements, s.
+        corrects: times of the next and of the last correction of a reach for the armhole, s.
     """
 
     arm: MovingArm
@@ -33,20 +37,23 @@ class Will:
     helps_within: float = 0.0
     sleeve_at: float = np.inf
     not_before: float = 0.0
+    dwell: float = _DWELL
+    corrects: tuple[float, float] = (0.0, 0.0)
 
     def due(self, time: float, armhole: Armhole | None) -> MovementKind | None:
-        """Returns the kind of movement that begins now; None if none does.
+        """Returns the kind of movement that begins now, None if none does; corrects a reach.
 
         Args:
             time: s.
             armhole: of the arm's sleeve; None while the arm is in it, or without a garment.
         """
-        if self.arm.is_willed(time):
-            return None
         rng = self.movements.rng
+        if self.arm.is_willed(time):
+            self._correct(time, armhole, rng)
+            return None
         self._see(time, armhole, rng)
         if time >= self.sleeve_at:
-            self.sleeve_at, self.not_before = np.inf, time + _AGAIN
+            self.sleeve_at, self.not_before = np.inf, time + rng.uniform(*_AGAIN)
             return "sleeve"
         if time < self.next_at:
             return None
@@ -59,7 +66,7 @@ class Will:
         kind: MovementKind,
         armhole: Armhole | None,
         slower: float = 1.0,
-        rest: float = _DWELL,
+        rest: float | None = None,
     ) -> bool:
         """Begins a movement; returns whether there is one of this kind.
 
@@ -68,14 +75,23 @@ class Will:
             kind: of the movement.
             armhole: as in `due`.
             slower: factor on its duration.
-            rest: mean time until the next movement, s.
+            rest: mean time until the next movement, s; `dwell` if None.
         """
         movement = self.movements.draw(kind, time, self.arm.hand, armhole, slower)
         if movement is None:
             return False
         self.arm.movement = movement
-        self.next_at = movement.end + self.movements.rng.exponential(rest)
+        self.corrects = (time + _CORRECTS[1], time + _GIVES_UP) if kind == "sleeve" else (0.0, 0.0)
+        self.next_at = movement.end + self.movements.rng.exponential(rest or self.dwell)
         return True
+
+    def _correct(self, time: float, armhole: Armhole | None, rng: np.random.Generator) -> None:
+        """Leads a reach on to where its armhole has moved."""
+        when, last = self.corrects
+        if armhole is None or self.arm.movement is None or not when <= time < last:
+            return
+        self.arm.movement = self.movements.corrected(self.arm.movement, time, armhole)
+        self.corrects = time + rng.uniform(*_CORRECTS), last
 
     def _see(self, time: float, armhole: Armhole | None, rng: np.random.Generator) -> None:
         """Decides on a reach for the armhole if that has come near."""

@@ -49,6 +49,8 @@ class Augmentation:
     Attributes:
         noise: standard deviation of the drawn standard deviation of a joint's noise, m.
         sleeve_noise: noise of sleeves over that of joints.
+        sleeve_off, sleeve_turned: standard deviations of each coordinate of a lasting error of
+            sleeves, m, and of their unit direction.
         noiseless: share without noise.
         paced, pace: share played at another pace, and the logarithms of slowest and fastest.
         turned: standard deviation of the heading's error, rad.
@@ -61,6 +63,8 @@ class Augmentation:
 
     noise: float = 0.004
     sleeve_noise: float = 1.5
+    sleeve_off: float = 0.01
+    sleeve_turned: float = 0.25
     noiseless: float = 0.2
     paced: float = 0.4
     pace: tuple[float, float] = (-0.4, 0.8)
@@ -69,7 +73,7 @@ class Augmentation:
     lost: float = 0.015
     one_armed: float = 0.05
     late: float = 0.12
-    bare: float = 0.15
+    bare: float = 0.35
 
 
 @dataclass(frozen=True)
@@ -209,6 +213,12 @@ class WindowSource:
             more = how.sleeve_noise
         joints += size * rng.normal(size=joints.shape)
         sleeves[..., :3] += more * size * rng.normal(size=sleeves[..., :3].shape)
+        if how is not None:
+            # what a tracker takes to be the armhole is a little beside it, and looks elsewhere
+            lasting = rng.normal(size=(len(sleeves), 1, 2, 6))
+            sleeves[..., :3] += how.sleeve_off * lasting[..., :3]
+            turned = sleeves[..., 3:] + how.sleeve_turned * lasting[..., 3:]
+            sleeves[..., 3:] = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
     def _hide(self, joints: FloatArray, visible: BoolArray) -> FloatArray:
         """Hides joints (NaN) and sleeves of some windows; returns joints before, (B,6,3), m.

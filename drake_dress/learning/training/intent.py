@@ -13,7 +13,7 @@ import torch
 from drake_dress.learning.motion.windows import Augmentation, Batch, Sequences, WindowSource
 from drake_dress.learning.training.loop import Report, Schedule, train
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.human.learned.intent import intent_logit, intent_weights
+from drake_dress.models.human.learned.intent import balanced_logit, intent_logit, intent_weights
 from drake_dress.models.human.learned.network import HISTORY
 
 SCHEDULE = Schedule(steps=10000, rate=2e-3, every=500, patience=10)
@@ -99,8 +99,7 @@ def windows_of(data: Sequences, seed: int, with_sleeves: bool = True) -> list[Ba
 def logits(weights: Mapping[str, np.ndarray], batch: Batch, steps: int) -> FloatArray:
     """Returns the logits (2B,) of a batch of which the last `steps` are in the history."""
     hidden = hidden_before(np.full(len(batch.intent), steps))
-    result: FloatArray = intent_logit(weights, batch.arms.tokens, hidden)
-    return result
+    return balanced_logit(weights, batch.arms.tokens, hidden)
 
 
 def hidden_before(known: np.ndarray) -> np.ndarray:

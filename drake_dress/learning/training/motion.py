@@ -27,7 +27,7 @@ from drake_dress.learning.training.loop import Batches, Loss, Report, Schedule, 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.learned import diffusion, network
 from drake_dress.models.human.learned.familiarity import familiar_weights
-from drake_dress.models.human.learned.intent import intent_logit
+from drake_dress.models.human.learned.intent import balanced_logit
 from drake_dress.models.human.learned.layers import logistic
 from drake_dress.models.human.learned.linear import LinearFit, LinearMotion
 from drake_dress.models.human.learned.network import COVERED, FUTURE, HISTORY
@@ -323,7 +323,7 @@ def validation_windows(data: Sequences, with_sleeves: bool = True) -> list[Batch
 def intents(weights: Mapping[str, np.ndarray], batch: Batch) -> np.ndarray:
     """Returns the probabilities (2B,) that the arms of a batch move by will."""
     hidden = np.zeros(batch.arms.tokens.shape[:2], dtype=np.float32)
-    found: np.ndarray = logistic(intent_logit(weights, batch.arms.tokens, hidden))
+    found: np.ndarray = logistic(balanced_logit(weights, batch.arms.tokens, hidden))
     return found
 
 

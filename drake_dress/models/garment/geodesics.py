@@ -49,10 +49,12 @@ def reach(mesh: GarmentMesh) -> Reach:
         np.asarray(mesh.rest_position, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32)
     )
 
-    far = _distances(exact, armhole[0], armhole[1])
-    gripped = [_distances(exact, loop, np.concatenate(grasp)) for loop in armhole]
-    split = len(grasp[0])
-    parts = [(d[:, :split], d[:, split:]) for d in gripped]
+    # one way from a node serves all its targets
+    ends = np.cumsum([len(grasp[0]), len(grasp[1])])
+    from_left = _distances(exact, armhole[0], np.concatenate([*grasp, armhole[1]]))
+    from_right = _distances(exact, armhole[1], np.concatenate(grasp))
+    far = from_left[:, ends[1] :]
+    parts = [(d[:, : ends[0]], d[:, ends[0] : ends[1]]) for d in (from_left, from_right)]
     to = [[mean_distance(parts[i][k], weights[i], held[k]) for k in (0, 1)] for i in (0, 1)]
     held_apart = mean_distance(_distances(exact, *grasp), *held)
     return Reach(

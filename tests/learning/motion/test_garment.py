@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drake_dress.learning.motion.garment import STEP, ArmAxes, GarmentDraw, Sleeves, axes_of
+from drake_dress.learning.motion.garment import STEP, ArmAxes, Sleeves, axes_of
+from drake_dress.learning.motion.garment_draw import GarmentDraw
 from drake_dress.learning.motion.goals import Goal
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.geodesics import Reach
@@ -26,10 +27,16 @@ def axes(angles: FloatArray = HOME) -> ArmAxes:
     return axes_of(joints(angles))
 
 
-def sleeves(seed: int, on: tuple[bool, bool] | None = None) -> Sleeves:
+def sleeves(
+    seed: int,
+    on: tuple[bool, bool] | None = None,
+    across: float = 1.0,
+    sways: float = 0.2,
+    hinders: float = STEP,
+) -> Sleeves:
     """Returns sleeves in a phase in which these arms are in their sleeves."""
     for attempt in range(seed, seed + 1000, 50):
-        of = GarmentDraw(REACH, 0.15, 0.03, 0.5, 0.9, 0.2)
+        of = GarmentDraw(REACH, 0.15, 0.03, 0.5, 0.9, 0.2, across, 0.5, sways, hinders)
         drawn = Sleeves.drawn(np.random.default_rng(attempt), of, axes())
         if on is None or tuple(drawn.on) == on:
             return drawn
@@ -54,7 +61,7 @@ def test_distances_stay_within_the_garments_reach_or_come_back_to_it(seed: int) 
         # the bounds of the solver hold up to 0.2 %
         assert (beyond(moving) <= np.maximum(1.0, before) + 2e-3).all()
     # grippers that began too far apart have come back
-    assert (beyond(moving) <= np.maximum(1.0, beyond(sleeves(seed)) - 0.1)).all()
+    assert (beyond(moving) <= np.maximum(1.0, beyond(sleeves(seed)) - 0.1) + 2e-3).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -96,6 +103,8 @@ def test_a_sleeve_is_drawn_up_an_arm() -> None:
 
 def test_an_arm_carries_its_sleeve() -> None:
     moving = sleeves(0, (True, True))
+    moving.progress[:] = 0.3
+    moving.center = np.stack([axis.G(0.3) for axis in axes()])
     after = axes(HOME + [0.6, -0.4, 0.0, 0.5])
     moving.meet(after, axes())
     for i in (0, 1):
@@ -134,7 +143,33 @@ def test_grippers_follow_a_sleeve_that_an_arm_carries_away() -> None:
     assert (off <= 1.4 * 0.12 + 1e-12).all()
 
 
-def test_drawn_garments_differ_within_their_ranges() -> None:
-    drawn = [GarmentDraw.drawn(np.random.default_rng(s), REACH) for s in range(30)]
-    assert len({g.max_speed for g in drawn}) == 30
-    assert all(0.03 <= g.max_speed <= 0.22 and 0.8 <= g.share <= 1.0 for g in drawn)
+def test_sleeves_off_their_arms_set_off_sideways_from_the_coat() -> None:
+    moving = sleeves(0, (False, False), across=1e3, sways=0.0)
+    for k in range(30):
+        moving.advance(axes(), NOBODY, k * STEP)
+    gap = moving.center[1] - moving.center[0]
+    across = gap / np.linalg.norm(gap)
+    # the armhole is the sleeve's inner end; directions follow with a lag
+    assert moving.direction[0] @ across > 0.98
+    assert moving.direction[1] @ across < -0.98
+
+
+def test_a_sleeve_on_its_arm_mostly_points_along_it() -> None:
+    moving = sleeves(0, (True, True), sways=0.0)
+    for i, axis in enumerate(axes()):
+        assert moving.direction[i] @ axis.D(float(moving.progress[i])) > 0.7
+
+
+def test_cloth_hinders_a_hand_for_a_while() -> None:
+    waited = []
+    for seed in range(40):
+        moving = sleeves(seed, (False, False), hinders=1.0)
+        moving.center[0] = joints()[2]
+        for k in range(200):
+            moving.meet(axes(), axes())
+            if moving.on[0]:
+                waited.append(STEP * k)
+                break
+    # exponential with mean 1 s: the mean of 40 is in this range but once in 10,000
+    assert len(waited) == 40
+    assert 0.45 < np.mean(waited) < 1.6

@@ -69,7 +69,7 @@ def test_turns_and_leans_stay_within_what_people_do() -> None:
     for _ in range(200):
         turn = draw_turn(rng, 0.0)
         assert 0.1 <= abs(turn.way[3]) <= 1.2
-        assert 0.6 <= turn.duration <= 4.0
+        assert 0.6 <= turn.duration <= 6.0
         lean = draw_lean(rng, 0.0, 1.0, rng.normal(size=3))
         assert (np.abs(lean.way[:3]) <= [0.35, 0.25, 0.04]).all()
         assert -0.14 < lean.way[5] <= 0.45

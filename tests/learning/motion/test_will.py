@@ -47,7 +47,8 @@ def test_a_hand_reaches_for_an_armhole_after_a_time_of_reaction_and_not_again_at
     assert all(helper.due(t, far) is None for t in np.arange(0.0, 2.0, STEP))
     due = [t for t in np.arange(2.0, 7.0, STEP) if helper.due(t, near(helper)) == "sleeve"]
     assert 2.15 <= due[0] <= 2.46 + STEP
-    assert due[1] >= due[0] + 3.0
+    assert due[1] >= due[0] + 0.5
+    assert len(due) <= 8
 
 
 def test_a_hand_in_its_sleeve_does_not_reach_for_it() -> None:
@@ -70,3 +71,34 @@ def test_movements_occur_in_their_shares() -> None:
         # four standard deviations: wrong once in 16,000 seeds
         spread = 4.0 * np.sqrt(1000 * share * (1.0 - share))
         assert abs(kinds.count(kind) - 1000 * share) < spread
+
+
+def test_a_reach_follows_its_armhole_and_is_given_up_after_a_time() -> None:
+    helper = will()
+    above = Armhole(helper.arm.hand + [0.0, 0.0, 0.15], np.array([0.0, 0.0, 1.0]))
+    assert helper.begin(0.0, "sleeve", above)
+    first = helper.arm.movement
+    assert first is not None
+    last = 0.0
+    for t in np.arange(0.0, 12.0, STEP):
+        moved = Armhole(above.center + [0.0, 0.02 * t, 0.0], above.into)
+        before = helper.arm.movement
+        helper.due(t, moved)
+        if helper.arm.movement is not before:
+            last = t
+            # a further stroke does not move the hand at once
+            assert before is not None
+            assert helper.arm.movement is not None
+            np.testing.assert_allclose(helper.arm.movement.position(t), before.position(t))
+    assert helper.arm.movement is not None
+    assert helper.arm.movement.goal[1] > first.goal[1] + 0.02
+    assert 1.0 < last < 5.0
+
+
+def test_a_reach_for_a_place_is_not_corrected() -> None:
+    mover = will()
+    assert mover.begin(0.0, "reach", None)
+    movement = mover.arm.movement
+    for t in np.arange(0.0, 3.0, STEP):
+        mover.due(t, near(mover))
+    assert mover.arm.movement is movement

@@ -17,7 +17,21 @@ from tests.learning.made import Data, carried, made
 from tests.models.human.learned.drawn import lengths
 
 STRIDE = round(PERIOD / SAMPLED)
-NOTHING = Augmentation(0.0, 0.0, 0.0, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING = Augmentation(
+    noise=0.0,
+    sleeve_noise=0.0,
+    sleeve_off=0.0,
+    sleeve_turned=0.0,
+    noiseless=0.0,
+    paced=0.0,
+    pace=(0.0, 0.0),
+    turned=0.0,
+    hidden=0.0,
+    lost=0.0,
+    one_armed=0.0,
+    late=0.0,
+    bare=0.0,
+)
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -254,3 +268,18 @@ def test_made_sequences_give_finite_windows_of_the_kinds_that_networks_take() ->
     for part in (batch.arms.tokens, batch.displacement, batch.arms.joints):
         assert np.isfinite(part).all()
     assert set(np.unique(batch.intent)) <= {0, 1}
+
+
+def test_sleeves_have_a_lasting_error() -> None:
+    data = carried(0)
+    how = replace(NOTHING, sleeve_off=0.02, sleeve_turned=0.3)
+    at = np.zeros(300, dtype=int), np.full(300, 60.0)
+    plain, off = (WindowSource(data, 0, h).at(*at).arms.tokens for h in (NOTHING, how))
+    place, direction = slice(37, 40), slice(40, 43)
+    # scaled by 3 per metre; the same over the whole window
+    error = (off - plain)[:, :, place] / 3.0
+    np.testing.assert_allclose(error, np.broadcast_to(error[:, :1], error.shape), atol=1e-5)
+    assert 0.018 < error[:, 0].std() < 0.022
+    np.testing.assert_allclose(np.linalg.norm(off[:, :, direction], axis=2), 1.0, atol=1e-5)
+    cosine = (off[:, -1, direction] * plain[:, -1, direction]).sum(axis=1)
+    assert 0.88 < cosine.mean() < 0.97

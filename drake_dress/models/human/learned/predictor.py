@@ -22,7 +22,7 @@ from drake_dress.models.human.learned.experts import ExpertMemory, ExpertSetting
 from drake_dress.models.human.learned.familiarity import distance
 from drake_dress.models.human.learned.filling import filled
 from drake_dress.models.human.learned.forecast import Forecast, PersonHistory
-from drake_dress.models.human.learned.intent import intent_logit
+from drake_dress.models.human.learned.intent import balanced_logit
 from drake_dress.models.human.learned.kinematics import Lengths, person_like
 from drake_dress.models.human.learned.layers import logistic
 from drake_dress.models.human.learned.linear import LinearMotion
@@ -110,7 +110,7 @@ class LearnedPredictor:
         arms = arm_tokens(_windows(joints, seen, history.sleeves[None]))
         hidden = np.tile(~np.any(np.isfinite(history.joints), axis=(1, 2)), (2, 1))
         intent = logistic(
-            intent_logit(self.networks.intent, arms.tokens, hidden.astype(np.float32))
+            balanced_logit(self.networks.intent, arms.tokens, hidden.astype(np.float32))
         )
         linear = self.networks.linear.displacement(arms.joints[:, :, :3])
         is_new = np.count_nonzero(seen[0].any(axis=1)) < network.FEWEST

@@ -7,9 +7,13 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drake_dress.models.human.learned.intent import intent_logit, intent_weights
+from drake_dress.models.human.learned.intent import (
+    balanced_logit,
+    intent_logit,
+    intent_weights,
+)
 from drake_dress.models.human.learned.network import HISTORY
-from drake_dress.models.human.learned.tokens import TOKEN_SIZE
+from drake_dress.models.human.learned.tokens import SLEEVE_COLUMNS, TOKEN_SIZE
 
 WEIGHTS = intent_weights(np.random.default_rng(0))
 seeds = st.integers(0, 2**32 - 1)
@@ -66,3 +70,18 @@ def test_each_arm_is_on_its_own(seed: int) -> None:
     tokens, hidden = drawn(seed)
     alone = [intent_logit(WEIGHTS, tokens[k : k + 1], hidden[k : k + 1])[0] for k in range(3)]
     np.testing.assert_allclose(intent_logit(WEIGHTS, tokens, hidden), alone, rtol=1e-4, atol=1e-5)
+
+
+@given(seeds)
+@settings(max_examples=15)
+def test_the_arms_own_motion_has_half_of_the_say(seed: int) -> None:
+    tokens, hidden = drawn(seed)
+    bare = tokens.copy()
+    bare[:, :, SLEEVE_COLUMNS] = 0.0
+    own, whole = (intent_logit(WEIGHTS, each, hidden) for each in (bare, tokens))
+    kept = tokens.copy()
+    found = balanced_logit(WEIGHTS, tokens, hidden)
+    np.testing.assert_allclose(found, 0.5 * (own + whole), rtol=1e-4, atol=1e-5)
+    np.testing.assert_array_equal(tokens, kept)
+    # without sleeves there is one answer
+    np.testing.assert_allclose(balanced_logit(WEIGHTS, bare, hidden), own, rtol=1e-4, atol=1e-5)
