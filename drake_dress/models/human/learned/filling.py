@@ -42,7 +42,11 @@ def _without_gaps(joints: FloatArray, seen: BoolArray, first: FloatArray | None)
     before = _first_poses(joints, seen, first)
     result = np.empty_like(joints)
     for t in range(joints.shape[1]):
-        before = result[:, t] = filled_pose(joints[:, t], seen[:, t], before)
+        now = joints[:, t].copy()
+        gaps = ~seen[:, t].all(axis=1)
+        if gaps.any():
+            now[gaps] = filled_pose(now[gaps], seen[gaps, t], before[gaps])
+        before = result[:, t] = now
     return result
 
 
