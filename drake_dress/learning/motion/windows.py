@@ -7,6 +7,7 @@ sleeves missing, or only since a moment ago.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -55,7 +56,8 @@ class Augmentation:
         paced, pace: share played at another pace, and the logarithms of slowest and fastest.
         turned: standard deviation of the heading's error, rad.
         hidden: share in which joints of one arm are hidden from some moment on.
-        lost: standard deviation of a coordinate of a joint that is hidden all along, m.
+        lost: largest standard deviation of a coordinate of a joint that is hidden all along, m;
+            smaller ones are more frequent. Limbs keep their lengths.
         one_armed: share in which an arm is never seen.
         late: share in which neither joints nor sleeves were seen before some moment.
         bare: share without sleeves.
@@ -70,7 +72,7 @@ class Augmentation:
     pace: tuple[float, float] = (-0.4, 0.8)
     turned: float = 0.2
     hidden: float = 0.25
-    lost: float = 0.015
+    lost: float = 0.12
     one_armed: float = 0.05
     late: float = 0.12
     bare: float = 0.35
@@ -233,14 +235,33 @@ class WindowSource:
         since = np.minimum(rng.integers(1, HISTORY + 6, size=count), HISTORY)
         first = np.full((count, 6, 3), np.nan)
         for b in np.flatnonzero(rng.random(count) < how.hidden):
+            hidden = [arm[b] + k for k in which[kind[b]]]
             if since[b] == HISTORY:
-                which_joints = [arm[b] + k for k in which[kind[b]]]
-                off = how.lost * rng.normal(size=(len(which_joints), 3))
-                first[b, which_joints] = joints[b, 0, which_joints] + off
-            joints[b, HISTORY - since[b] :, [arm[b] + k for k in which[kind[b]]]] = np.nan
+                first[b, hidden] = _misplaced(joints[b, 0], hidden, how.lost, rng)
+            joints[b, HISTORY - since[b] :, hidden] = np.nan
         for b in np.flatnonzero(rng.random(count) < how.one_armed):
             joints[b, :, 3 - arm[b] : 6 - arm[b]] = np.nan
         begin = rng.integers(1, HISTORY - FEWEST + 1, size=count)
         for b in np.flatnonzero(rng.random(count) < how.late):
             joints[b, : begin[b]], visible[b, : begin[b]] = np.nan, False
         return first
+
+
+def _misplaced(
+    pose: FloatArray, hidden: Sequence[int], most: float, rng: np.random.Generator
+) -> FloatArray:
+    """Returns where `hidden` joints of a pose (6,3) are believed to be, m; limbs keep lengths.
+
+    Args:
+        pose: true joints, m.
+        hidden: rows of joints of one arm, from the shoulder on.
+        most: largest standard deviation of a coordinate, m.
+        rng: draws.
+    """
+    believed, size = pose.copy(), most * rng.random() ** 2
+    for row in hidden:
+        limb = pose[row] - pose[row - 1]
+        off = believed[row] + size * rng.normal(size=3) - believed[row - 1]
+        length = np.linalg.norm(limb) / max(float(np.linalg.norm(off)), 1e-9)
+        believed[row] = believed[row - 1] + length * off
+    return believed[list(hidden)]
