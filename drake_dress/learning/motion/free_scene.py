@@ -47,7 +47,7 @@ class FreeScene:
         self._gait = Gait.drawn(rng) if rng.random() < _WALKERS else None
         self._place, self._heading = np.zeros(2), self._mover.torso.yaw
         self._wills = [
-            Will(arm, self._mover.movements(i), float(rng.exponential(_REST)))
+            Will(arm, self._mover.movements(i), float(rng.exponential(_REST)), dwell=_REST)
             for i, arm in enumerate(self._mover.arms)
         ]
 
@@ -96,11 +96,11 @@ class FreeScene:
         self._decide_on_body(time)
         for i, will in enumerate(self._wills):
             kind = will.due(time, None)
-            if kind is None or not will.begin(time, kind, None, slower=_FASTER, rest=_REST):
+            if kind is None or not will.begin(time, kind, None, slower=_FASTER):
                 continue
             other = self._wills[1 - i]
             if self._rng.random() < _TOGETHER and not other.arm.is_willed(time):
-                other.begin(time, kind, None, slower=_FASTER, rest=_REST)
+                other.begin(time, kind, None, slower=_FASTER)
             self._mover.lean_with(will.arm, time, _LEANS)
 
     def _decide_on_body(self, time: float) -> None:

@@ -66,7 +66,6 @@ class Will:
         kind: MovementKind,
         armhole: Armhole | None,
         slower: float = 1.0,
-        rest: float | None = None,
     ) -> bool:
         """Begins a movement; returns whether there is one of this kind.
 
@@ -75,14 +74,13 @@ class Will:
             kind: of the movement.
             armhole: as in `due`.
             slower: factor on its duration.
-            rest: mean time until the next movement, s; `dwell` if None.
         """
         movement = self.movements.draw(kind, time, self.arm.hand, armhole, slower)
         if movement is None:
             return False
         self.arm.movement = movement
         self.corrects = (time + _CORRECTS[1], time + _GIVES_UP) if kind == "sleeve" else (0.0, 0.0)
-        self.next_at = movement.end + self.movements.rng.exponential(rest or self.dwell)
+        self.next_at = movement.end + self.movements.rng.exponential(self.dwell)
         return True
 
     def _correct(self, time: float, armhole: Armhole | None, rng: np.random.Generator) -> None:
