@@ -11,25 +11,8 @@ from benchmarks.figures import Figure
 from drake_dress.learning.evaluation.held_out import held_out_batches
 from drake_dress.learning.motion.windows import Batch, Sequences
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.human.learned.tokens import TOKEN_SIZE
+from drake_dress.models.human.learned.tokens import TOKEN_COLUMNS, TOKEN_SIZE
 
-# Columns of the tokens by what they tell.
-_COLUMNS = {
-    "shoulder, motion within the history": slice(0, 3),
-    "upper arm": slice(3, 6),
-    "forearm": slice(6, 9),
-    "other shoulder": slice(9, 12),
-    "other hand": slice(12, 15),
-    "speeds of joints": slice(15, 27),
-    "hand and elbow, motion within the history": slice(27, 33),
-    "own armhole, from the hand": slice(37, 40),
-    "own armhole, direction": slice(40, 43),
-    "own armhole, speed": slice(43, 46),
-    "own armhole, place on the arm": slice(46, 48),
-    "own armhole beside the arm, and who leads": slice(48, 56),
-    "other armhole, from its hand": slice(57, 60),
-    "other armhole, speed": slice(60, 63),
-}
 _TAILS = 0.01  # share of known windows below, and above, what counts as their range
 
 
@@ -48,7 +31,7 @@ def likeness(
     seen = _values([b for data in others for b in held_out_batches(data, noise)])
     outside = 100.0 * np.mean((seen < low) | (seen > high), axis=0)
     rows: list[list[object]] = []
-    for name, columns in _COLUMNS.items():
+    for name, columns in TOKEN_COLUMNS.items():
         worst = columns.start + int(np.argmax(outside[columns]))
         middle = [float(np.median(values[:, worst])) for values in (seen, base)]
         rows.append([name, float(outside[columns].mean()), float(outside[worst]), *middle])

@@ -5,8 +5,9 @@ All lengths are brought to about 1 by fixed scales, so that no scale depends on 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,50 @@ _JOINT_SPEED, _SLEEVE_SPEED = 2.0, 5.0
 _BESIDE, _CLOSE = 20.0, 0.01
 # What is farther or faster than this, in scaled units, tells nothing more.
 _MOST = 3.0
+
+
+def _laid_out(widths: Sequence[tuple[str, int]]) -> dict[str, slice]:
+    ends = np.cumsum([width for _, width in widths])
+    return {
+        name: slice(int(end) - width, int(end))
+        for (name, width), end in zip(widths, ends, strict=True)
+    }
+
+
+# The columns of a token, by what they tell of an arm.
+TOKEN_COLUMNS: Mapping[str, slice] = MappingProxyType(
+    _laid_out(
+        [
+            ("shoulder, motion within the history", 3),
+            ("upper arm", 3),
+            ("forearm", 3),
+            ("other shoulder", 3),
+            ("other hand", 3),
+            ("speed of the shoulder", 3),
+            ("speed of the elbow", 3),
+            ("speed of the hand", 3),
+            ("speed of the other hand", 3),
+            ("hand, motion within the history", 3),
+            ("elbow, motion within the history", 3),
+            ("joints are seen", 4),
+            ("armhole, from the hand", 3),
+            ("armhole, direction", 3),
+            ("armhole, speed", 3),
+            ("armhole, place on the arm", 2),
+            ("armhole beside the arm", 3),
+            ("armhole leads the arm", 5),
+            ("armhole is known", 1),
+            ("other armhole, from its hand", 3),
+            ("other armhole, speed", 3),
+            ("other armhole is known", 1),
+        ]
+    )
+)
+TOKEN_SIZE = max(columns.stop for columns in TOKEN_COLUMNS.values())
+# Columns of upper arm, forearm, and the way to the other shoulder.
+LIMB_COLUMNS = tuple(TOKEN_COLUMNS[name] for name in ("upper arm", "forearm", "other shoulder"))
+# Columns that tell of sleeves: from the first one of an armhole on.
+SLEEVE_COLUMNS = slice(TOKEN_COLUMNS["armhole, from the hand"].start, TOKEN_SIZE)
 
 
 @dataclass(frozen=True)
@@ -83,38 +128,37 @@ def arm_tokens(windows: Windows, turned: FloatArray | None = None) -> ArmTokens:
     leading = np.concatenate([moved - carried, *along], axis=2)
     on_own, on_other = known[:, :, :1], known[:, :, 1:]
     lasting = known * np.concatenate([known[:, :1], known[:, :-1]], axis=1)
-    parts = [
-        _MOTION * shoulder,
-        _LIMB * (elbow - shoulder),
-        _LIMB * (hand - elbow),
-        _OTHER * (other_shoulder - shoulder),
-        _OTHER * (other_hand - shoulder),
-        *(_JOINT_SPEED * velocity for velocity in reversed(velocities)),
-        0.5 * _JOINT_SPEED * rates(other_hand, period),
-        _MOTION * (hand - hand[:, -1:]),
-        _MOTION * (elbow - elbow[:, -1:]),
-        seen[:, :, [0, 1, 2, 5]].astype(np.float64),
-        on_own * np.clip(_SLEEVE * (own - hand), -_MOST, _MOST),
-        on_own * direction[:, :, 0],
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * moved, -_MOST, _MOST),
-        on_own * np.stack([place.progress, np.minimum(5.0 * place.distance, _MOST)], axis=2),
+    parts = {
+        "shoulder, motion within the history": _MOTION * shoulder,
+        "upper arm": _LIMB * (elbow - shoulder),
+        "forearm": _LIMB * (hand - elbow),
+        "other shoulder": _OTHER * (other_shoulder - shoulder),
+        "other hand": _OTHER * (other_hand - shoulder),
+        "speed of the shoulder": _JOINT_SPEED * velocities[2],
+        "speed of the elbow": _JOINT_SPEED * velocities[1],
+        "speed of the hand": _JOINT_SPEED * velocities[0],
+        "speed of the other hand": 0.5 * _JOINT_SPEED * rates(other_hand, period),
+        "hand, motion within the history": _MOTION * (hand - hand[:, -1:]),
+        "elbow, motion within the history": _MOTION * (elbow - elbow[:, -1:]),
+        "joints are seen": seen[:, :, [0, 1, 2, 5]].astype(np.float64),
+        "armhole, from the hand": on_own * np.clip(_SLEEVE * (own - hand), -_MOST, _MOST),
+        "armhole, direction": on_own * direction[:, :, 0],
+        "armhole, speed": lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * moved, -_MOST, _MOST),
+        "armhole, place on the arm": on_own
+        * np.stack([place.progress, np.minimum(5.0 * place.distance, _MOST)], axis=2),
         # who leads whom: the sleeve beside the arm's axis, and how each moves in that direction
-        on_own * np.clip(_BESIDE * off, -_MOST, _MOST),
-        lasting[:, :, :1] * np.clip(_SLEEVE_SPEED * leading, -_MOST, _MOST),
-        on_own,
-        on_other * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
-        lasting[:, :, 1:] * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
-        on_other,
-    ]
-    tokens = np.concatenate(parts, axis=2).astype(np.float32)
+        "armhole beside the arm": on_own * np.clip(_BESIDE * off, -_MOST, _MOST),
+        "armhole leads the arm": lasting[:, :, :1]
+        * np.clip(_SLEEVE_SPEED * leading, -_MOST, _MOST),
+        "armhole is known": on_own,
+        "other armhole, from its hand": on_other
+        * np.clip(_SLEEVE * (other - other_hand), -_MOST, _MOST),
+        "other armhole, speed": lasting[:, :, 1:]
+        * np.clip(_SLEEVE_SPEED * rates(other, period), -_MOST, _MOST),
+        "other armhole is known": on_other,
+    }
+    tokens = np.concatenate([parts[name] for name in TOKEN_COLUMNS], axis=2).astype(np.float32)
     return ArmTokens(frames, joints, np.clip(tokens, -2.0 * _MOST, 2.0 * _MOST))
-
-
-TOKEN_SIZE = 64
-# Columns of upper arm, forearm, and the way to the other shoulder.
-LIMB_COLUMNS = (slice(3, 6), slice(6, 9), slice(9, 12))
-# Columns that tell of sleeves.
-SLEEVE_COLUMNS = slice(37, 64)
 
 
 def swapped_sides_of_frames(pairs: FloatArray) -> FloatArray:

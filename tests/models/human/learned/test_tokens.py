@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from drake_dress.models.human.learned.network import PERIOD
 from drake_dress.models.human.learned.tokens import (
     SLEEVE_COLUMNS,
+    TOKEN_COLUMNS,
     TOKEN_SIZE,
     ArmTokens,
     Windows,
@@ -56,6 +57,19 @@ def test_tokens_have_their_size_and_are_bounded_single_precision(seed: int) -> N
     assert found.shape == (2, 20, TOKEN_SIZE)
     assert found.dtype == np.float32
     assert np.abs(found).max() <= 6.0
+
+
+@given(seeds)
+def test_columns_have_the_names_of_what_they_tell(seed: int) -> None:
+    scene = drawn_scene(seed)
+    joints = scene.joints.copy()
+    joints[:, 5] += np.random.default_rng(seed).normal(size=(len(joints), 3))
+    changed = (tokens_of(scene).tokens[0] != tokens_of(Scene(joints, scene.sleeves)).tokens[0]).any(
+        axis=0
+    )
+    told = {name for name, columns in TOKEN_COLUMNS.items() if changed[columns].all()}
+    assert told == {"other hand", "speed of the other hand", "other armhole, from its hand"}
+    assert changed.sum() == 9
 
 
 @given(seeds)
