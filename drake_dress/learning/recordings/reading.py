@@ -21,9 +21,11 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.prediction import LIMBS
 
 UPS = ("x", "-x", "y", "-y", "z", "-z")
-# Units by which files give lengths, m, and the plausible median length of a limb, m.
-_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "0.1 mm": 1e-4}
-_LIMBS = 0.15, 0.45
+# Units by which files give lengths, m.
+_UNITS = {"m": 1.0, "dm": 0.1, "in": 0.0254, "cm": 0.01, "mm": 0.001, "0.1 mm": 1e-4}
+# Median length of upper arms and forearms, m: from small children to tall adults, and of most
+# adults. No length of a limb in a file fits two units.
+_LIMBS, _ADULT = (0.15, 0.36), 0.27
 # A direction counts as down if arms hang along it by this share of their length on average.
 _HANGING = 0.3
 _FEWEST = 5  # samples with a joint
@@ -172,9 +174,10 @@ def _unit(path: Path, joints: FloatArray, told: Callable[[str], None]) -> float:
             str(path),
             "unit",
             f"is not known: limbs are {length:.4g} long, expected {_LIMBS[0]} to {_LIMBS[1]} m in "
-            f"{', '.join(_UNITS)}; give it by --unit",
+            f"{', '.join(_UNITS)}; give it by --unit, in which {_ADULT / length:.3g} would be an "
+            "adult's",
         )
-    name, unit = min(fitting.items(), key=lambda item: abs(length * item[1] - 0.27))
+    name, unit = min(fitting.items(), key=lambda item: abs(length * item[1] - _ADULT))
     told(f"{path.name}: unit {name}, since limbs are {length:.4g} long")
     return unit
 

@@ -44,7 +44,7 @@ def test_turning_up_is_a_rotation_that_takes_the_axis_to_z(up: str) -> None:
 
 
 @pytest.mark.parametrize("up", UPS)
-@pytest.mark.parametrize("unit", [1.0, 0.01, 0.001])
+@pytest.mark.parametrize("unit", [1.0, 0.1, 0.0254, 0.01, 0.001])
 def test_unit_and_up_are_found_from_the_body(tmp_path: Path, up: str, unit: float) -> None:
     joints = hanging()
     # the inverse rotation, by the columns of what `turned_up` does
@@ -114,6 +114,8 @@ def test_repeated_stamps_are_left_out_and_gaps_stay(tmp_path: Path) -> None:
         (lambda j, t: (j, t[::-1]), "time: decreases"),
         (lambda j, t: (np.full_like(j, np.nan), t), "has no arm with shoulder, elbow and hand"),
         (lambda j, t: (1e7 * j, t), "unit: is not known"),
+        # the unit of the CMU motion capture database, 1/0.45 in
+        (lambda j, t: (j / 0.0564, t), "unit: is not known.*in which 0.05.* would be an adult's"),
         (lambda j, t: (j[:, :, :2], t), "joint_position: has shape"),
         (lambda j, t: (j, t[:-1]), "time: has shape"),
     ],
