@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import OrderedDict
 from pathlib import Path
 
@@ -31,9 +32,14 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         UserError: measures contradict each other, or the file cannot be used.
     """
     if garment.mesh is not None:
+        path = base / garment.mesh.file
+        known = _identity(path, garment.mesh) in _kept
         with ShownWhenSlow(garment.mesh.file) as progress:
-            whole = _read_once(base / garment.mesh.file, garment.mesh, progress)
-            return whole.at_spacing(spacing, progress)
+            whole = _read_once(path, garment.mesh, progress)
+            mesh = whole.at_spacing(spacing, progress)
+        for note in () if known else whole.notes:
+            print(f"{garment.mesh.file}: {note}", file=sys.stderr)
+        return mesh
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
 
 

@@ -14,6 +14,7 @@ from drake_dress.models.garment.axes import AXES, turned
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
 from drake_dress.models.garment.manifold import check_manifold
+from drake_dress.models.garment.mend import mended
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
 from drake_dress.models.garment.mesh import LOOP_NAMES, GarmentMesh, check_loop
 from drake_dress.models.garment.parts import (
@@ -99,6 +100,7 @@ class WholeGarment:
         faces: (F,3), counter-clockwise seen from outside.
         loops: nodes around each opening of `LOOP_NAMES`.
         grasp: nodes that a gripper holds, for each gripper whose nodes the options name.
+        notes: what was mended, a line each.
     """
 
     source: str
@@ -106,6 +108,7 @@ class WholeGarment:
     faces: IntArray
     loops: dict[str, IntArray]
     grasp: dict[str, IntArray]
+    notes: tuple[str, ...] = ()
 
     def mesh(self) -> GarmentMesh:
         """Returns the labelled mesh at the resolution of the file."""
@@ -184,12 +187,13 @@ def read_garment(
     """Returns the garment of an OBJ, PLY or STL file, checked.
 
     The sleeves must point sideways in the file. Nodes at the same place are merged, unused nodes
-    are dropped, and an inside-out mesh is turned outward.
+    are dropped, and an inside-out mesh is turned outward. What `mend` can mend is mended.
 
     Raises:
         UserError: the file, its format or an option is unusable; the mesh is empty, not finite, not
-            plausible, not manifold or in parts; a loop is absent or not closed; an index is wrong.
-            The message is one line and names nodes as the file counts them, from 0, with lines.
+            plausible, in parts, or not manifold in too many places; a loop is absent or not closed;
+            an index is wrong. The message is one line and names nodes as the file counts them, from
+            0, with lines.
     """
     source = str(path)
     options.check(source)
@@ -204,6 +208,9 @@ def read_garment(
     for size in sizes_of(options.leave_out, source):
         raw = without_small(raw, size)
     check_one_part(raw)
+    raw, notes = mended(raw)
+    if notes:
+        check_plausible(raw)  # a face with a wrong corner shows once it is cut off
     node, face = raw.node, raw.face
     check_manifold(raw.faces, len(raw.position), source, node, face)
     faces = _outward(raw.position, raw.faces).astype(np.int32)
@@ -218,7 +225,7 @@ def read_garment(
         check_loop(loop, faces, len(raw.position), source, f"loops.{name}", node)
     progress("looking for the garment's openings", 0.5)
     loops = with_openings(raw.position, faces, loops, options.up, source)
-    whole = WholeGarment(source, turned(raw.position, options.up), faces, loops, grasp)
+    whole = WholeGarment(source, turned(raw.position, options.up), faces, loops, grasp, notes)
     whole.mesh().validate(source)
     return whole
 

@@ -159,9 +159,6 @@ def test_unusable_mesh_is_named(tmp_path: Path, coat: GarmentMesh) -> None:
     assert "NaN" in refusal(write_obj(path, broken, faces))
     fin = np.vstack([faces, [*faces[100, :2], faces[-1, 2]]])
     assert refusal(write_obj(path, x, fin))
-    turned = faces.copy()
-    turned[10] = turned[10, ::-1]
-    assert "oriented against" in refusal(write_obj(path, x, turned))
     two = np.vstack([faces, faces + len(x)])
     assert "separate parts" in refusal(write_obj(path, np.vstack([x, x + [0, 0, 0.3]]), two))
 
