@@ -79,6 +79,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarmen
             unit=mesh.unit,
             scale=mesh.scale,
             up=mesh.up,
+            facing=mesh.facing,
             weld=mesh.weld,
             leave_out=tuple(mesh.leave_out),
             loops=mesh.loops,

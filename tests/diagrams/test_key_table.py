@@ -94,7 +94,7 @@ def settable(key: Key) -> bool:
 
 def outside(key: Key) -> str:
     """Returns a value that the table does not allow."""
-    if key.type == "text":
+    if key.type.startswith("text"):
         return "no_such_word"
     low, high = map(float, key.allowed.split(" to "))
     assert low < high

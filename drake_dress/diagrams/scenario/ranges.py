@@ -20,7 +20,8 @@ CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": ("m", "cm", "mm"),
-    "garment.mesh.up": tuple(AXES),
+    "garment.mesh.up": AXES,
+    "garment.mesh.facing": AXES,
     "person.posture": ("standing", "sitting"),
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{

@@ -87,8 +87,9 @@ class Mesh:
         file: OBJ, PLY or STL file, relative to the scenario.
         unit: unit of the file's coordinates.
         scale: factor on all coordinates, in addition to the unit.
-        up: axis of the file that points up. With `z` the garment faces +x, with `y` +z, with `x`
-            +y; a minus sign is for files that are upside down.
+        up: axis of the file that points up; a minus sign is for files that are upside down.
+        facing: axis of the file that the garment faces. By default x with z up, z with y up, y with
+            x up.
         weld: distance across which edges of seams are joined, m. With 0 only nodes at the same
             position are merged.
         leave_out: names of objects or groups to omit, or sizes such as `<0.05 m`, below which
@@ -103,6 +104,7 @@ class Mesh:
     unit: str = MeshOptions.unit
     scale: float = MeshOptions.scale
     up: str = MeshOptions.up
+    facing: str | None = MeshOptions.facing
     weld: float = MeshOptions.weld
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int]] = field(default_factory=dict)

@@ -8,7 +8,7 @@ import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.garment.axes import AXES, turned
+from drake_dress.models.garment.axes import AXES, facings, turned
 from drake_dress.models.garment.mesh import LOOP_NAMES, REGION_NAMES, GarmentMesh
 from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
 from drake_dress.models.sides import SIDES
@@ -25,6 +25,7 @@ def with_openings(
     faces: IntArray,
     named: Mapping[str, IntArray],
     up: str,
+    facing: str | None,
     source: str,
 ) -> dict[str, IntArray]:
     """Returns the named loops, and finds the others.
@@ -33,26 +34,47 @@ def with_openings(
         position: (n,3), m, in the axes of the file.
         faces: (F,3) of a manifold.
         named: loops by their names in `LOOP_NAMES`.
-        up: the axis of the file that points up, a key of `AXES`.
+        up: the axis of the file that points up.
+        facing: the axis of the file that the garment faces; None for the usual one.
         source: file put in front of messages.
 
     Raises:
-        UserError: a loop is not found, or `up` is the wrong axis.
+        UserError: a loop is not found, or `up` or `facing` is the wrong axis.
     """
     try:
-        return _hanging(turned(position, up), faces, named, source)
+        return _hanging(turned(position, up, facing), faces, named, source)
     except UserError as error:
-        for other in AXES:
-            if other == up:
-                continue
-            try:
-                _hanging(turned(position, other), faces, named, source)
-            except UserError:
-                continue
-            raise UserError(
-                source, error.key, f"{error.message}; with garment.mesh.up: {other} it would fit"
-            ) from error
-        raise
+        keys = _keys_that_fit(position, faces, named, up, facing, source)
+        if keys is None:
+            raise
+        raise UserError(source, error.key, f"{error.message}; with {keys} it would fit") from error
+
+
+def _keys_that_fit(
+    position: FloatArray,
+    faces: IntArray,
+    named: Mapping[str, IntArray],
+    up: str,
+    facing: str | None,
+    source: str,
+) -> str | None:
+    """Returns the keys with which the garment hangs as expected; None if there are none."""
+    usual = [(other, None) for other in AXES]
+    others = [(other, axis) for other in AXES for axis in facings(other)[1:]]
+    for other, axis in [*usual, *others]:
+        if (other, axis or facings(other)[0]) == (up, facing or facings(up)[0]):
+            continue
+        try:
+            _hanging(turned(position, other, axis), faces, named, source)
+        except UserError:
+            continue
+        changed = [] if other == up else [f"garment.mesh.up: {other}"]
+        if axis is not None:
+            changed.append(f"garment.mesh.facing: {axis}")
+        elif facing is not None:
+            changed.append("the usual garment.mesh.facing")
+        return " and ".join(changed)
+    return None
 
 
 def labelled(

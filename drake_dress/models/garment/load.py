@@ -10,7 +10,7 @@ import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.garment.axes import AXES, turned
+from drake_dress.models.garment.axes import AXES, facings, turned
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
 from drake_dress.models.garment.manifold import check_manifold
@@ -49,7 +49,9 @@ class MeshOptions:
 
     Attributes:
         unit: unit of its coordinates, `m`, `cm` or `mm`.
-        up: axis of the file that points up; see `axes.AXES` for the direction the garment faces.
+        up: axis of the file that points up.
+        facing: axis of the file that the garment faces; None for the usual one, which is +x with
+            z up, +z with y up, and +y with x up.
         weld: distance across which edges of seams are joined, m; 0 joins only coincident nodes.
         leave_out: names of objects or groups, or sizes such as `<0.05 m` of connected parts.
         loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
@@ -67,12 +69,20 @@ class MeshOptions:
     loops: Mapping[str, Sequence[int]] | None = None
     grasp: Mapping[str, Sequence[int]] | None = None
     scale: float = 1.0
+    facing: str | None = None
 
     def check(self, source: str) -> None:
         """Raises UserError if an option is unknown or out of range."""
         for key, word, known in (("unit", self.unit, UNITS), ("up", self.up, AXES)):
             if word not in known:
                 raise UserError(source, key, f"is {word!r}, expected one of {', '.join(known)}")
+        if self.facing is not None and self.facing not in facings(self.up):
+            expected = ", ".join(facings(self.up))
+            raise UserError(
+                source,
+                "facing",
+                f"is {self.facing!r}, expected one of {expected} with {self.up} up",
+            )
         low, high = WELD_RANGE
         if not low <= self.weld <= high:
             raise UserError(source, "weld", f"is {self.weld} m, expected {low:g} to {high} m")
@@ -155,6 +165,7 @@ def load_garment(
     loops: Mapping[str, Sequence[int]] | None = None,
     grasp: Mapping[str, Sequence[int]] | None = None,
     scale: float = 1.0,
+    facing: str | None = None,
     progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
@@ -169,13 +180,15 @@ def load_garment(
         loops: nodes in order around each opening, by its name; those not given are searched for.
         grasp: nodes that the `left` and the `right` gripper hold.
         scale: factor on all coordinates, in addition to the unit.
+        facing: axis of the file that the garment faces; None for the usual one: +x with z up, +z
+            with y up, +y with x up.
         progress: function that is called with the current task and the fraction of it that is done.
 
     Raises:
         UserError: the file, an option or the mesh is unusable; see `read_garment` and
             `WholeGarment.at_spacing`.
     """
-    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale)
+    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing)
     whole = read_garment(path, options, progress)
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
@@ -224,8 +237,10 @@ def read_garment(
     for name, loop in loops.items():
         check_loop(loop, faces, len(raw.position), source, f"loops.{name}", node)
     progress("looking for the garment's openings", 0.5)
-    loops = with_openings(raw.position, faces, loops, options.up, source)
-    whole = WholeGarment(source, turned(raw.position, options.up), faces, loops, grasp, notes)
+    loops = with_openings(raw.position, faces, loops, options.up, options.facing, source)
+    whole = WholeGarment(
+        source, turned(raw.position, options.up, options.facing), faces, loops, grasp, notes
+    )
     whole.mesh().validate(source)
     return whole
 
