@@ -81,6 +81,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarmen
             up=mesh.up,
             facing=mesh.facing,
             weld=mesh.weld,
+            take=tuple(mesh.take),
             leave_out=tuple(mesh.leave_out),
             loops=mesh.loops,
             grasp=mesh.grasp,

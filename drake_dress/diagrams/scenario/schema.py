@@ -92,8 +92,9 @@ class Mesh:
             x up.
         weld: distance across which edges of seams are joined, m. With 0 only nodes at the same
             position are merged.
-        leave_out: names of objects or groups to omit, or sizes such as `<0.05 m`, below which
-            connected parts are omitted.
+        take: parts of the file that are the garment, if not all are: names of objects or groups,
+            sizes such as `>0.5 m` of connected parts, or places such as `near (0.1, 0, 1.2) m`.
+        leave_out: parts to omit, in the same words; `<0.05 m` omits smaller connected parts.
         loops: node indices in order around each opening, by the opening's name. Openings that are
             not given are detected.
         grasp: node indices that each gripper holds, by side. By default ten nodes near each
@@ -106,6 +107,7 @@ class Mesh:
     up: str = MeshOptions.up
     facing: str | None = MeshOptions.facing
     weld: float = MeshOptions.weld
+    take: list[str] = field(default_factory=list)
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int]] = field(default_factory=dict)
     grasp: dict[str, list[int]] = field(default_factory=dict)

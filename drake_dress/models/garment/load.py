@@ -11,18 +11,14 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, facings, turned
+from drake_dress.models.garment.chosen import by_measure, by_name, chosen
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
 from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.mend import mended
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
 from drake_dress.models.garment.mesh import LOOP_NAMES, GarmentMesh, check_loop
-from drake_dress.models.garment.parts import (
-    check_one_part,
-    sizes_of,
-    without_named,
-    without_small,
-)
+from drake_dress.models.garment.parts import check_one_part
 from drake_dress.models.garment.plausible import check_plausible
 from drake_dress.models.garment.simplify import to_spacing
 from drake_dress.models.sides import SIDES
@@ -53,7 +49,9 @@ class MeshOptions:
         facing: axis of the file that the garment faces; None for the usual one, which is +x with
             z up, +z with y up, and +y with x up.
         weld: distance across which edges of seams are joined, m; 0 joins only coincident nodes.
-        leave_out: names of objects or groups, or sizes such as `<0.05 m` of connected parts.
+        leave_out: names of objects or groups, sizes such as `<0.05 m` of connected parts, or places
+            such as `near (0.1, 0, 1.2) m`; see `chosen`.
+        take: the same; what is not taken is left out. Empty for all.
         loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
             those not named are searched for (see `openings`). In an STL, which lists a node once
             per triangle, any of the copies may be named.
@@ -70,6 +68,7 @@ class MeshOptions:
     grasp: Mapping[str, Sequence[int]] | None = None
     scale: float = 1.0
     facing: str | None = None
+    take: Sequence[str] = ()
 
     def check(self, source: str) -> None:
         """Raises UserError if an option is unknown or out of range."""
@@ -166,6 +165,7 @@ def load_garment(
     grasp: Mapping[str, Sequence[int]] | None = None,
     scale: float = 1.0,
     facing: str | None = None,
+    take: Sequence[str] = (),
     progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
@@ -176,19 +176,21 @@ def load_garment(
         spacing: desired mean edge length, m. None keeps the mesh as it is.
         up: axis of the file that points up: `z`, `y` or `x`, with a minus sign for upside down.
         weld: distance across which seams are sewn, m.
-        leave_out: names of objects or groups to leave out, or sizes such as `<0.05 m`.
+        leave_out: names of objects or groups to leave out, sizes such as `<0.05 m`, or places such
+            as `near (0.1, 0, 1.2) m`.
         loops: nodes in order around each opening, by its name; those not given are searched for.
         grasp: nodes that the `left` and the `right` gripper hold.
         scale: factor on all coordinates, in addition to the unit.
         facing: axis of the file that the garment faces; None for the usual one: +x with z up, +z
             with y up, +y with x up.
+        take: the only objects, groups, sizes or places to take, as in `leave_out`.
         progress: function that is called with the current task and the fraction of it that is done.
 
     Raises:
         UserError: the file, an option or the mesh is unusable; see `read_garment` and
             `WholeGarment.at_spacing`.
     """
-    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing)
+    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing, take)
     whole = read_garment(path, options, progress)
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
@@ -211,15 +213,16 @@ def read_garment(
     source = str(path)
     options.check(source)
     progress("reading the garment", 0.0)
-    raw = without_named(read_mesh(Path(path)), options.leave_out)
+    take = chosen(options.take, "take", source)
+    leave_out = chosen(options.leave_out, "leave_out", source)
+    raw = by_name(read_mesh(Path(path)), take, leave_out)
     progress("checking the garment", 0.3)
     raw = duplicates_merged(raw.scaled(UNITS[options.unit] * options.scale))
     # first check what holds in any unit, so that a stray node is not reported as a wrong unit
     check_plausible(raw)
     _check_size(raw, options.unit)
     raw = seams_sewn(raw, options.weld)
-    for size in sizes_of(options.leave_out, source):
-        raw = without_small(raw, size)
+    raw = by_measure(raw, take, leave_out)
     check_one_part(raw)
     raw, notes = mended(raw)
     if notes:

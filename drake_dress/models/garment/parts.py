@@ -1,83 +1,21 @@
-"""Leaves out parts of a file, and reports a garment that is in several parts."""
+"""Reports a garment that is in several parts, with the keys that would leave one."""
 
 from __future__ import annotations
 
-import difflib
-import re
-from collections.abc import Sequence
-
 import numpy as np
+from scipy.spatial import KDTree
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.chosen import by_measure, chosen
 from drake_dress.models.garment.edges import components
-from drake_dress.models.garment.files.raw import MaskArray, RawMesh, place
+from drake_dress.models.garment.files.raw import RawMesh, place
 from drake_dress.models.garment.merge import gap_between, seams_sewn
 from drake_dress.models.garment.mesh import face_areas
 
-_SIZE = re.compile(r"<\s*(\d+\.?\d*|\.\d+)\s*(m|cm|mm)?")
-_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, None: 1.0}
 _TOLD = 3  # parts that a message describes one by one
-_NAMES_TOLD = 12
 # Seam gaps and part sizes that are tried before a message advises one, m.
 _GAPS = (1e-6, 1e-5, 1e-4, 1e-3, 5e-3)
 _SIZES = (0.01, 0.02, 0.05, 0.1)
-
-
-def sizes_of(leave_out: Sequence[str], source: str) -> list[float]:
-    """Returns the sizes among entries of `leave_out`, such as `<0.05 m`, in m.
-
-    Raises:
-        UserError: an entry begins with "<" and is not a size.
-    """
-    sizes = []
-    for k, entry in enumerate(leave_out):
-        if entry.startswith("<"):
-            match = _SIZE.fullmatch(entry.strip())
-            if match is None or float(match[1]) <= 0.0:
-                raise UserError(
-                    source,
-                    f"leave_out[{k}]",
-                    f"is {entry!r}, expected a name, or a size such as '<0.05 m'",
-                )
-            sizes.append(float(match[1]) * _METRES[match[2]])
-    return sizes
-
-
-def without_named(mesh: RawMesh, leave_out: Sequence[str]) -> RawMesh:
-    """Returns the mesh without the objects and groups that `leave_out` names.
-
-    Raises:
-        UserError: the file has no such name, or nothing is left.
-    """
-    names = list(dict.fromkeys(name for part in mesh.part_names for name in part))
-    dropped = np.zeros(len(mesh.part_names), dtype=bool)
-    for k, entry in enumerate(leave_out):
-        if entry.startswith("<"):
-            continue
-        if entry not in names:
-            raise UserError(
-                mesh.source,
-                f"leave_out[{k}]",
-                f"names {entry!r}, which the file lacks, expected {_offer(entry, names)}",
-            )
-        dropped |= [entry in part for part in mesh.part_names]
-    if not dropped.any():
-        return mesh
-    return _left(mesh, ~dropped[mesh.face_part])
-
-
-def without_small(mesh: RawMesh, size: float) -> RawMesh:
-    """Returns the mesh without connected parts whose longest extent is below `size`, m.
-
-    Raises:
-        UserError: nothing is left.
-    """
-    label = components(mesh.faces, len(mesh.position))
-    low, high = (np.full((label.max() + 1, 3), start) for start in (np.inf, -np.inf))
-    np.minimum.at(low, label, mesh.position)
-    np.maximum.at(high, label, mesh.position)
-    keep = (high - low).max(axis=1) >= size
-    return mesh if keep.all() else _left(mesh, keep[label[mesh.faces[:, 0]]])
 
 
 def check_one_part(mesh: RawMesh) -> None:
@@ -110,25 +48,11 @@ def check_one_part(mesh: RawMesh) -> None:
         mesh.source,
         "faces",
         f"the mesh falls into {count} separate parts, expected one: {'; '.join(told)}{more}; "
-        f"{_advice(mesh)}",
+        f"{_advice(mesh, label, order[0])}",
     )
 
 
-def _left(mesh: RawMesh, keep: MaskArray) -> RawMesh:
-    if not keep.any():
-        raise UserError(mesh.source, "leave_out", "leaves nothing of the mesh, expected a garment")
-    return mesh.only(keep)
-
-
-def _offer(entry: str, names: Sequence[str]) -> str:
-    if not names:
-        return "sizes such as '<0.05 m' alone: it has no named objects or groups"
-    near = difflib.get_close_matches(entry, names, n=1)
-    listed = ", ".join(names[:_NAMES_TOLD]) + (", …" if len(names) > _NAMES_TOLD else "")
-    return f"{near[0]!r} perhaps; it has {listed}" if near else f"one of {listed}"
-
-
-def _advice(mesh: RawMesh) -> str:
+def _advice(mesh: RawMesh, label: np.ndarray, first: int) -> str:
     """Returns the keys that would leave one part; each is first tried on the mesh."""
     advice = []
     for gap in _GAPS:
@@ -137,13 +61,27 @@ def _advice(mesh: RawMesh) -> str:
             advice.append(f"garment.mesh.weld: {gap:g} joins them")
             break
     for size in _SIZES:
-        small = without_small(mesh, size)
+        entry = f"<{size:g} m"
+        small = by_measure(mesh, (), chosen([entry], "leave_out", mesh.source))
         if int(components(small.faces, len(small.position)).max()) == 0:
-            advice.append(f"garment.mesh.leave_out: ['<{size:g} m'] leaves the first alone")
+            advice.append(f"garment.mesh.leave_out: ['{entry}'] leaves the first alone")
             break
-    return " and ".join(advice) or (
-        "leave parts out with garment.mesh.leave_out, or join seams with garment.mesh.weld"
-    )
+    else:
+        advice.append(f"garment.mesh.take: ['{_where(mesh, label, first)}'] takes the first alone")
+    return " and ".join(advice)
+
+
+def _where(mesh: RawMesh, label: np.ndarray, part: int) -> str:
+    """Returns an entry of `take` for a part: its name if it is alone in that, else a place."""
+    of_face = label[mesh.faces[:, 0]] == part
+    named = {name for k in np.unique(mesh.face_part[of_face]) for name in mesh.part_names[k]}
+    others = {name for k in np.unique(mesh.face_part[~of_face]) for name in mesh.part_names[k]}
+    alone = sorted(named - others)
+    if alone and len(np.unique(mesh.face_part[of_face])) == 1:
+        return alone[0]
+    nodes = mesh.position[label == part]
+    away = KDTree(mesh.position[label != part]).query(nodes)[0]
+    return f"near{place(nodes[np.argmax(away)]).removeprefix(' at')}"
 
 
 def _name(mesh: RawMesh, label: np.ndarray, part: int) -> str:
