@@ -168,7 +168,7 @@ def load_garment(
     take: Sequence[str] = (),
     progress: Progress = _silent,
 ) -> GarmentMesh:
-    """Returns the garment of an OBJ, PLY or STL file, in the pose of `GarmentMesh`.
+    """Returns the garment of an OBJ, PLY, STL or glTF file, in the pose of `GarmentMesh`.
 
     Args:
         path: file.
@@ -199,7 +199,7 @@ def load_garment(
 def read_garment(
     path: str | Path, options: MeshOptions, progress: Progress = _silent
 ) -> WholeGarment:
-    """Returns the garment of an OBJ, PLY or STL file, checked.
+    """Returns the garment of an OBJ, PLY, STL or glTF file, checked.
 
     The sleeves must point sideways in the file. Nodes at the same place are merged, unused nodes
     are dropped, and an inside-out mesh is turned outward. What `mend` can mend is mended.

@@ -8,12 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.errors import UserError
+from drake_dress.models.garment.files.gltf import read_gltf
 from drake_dress.models.garment.files.obj import read_obj
 from drake_dress.models.garment.files.ply import read_ply
 from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.stl import read_stl
 
-EXTENSIONS = (".obj", ".ply", ".stl")
+EXTENSIONS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+# Other formats that garments come in, and how to turn them.
+_OTHERS = {
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "a USD stage"),
+    **dict.fromkeys((".fbx", ".dae", ".blend", ".abc", ".3ds"), "a scene of another program"),
+    **dict.fromkeys((".zprj", ".zpac"), "a project of CLO or Marvelous Designer"),
+}
 # A scan of a garment has some 100,000. This many take about half a minute to read and simplify.
 MOST_TRIANGLES = 200_000
 _LARGEST = 1e9  # coordinate in any unit: no garment is larger, and huge numbers overflow if squared
@@ -21,7 +28,7 @@ _MOST_BYTES = 200 * 10**6
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """Returns the triangles of an OBJ, PLY or STL file.
+    """Returns the triangles of an OBJ, PLY, STL or glTF file.
 
     Raises:
         UserError: the file is absent, unreadable, too large, not of its format, or without
@@ -35,8 +42,10 @@ def read_mesh(path: Path) -> RawMesh:
             mesh = read_obj(data, source, MOST_TRIANGLES)
         elif path.suffix.lower() == ".ply":
             mesh = read_ply(data, source, MOST_TRIANGLES)
-        else:
+        elif path.suffix.lower() == ".stl":
             mesh = read_stl(data, source, MOST_TRIANGLES)
+        else:
+            mesh = read_gltf(data, path, MOST_TRIANGLES)
     if len(mesh.faces) == 0:
         raise UserError(source, "faces", "the mesh is empty, expected at least one triangle")
     if len(mesh.faces) > MOST_TRIANGLES:
@@ -55,9 +64,12 @@ def read_mesh(path: Path) -> RawMesh:
 def _content(path: Path) -> bytes:
     source = str(path)
     if path.suffix.lower() not in EXTENSIONS:
-        raise UserError(
-            source, "", f"unknown format {path.suffix!r}, expected {', '.join(EXTENSIONS)}"
+        kind = _OTHERS.get(path.suffix.lower())
+        told = (
+            f"unknown format {path.suffix!r}" if kind is None else f"is {kind}, which is not read"
         )
+        how = "" if kind is None else "; export it as glTF or OBJ, with Blender for instance"
+        raise UserError(source, "", f"{told}, expected {', '.join(EXTENSIONS)}{how}")
     try:
         if not path.is_file():
             raise UserError(source, "", "no such file, expected a triangle mesh")
