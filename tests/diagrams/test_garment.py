@@ -113,3 +113,37 @@ def test_a_garment_like_the_nominal_one_has_its_nodes(scale: float, tmp_path: Pa
             like.rest_position, scale * first.rest_position, atol=0.02 * abs(scale - 1.0) + 1e-12
         )
         np.testing.assert_array_equal(like.loops["left_cuff"], first.loops["left_cuff"])
+
+
+def test_keys_of_a_file_reach_its_reader(tmp_path: Path) -> None:
+    write(tmp_path / "coat.obj", y_up=True)
+    cuff = JACKET.rest_position[JACKET.loops["left_cuff"][0], [1, 2, 0]]
+    place = "near ({:.3f}, {:.3f}, {:.3f}) m".format(*cuff)
+    (tmp_path / "s.yaml").write_text(
+        "garment:\n  mesh:\n    file: coat.obj\n    up: y\n    facing: z\n"
+        f"    take: ['>0.5 m']\n    loops: {{left_cuff: '{place}'}}\n"
+    )
+    scenario = load_scenario(tmp_path / "s.yaml")
+    mesh = garment.build_garment(scenario.garment, 0.06, tmp_path)
+    assert len(mesh.loops) == 4
+    nodes = JACKET.loops["left_cuff"].tolist()
+    (tmp_path / "s.yaml").write_text(
+        f"garment: {{mesh: {{file: coat.obj, up: y, loops: {{left_cuff: {nodes}}}}}}}\n"
+    )
+    again = garment.build_garment(load_scenario(tmp_path / "s.yaml").garment, 0.06, tmp_path)
+    np.testing.assert_array_equal(again.faces, mesh.faces)
+
+
+def test_what_was_mended_is_told_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], reads: list[Path]
+) -> None:
+    path = tmp_path / "coat.obj"
+    write(path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines, lines[-1]]) + "\n")
+    wanted = Garment(mesh=Mesh(file="coat.obj"))
+    garment.build_garment(wanted, 0.06, tmp_path)
+    garment.build_garment(wanted, 0.07, tmp_path)
+    told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("coat.obj: ")]
+    assert len(told) == 1
+    assert "1 triangles are given twice" in told[0]

@@ -184,6 +184,10 @@ def _unwrapped(hint: Any) -> tuple[Any, bool, bool]:
 
 
 def _type(hint: Any) -> str:
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        kinds = [kind for kind in typing.get_args(hint) if kind is not type(None)]
+        if len(kinds) > 1:
+            return " or ".join(_type(kind) for kind in kinds)
     inner, optional, many = _unwrapped(hint)
     if typing.get_origin(inner) is dict:
         return f"{_type(typing.get_args(inner)[1])} by name"

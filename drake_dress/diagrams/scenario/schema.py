@@ -95,8 +95,9 @@ class Mesh:
         take: parts of the file that are the garment, if not all are: names of objects or groups,
             sizes such as `>0.5 m` of connected parts, or places such as `near (0.1, 0, 1.2) m`.
         leave_out: parts to omit, in the same words; `<0.05 m` omits smaller connected parts.
-        loops: node indices in order around each opening, by the opening's name. Openings that are
-            not given are detected.
+        loops: node indices in order around each opening, by the opening's name; or a place on it,
+            such as `near (0.5, 0, 1.2) m`; or for an armhole a plane with point and normal,
+            `plane (0.2, 0, 1.3) m, (1, 0, 0)`. Openings that are not given are detected.
         grasp: node indices that each gripper holds, by side. By default ten nodes near each
             shoulder tip.
     """
@@ -109,7 +110,7 @@ class Mesh:
     weld: float = MeshOptions.weld
     take: list[str] = field(default_factory=list)
     leave_out: list[str] = field(default_factory=list)
-    loops: dict[str, list[int]] = field(default_factory=dict)
+    loops: dict[str, list[int] | str] = field(default_factory=dict)
     grasp: dict[str, list[int]] = field(default_factory=dict)
 
 

@@ -35,7 +35,7 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
     """Checks a value read from YAML against a type, and returns it."""
     if value is None and _takes_none(schema):
         return None
-    schema = _without_none(schema)
+    schema = _of_value(_without_none(schema), value)
     origin = typing.get_origin(schema)
     if dataclasses.is_dataclass(schema):
         if not isinstance(value, dict):
@@ -95,14 +95,28 @@ def check_ranges(source: str, key: str, value: Any) -> None:
             raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
 
 
-def _takes_none(schema: Any) -> bool:
+def _is_union(schema: Any) -> bool:
     return typing.get_origin(schema) in (typing.Union, types.UnionType)
+
+
+def _takes_none(schema: Any) -> bool:
+    return _is_union(schema) and type(None) in typing.get_args(schema)
 
 
 def _without_none(schema: Any) -> Any:
     if _takes_none(schema):
         return next(t for t in typing.get_args(schema) if t is not type(None))
     return schema
+
+
+def _of_value(schema: Any, value: Any) -> Any:
+    """Returns the type of a union that a value is checked against: text, or the first other one."""
+    if not _is_union(schema):
+        return schema
+    kinds = typing.get_args(schema)
+    if isinstance(value, str) and str in kinds:
+        return str
+    return next(kind for kind in kinds if kind is not str)
 
 
 def kind_of(value: Any) -> str:

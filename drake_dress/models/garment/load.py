@@ -19,6 +19,7 @@ from drake_dress.models.garment.mend import mended
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
 from drake_dress.models.garment.mesh import LOOP_NAMES, GarmentMesh, check_loop
 from drake_dress.models.garment.parts import check_one_part
+from drake_dress.models.garment.placed_loops import placed_loops
 from drake_dress.models.garment.plausible import check_plausible
 from drake_dress.models.garment.simplify import to_spacing
 from drake_dress.models.sides import SIDES
@@ -54,7 +55,8 @@ class MeshOptions:
         take: the same; what is not taken is left out. Empty for all.
         loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
             those not named are searched for (see `openings`). In an STL, which lists a node once
-            per triangle, any of the copies may be named.
+            per triangle, any of the copies may be named. Or a place, such as
+            `near (0.5, 0, 1.2) m`, or a plane; see `placed_loops`.
         grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
             nodes nearest to a point 3.5 cm inward of the armhole's highest node.
         scale: factor on all coordinates, in addition to the unit.
@@ -64,7 +66,7 @@ class MeshOptions:
     up: str = "z"
     weld: float = 0.0
     leave_out: Sequence[str] = ()
-    loops: Mapping[str, Sequence[int]] | None = None
+    loops: Mapping[str, Sequence[int] | str] | None = None
     grasp: Mapping[str, Sequence[int]] | None = None
     scale: float = 1.0
     facing: str | None = None
@@ -161,7 +163,7 @@ def load_garment(
     up: str = "z",
     weld: float = 0.0,
     leave_out: Sequence[str] = (),
-    loops: Mapping[str, Sequence[int]] | None = None,
+    loops: Mapping[str, Sequence[int] | str] | None = None,
     grasp: Mapping[str, Sequence[int]] | None = None,
     scale: float = 1.0,
     facing: str | None = None,
@@ -178,7 +180,8 @@ def load_garment(
         weld: distance across which seams are sewn, m.
         leave_out: names of objects or groups to leave out, sizes such as `<0.05 m`, or places such
             as `near (0.1, 0, 1.2) m`.
-        loops: nodes in order around each opening, by its name; those not given are searched for.
+        loops: nodes in order around each opening, or a place or plane, by its name; those not given
+            are searched for.
         grasp: nodes that the `left` and the `right` gripper hold.
         scale: factor on all coordinates, in addition to the unit.
         facing: axis of the file that the garment faces; None for the usual one: +x with z up, +z
@@ -231,8 +234,11 @@ def read_garment(
     check_manifold(raw.faces, len(raw.position), source, node, face)
     faces = _outward(raw.position, raw.faces).astype(np.int32)
 
+    given = options.loops or {}
     loops = {
-        name: _mapped(raw, nodes, f"loops.{name}") for name, nodes in (options.loops or {}).items()
+        name: _mapped(raw, nodes, f"loops.{name}")
+        for name, nodes in given.items()
+        if not isinstance(nodes, str)
     }
     grasp = {
         side: _mapped(raw, nodes, f"grasp.{side}") for side, nodes in (options.grasp or {}).items()
@@ -240,10 +246,11 @@ def read_garment(
     for name, loop in loops.items():
         check_loop(loop, faces, len(raw.position), source, f"loops.{name}", node)
     progress("looking for the garment's openings", 0.5)
-    loops = with_openings(raw.position, faces, loops, options.up, options.facing, source)
-    whole = WholeGarment(
-        source, turned(raw.position, options.up, options.facing), faces, loops, grasp, notes
-    )
+    places = {name: text for name, text in given.items() if isinstance(text, str)}
+    position, faces, placed = placed_loops(raw.position, faces, places, source)
+    loops = with_openings(position, faces, loops | placed, options.up, options.facing, source)
+    position = turned(position, options.up, options.facing)
+    whole = WholeGarment(source, position, faces, loops, grasp, notes)
     whole.mesh().validate(source)
     return whole
 

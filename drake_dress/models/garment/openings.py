@@ -22,7 +22,7 @@ from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArra
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import loop_length
 
-_CUFF_GIRTH = (0.1, 0.8)  # m
+CUFF_GIRTH = (0.1, 0.8)  # m
 _STEP = 0.005  # between cuts, m
 _GROWTH = 0.12  # largest growth of a tube's girth between cuts; the side of a body gives more
 _SEARCH = 0.45  # fraction of the distance between the cuffs that is searched for an armhole
@@ -44,7 +44,7 @@ def find_cuffs(position: FloatArray, faces: IntArray, source: str) -> dict[str, 
     y = position[:, 1]
     middle, width = 0.5 * float(y.min() + y.max()), float(np.ptp(y))
     every = boundary_loops(faces)
-    small = [q for q in every if _CUFF_GIRTH[0] <= loop_length(position, q) <= _CUFF_GIRTH[1]]
+    small = [q for q in every if CUFF_GIRTH[0] <= loop_length(position, q) <= CUFF_GIRTH[1]]
     offset = [float(position[q, 1].mean()) - middle for q in small]
     if not small or max(offset) < 0.25 * width or min(offset) > -0.25 * width:
         raise UserError(
