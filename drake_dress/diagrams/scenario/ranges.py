@@ -7,6 +7,7 @@ from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
+from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.prediction import PREDICTORS
@@ -19,7 +20,7 @@ SOURCES = ("left_arm", "right_arm", "garment", "person")
 CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
-    "garment.mesh.unit": ("m", "cm", "mm"),
+    "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
     "person.posture": ("standing", "sitting"),

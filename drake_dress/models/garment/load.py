@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,18 @@ from drake_dress.models.garment.axes import AXES, facings, turned
 from drake_dress.models.garment.chosen import by_measure, by_name, chosen
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
+from drake_dress.models.garment.life_size import (
+    ADULT,
+    AUTO,
+    JACKET,
+    UNITS,
+    adultness,
+    check_diagonal,
+    check_life_size,
+    is_life_size,
+    shoulder_width,
+    units_that_fit,
+)
 from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.mend import mended
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
@@ -26,8 +39,6 @@ from drake_dress.models.sides import SIDES
 
 __all__ = ["EXTENSIONS", "UNITS", "MeshOptions", "WholeGarment", "load_garment", "read_garment"]
 
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-DIAGONAL_RANGE = (0.5, 3.0)  # of a garment's bounding box, m
 SPACING_RANGE = (0.005, 0.1)  # m
 WELD_RANGE = (0.0, 0.02)  # m
 SCALE_RANGE = (1e-4, 1e4)  # files from a ten-thousandth of life size to 10,000 times life size
@@ -45,7 +56,8 @@ class MeshOptions:
     """Options for reading a garment file.
 
     Attributes:
-        unit: unit of its coordinates, `m`, `cm` or `mm`.
+        unit: unit of its coordinates, one of `UNITS`; or `auto`, which means the one in which the
+            shoulders are most like an adult's.
         up: axis of the file that points up.
         facing: axis of the file that the garment faces; None for the usual one, which is +x with
             z up, +z with y up, and +y with x up.
@@ -74,7 +86,7 @@ class MeshOptions:
 
     def check(self, source: str) -> None:
         """Raises UserError if an option is unknown or out of range."""
-        for key, word, known in (("unit", self.unit, UNITS), ("up", self.up, AXES)):
+        for key, word, known in (("unit", self.unit, (*UNITS, AUTO)), ("up", self.up, AXES)):
             if word not in known:
                 raise UserError(source, key, f"is {word!r}, expected one of {', '.join(known)}")
         if self.facing is not None and self.facing not in facings(self.up):
@@ -174,7 +186,7 @@ def load_garment(
 
     Args:
         path: file.
-        unit: unit of its coordinates, `m`, `cm` or `mm`.
+        unit: unit of its coordinates, one of `UNITS`, or `auto`.
         spacing: desired mean edge length, m. None keeps the mesh as it is.
         up: axis of the file that points up: `z`, `y` or `x`, with a minus sign for upside down.
         weld: distance across which seams are sewn, m.
@@ -218,14 +230,55 @@ def read_garment(
     progress("reading the garment", 0.0)
     take = chosen(options.take, "take", source)
     leave_out = chosen(options.leave_out, "leave_out", source)
-    raw = by_name(read_mesh(Path(path)), take, leave_out)
+    raw = by_name(read_mesh(Path(path)), take, leave_out).scaled(options.scale)
     progress("checking the garment", 0.3)
-    raw = duplicates_merged(raw.scaled(UNITS[options.unit] * options.scale))
+    if options.unit != AUTO:
+        whole = _checked(raw, options, progress)
+    else:
+        whole = _in_likely_unit(raw, options, progress)
+    check_life_size(whole.position, whole.loops, options.scale, source)
+    return whole
+
+
+def _in_likely_unit(raw: RawMesh, options: MeshOptions, progress: Progress) -> WholeGarment:
+    """Returns the garment in the unit in which its shoulders are most like an adult's."""
+    used = raw.position[np.unique(raw.faces)]
+    diagonal = max(float(np.linalg.norm(np.ptp(used, axis=0))), 1e-12)
+    found = {}
+    for unit in units_that_fit(diagonal):
+        with suppress(UserError):
+            whole = _checked(raw, replace(options, unit=unit), progress)
+            if is_life_size(whole.position, whole.loops):
+                found[unit] = whole
+    if not found:
+        # as large as a jacket: what is wrong with it besides its size is told
+        like = _checked(raw.scaled(JACKET / diagonal), replace(options, unit="m"), progress)
+        width = shoulder_width(like.position, like.loops) * diagonal / JACKET
+        scale = f"garment.mesh.scale: {options.scale * ADULT / width:.2g}"
+        raise UserError(
+            raw.source,
+            "unit",
+            f"is auto, but in no unit the shoulders are a person's: they are {width:.3g} wide; "
+            f"with garment.mesh.unit: m and {scale} they would be {ADULT} m wide",
+        )
+    unit, best = min(found.items(), key=lambda item: adultness(item[1].position, item[1].loops))
+    width = shoulder_width(best.position, best.loops)
+    note = f"the unit is {unit}, in which the shoulders are {width:.2f} m wide"
+    return replace(best, notes=(note, *best.notes))
+
+
+def _checked(raw: RawMesh, options: MeshOptions, progress: Progress) -> WholeGarment:
+    """Returns the garment of a mesh in the options' unit, times their scale."""
+    source, factor = raw.source, UNITS[options.unit]
+    raw = duplicates_merged(raw.scaled(factor))
     # first check what holds in any unit, so that a stray node is not reported as a wrong unit
     check_plausible(raw)
-    _check_size(raw, options.unit)
+    diagonal = float(np.linalg.norm(np.ptp(raw.position, axis=0))) / factor
+    check_diagonal(diagonal, options.unit, options.scale, source)
     raw = seams_sewn(raw, options.weld)
-    raw = by_measure(raw, take, leave_out)
+    raw = by_measure(
+        raw, chosen(options.take, "take", source), chosen(options.leave_out, "leave_out", source)
+    )
     check_one_part(raw)
     raw, notes = mended(raw)
     if notes:
@@ -233,7 +286,6 @@ def read_garment(
     node, face = raw.node, raw.face
     check_manifold(raw.faces, len(raw.position), source, node, face)
     faces = _outward(raw.position, raw.faces).astype(np.int32)
-
     given = options.loops or {}
     loops = {
         name: _mapped(raw, nodes, f"loops.{name}")
@@ -253,22 +305,6 @@ def read_garment(
     whole = WholeGarment(source, position, faces, loops, grasp, notes)
     whole.mesh().validate(source)
     return whole
-
-
-def _check_size(raw: RawMesh, unit: str) -> None:
-    diagonal = float(np.linalg.norm(np.ptp(raw.position, axis=0)))
-    low, high = DIAGONAL_RANGE
-    if not low <= diagonal <= high:
-        better = [
-            name for name, factor in UNITS.items() if low <= diagonal * factor / UNITS[unit] <= high
-        ]
-        hint = f"with {better[0]} it would fit" if better else "no unit fits, a scale might"
-        raise UserError(
-            raw.source,
-            "unit",
-            f"in {unit} the garment's bounding box has a diagonal of {diagonal:.3g} m, expected "
-            f"{low} to {high} m (wrong unit?); {hint}",
-        )
 
 
 def _outward(position: FloatArray, faces: np.ndarray) -> np.ndarray:
