@@ -10,7 +10,13 @@ from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, facings, turned
 from drake_dress.models.garment.mesh import LOOP_NAMES, REGION_NAMES, GarmentMesh
-from drake_dress.models.garment.openings import beyond, find_armhole, find_cuffs, ordered
+from drake_dress.models.garment.openings import (
+    beyond,
+    check_neck_and_hem,
+    find_armhole,
+    find_cuffs,
+    ordered,
+)
 from drake_dress.models.sides import SIDES
 
 _GRASP_COUNT = 10  # nodes per gripper if none are given
@@ -113,6 +119,7 @@ def _hanging(
     loops = dict(named)
     if not all(f"{side}_cuff" in loops for side in SIDES):
         loops = {**find_cuffs(position, faces, source), **loops}
+    check_neck_and_hem(position, faces, loops, source)
     for side in SIDES:
         name = f"{side}_armhole"
         if name not in loops:

@@ -12,6 +12,8 @@ must be named.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
@@ -21,11 +23,15 @@ from drake_dress.errors import UserError
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import loop_length
+from drake_dress.models.sides import SIDES
 
 CUFF_GIRTH = (0.1, 0.8)  # m
 _STEP = 0.005  # between cuts, m
 _GROWTH = 0.12  # largest growth of a tube's girth between cuts; the side of a body gives more
 _SEARCH = 0.45  # fraction of the distance between the cuffs that is searched for an armhole
+
+# Heights, in shares of the garment's, above and below which it has openings for head and hem.
+_UPPER, _LOWER = 0.6, 0.4
 
 _NAME_THEM = "expected loops named by node indices (left_armhole, left_cuff, right_…)"
 
@@ -57,6 +63,41 @@ def find_cuffs(position: FloatArray, faces: IntArray, source: str) -> dict[str, 
         "left_cuff": small[int(np.argmax(offset))],
         "right_cuff": small[int(np.argmin(offset))],
     }
+
+
+def check_neck_and_hem(
+    position: FloatArray, faces: IntArray, loops: Mapping[str, IntArray], source: str
+) -> None:
+    """Checks that a garment has openings above and below, besides its cuffs.
+
+    Args:
+        position: (n,3), m, in the canonical rest pose.
+        faces: (F,3) of a manifold.
+        loops: with both cuffs.
+        source: file put in front of the message.
+
+    Raises:
+        UserError: it has not, as trousers have not.
+    """
+    border = np.unique(np.concatenate(boundary_loops(faces)))
+    border = np.setdiff1d(border, np.concatenate([loops[f"{side}_cuff"] for side in SIDES]))
+    z = position[:, 2]
+    height = (z[border] - z.min()) / max(float(np.ptp(z)), 1e-9)
+    upper, lower = bool((height > _UPPER).any()), bool((height < _LOWER).any())
+    if upper and lower:
+        return
+    missing = "for the head" if lower else "at the hem" if upper else "for head and hem"
+    raise UserError(
+        source,
+        "loops",
+        f"there is no opening {missing} besides two at ({_place(position, loops['left_cuff'])}) "
+        f"and ({_place(position, loops['right_cuff'])}) m, with +x forward and +y to the left: are "
+        "these trousers? expected a garment with two sleeves",
+    )
+
+
+def _place(position: FloatArray, loop: IntArray) -> str:
+    return ", ".join(f"{x:.2f}" for x in position[loop].mean(axis=0))
 
 
 def find_armhole(

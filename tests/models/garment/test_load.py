@@ -181,6 +181,42 @@ def test_garment_without_findable_loops_is_named(tmp_path: Path, coat: GarmentMe
     assert "face +x" in refusal(write_obj(tmp_path / "coat.obj", turned, coat.faces))
 
 
+def trousers() -> tuple[FloatArray, IntArray]:
+    """A waist that parts into two legs along a crotch."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    waist = np.stack([0.12 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
+    nodes = [np.column_stack([waist, np.full(24, z)]) for z in np.linspace(1.05, 0.8, 5)]
+    crotch = np.linspace(waist[0], waist[12], 5)[1:-1]
+    nodes.append(np.column_stack([crotch, np.full(3, 0.8)]))
+    rings = [[np.arange(24) + 24 * k for k in range(5)]]
+    last, inner, count = rings[0][-1], 120 + np.arange(3), 123
+    halves = np.r_[last[:13], inner[::-1]], np.r_[last[0], inner, last[12:]]
+    for sign, half in zip((1.0, -1.0), halves, strict=True):
+        around = np.linspace(0.0, sign * 2.0 * np.pi, 16, endpoint=False)
+        leg = [half]
+        for z in np.linspace(0.8, 0.0, 12)[1:]:
+            circle = np.stack([0.09 * np.cos(around), 0.2 * sign + 0.09 * np.sin(around)], axis=1)
+            nodes.append(np.column_stack([circle, np.full(16, z)]))
+            leg.append(np.arange(16) + count)
+            count += 16
+        rings.append(leg)
+    faces = []
+    for tube in rings:
+        for upper, lower in pairwise(tube):
+            a, b, c, d = upper, np.roll(upper, -1), lower, np.roll(lower, -1)
+            faces += [np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]
+    return np.concatenate(nodes), np.concatenate(faces).astype(np.int32)
+
+
+@pytest.mark.parametrize("up", ["z", "-z", "y"])
+def test_trousers_are_told_by_what_they_lack(tmp_path: Path, up: str) -> None:
+    path = write_obj(tmp_path / "trousers.obj", *trousers())
+    message = refusal(path, up=up)
+    assert "it would fit" not in message
+    if up != "y":
+        assert "are these trousers?" in message
+
+
 def test_bad_indices_are_named(tmp_path: Path, coat: GarmentMesh) -> None:
     path = write_obj(tmp_path / "coat.obj", coat.rest_position, coat.faces)
     loop = named(coat)["left_cuff"]
