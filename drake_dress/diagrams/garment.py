@@ -32,12 +32,10 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         UserError: measures contradict each other, or the file cannot be used.
     """
     if garment.mesh is not None:
-        path = base / garment.mesh.file
-        known = _identity(path, garment.mesh) in _kept
         with ShownWhenSlow(garment.mesh.file) as progress:
-            whole = _read_once(path, garment.mesh, progress)
+            whole, is_new = _read_once(base / garment.mesh.file, garment.mesh, progress)
             mesh = whole.at_spacing(spacing, progress)
-        for note in () if known else whole.notes:
+        for note in whole.notes if is_new else ():
             print(f"{garment.mesh.file}: {note}", file=sys.stderr)
         return mesh
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
@@ -68,11 +66,12 @@ def build_garment_like(
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
 
 
-def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarment:
+def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[WholeGarment, bool]:
+    """Returns the garment of a file, and whether the file was read now."""
     key = _identity(path, mesh)
     if key is not None and key in _kept:
         _kept.move_to_end(key)
-        return _kept[key]
+        return _kept[key], False
     whole = read_garment(
         path,
         MeshOptions(
@@ -92,7 +91,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> WholeGarmen
         _kept[key] = whole
         while len(_kept) > _MOST_KEPT:
             _kept.popitem(last=False)
-    return whole
+    return whole, True
 
 
 def _identity(path: Path, mesh: schema.Mesh) -> tuple[object, ...] | None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from typing import Any
 from drake_dress.diagrams.scenario.mirror import Mirror
 from drake_dress.diagrams.scenario.ranges import choices_of, plain, range_of
 from drake_dress.diagrams.scenario.schema import Scenario
+from drake_dress.diagrams.scenario.typed import is_union
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import LOOP_NAMES
@@ -176,7 +176,7 @@ def _key(name: str, hint: Any, default: Any, text: str) -> Key:
 
 def _unwrapped(hint: Any) -> tuple[Any, bool, bool]:
     """Returns the type inside an optional or a list, and whether it was optional and a list."""
-    optional = typing.get_origin(hint) in (typing.Union, types.UnionType)
+    optional = is_union(hint)
     if optional:
         hint = next(t for t in typing.get_args(hint) if t is not type(None))
     many = typing.get_origin(hint) is list
@@ -184,7 +184,7 @@ def _unwrapped(hint: Any) -> tuple[Any, bool, bool]:
 
 
 def _type(hint: Any) -> str:
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+    if is_union(hint):
         kinds = [kind for kind in typing.get_args(hint) if kind is not type(None)]
         if len(kinds) > 1:
             return " or ".join(_type(kind) for kind in kinds)

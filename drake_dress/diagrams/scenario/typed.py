@@ -95,12 +95,13 @@ def check_ranges(source: str, key: str, value: Any) -> None:
             raise UserError(source, key, f"is {value}, expected {bounds[0]:g} to {bounds[1]:g}")
 
 
-def _is_union(schema: Any) -> bool:
+def is_union(schema: Any) -> bool:
+    """Returns whether a type is a union, such as an optional one."""
     return typing.get_origin(schema) in (typing.Union, types.UnionType)
 
 
 def _takes_none(schema: Any) -> bool:
-    return _is_union(schema) and type(None) in typing.get_args(schema)
+    return is_union(schema) and type(None) in typing.get_args(schema)
 
 
 def _without_none(schema: Any) -> Any:
@@ -111,7 +112,7 @@ def _without_none(schema: Any) -> Any:
 
 def _of_value(schema: Any, value: Any) -> Any:
     """Returns the type of a union that a value is checked against: text, or the first other one."""
-    if not _is_union(schema):
+    if not is_union(schema):
         return schema
     kinds = typing.get_args(schema)
     if isinstance(value, str) and str in kinds:

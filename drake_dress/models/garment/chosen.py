@@ -18,13 +18,11 @@ from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.edges import components
 from drake_dress.models.garment.files.raw import MaskArray, RawMesh
+from drake_dress.models.garment.files.text import NUMBER, TRIPLE
 
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, None: 1.0}
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_SIZE = re.compile(rf"([<>])\s*({_NUMBER})\s*(m|cm|mm)?")
-_PLACE = re.compile(
-    rf"near\s*\(\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\)\s*(m|cm|mm)?"
-)
+_SIZE = re.compile(rf"([<>])\s*({NUMBER})\s*(m|cm|mm)?")
+_PLACE = re.compile(rf"near\s*{TRIPLE}\s*(m|cm|mm)?")
 _NAMES_TOLD = 12
 
 
@@ -136,12 +134,12 @@ def _faces_of(mesh: RawMesh, entry: Chosen) -> MaskArray:
         off = np.linalg.norm(mesh.position[used] - np.array(entry.point), axis=1)
         part = np.arange(label.max() + 1) == label[used[np.argmin(off)]]
     else:
-        size = extents(mesh.position, label)
+        size = _extents(mesh.position, label)
         part = size < entry.size if entry.sign == "<" else size > entry.size
     return np.asarray(part[label[mesh.faces[:, 0]]])
 
 
-def extents(position: FloatArray, label: np.ndarray) -> FloatArray:
+def _extents(position: FloatArray, label: np.ndarray) -> FloatArray:
     """Returns the longest extent of the nodes of each label, in the unit of `position`."""
     low, high = (np.full((label.max() + 1, 3), start) for start in (np.inf, -np.inf))
     np.minimum.at(low, label, position)

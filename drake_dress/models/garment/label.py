@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -47,31 +47,36 @@ def with_openings(
     Raises:
         UserError: a loop is not found, or `up` or `facing` is the wrong axis.
     """
-    try:
+
+    def hanging(up: str, facing: str | None) -> dict[str, IntArray]:
         return _hanging(turned(position, up, facing), faces, named, source)
+
+    try:
+        return hanging(up, facing)
     except UserError as error:
-        keys = _keys_that_fit(position, faces, named, up, facing, source)
+        keys = _keys_that_fit(hanging, up, facing)
         if keys is None:
             raise
         raise UserError(source, error.key, f"{error.message}; with {keys} it would fit") from error
 
 
 def _keys_that_fit(
-    position: FloatArray,
-    faces: IntArray,
-    named: Mapping[str, IntArray],
-    up: str,
-    facing: str | None,
-    source: str,
+    hanging: Callable[[str, str | None], object], up: str, facing: str | None
 ) -> str | None:
-    """Returns the keys with which the garment hangs as expected; None if there are none."""
+    """Returns the keys with which the garment hangs as expected; None if there are none.
+
+    Args:
+        hanging: raises UserError if the garment does not hang with these axes.
+        up: axis that does not fit as the upper one.
+        facing: axis that does not fit as the one in front.
+    """
     usual = [(other, None) for other in AXES]
     others = [(other, axis) for other in AXES for axis in facings(other)[1:]]
     for other, axis in [*usual, *others]:
         if (other, axis or facings(other)[0]) == (up, facing or facings(up)[0]):
             continue
         try:
-            _hanging(turned(position, other, axis), faces, named, source)
+            hanging(other, axis)
         except UserError:
             continue
         changed = [] if other == up else [f"garment.mesh.up: {other}"]

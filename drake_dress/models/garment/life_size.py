@@ -70,22 +70,18 @@ def shoulder_width(position: FloatArray, loops: Mapping[str, IntArray]) -> float
     return float(np.linalg.norm(tips[0] - tips[1]))
 
 
-def check_life_size(
-    position: FloatArray, loops: Mapping[str, IntArray], scale: float, source: str
-) -> None:
+def check_life_size(width: float, scale: float, source: str) -> None:
     """Checks that a garment's shoulders are a person's.
 
     Args:
-        position: (n,3) with z up, m.
-        loops: with both armholes.
+        width: of the shoulders, m.
         scale: factor that was applied in addition to the unit.
         source: file put in front of messages.
 
     Raises:
         UserError: they are not.
     """
-    if not is_life_size(position, loops):
-        width = shoulder_width(position, loops)
+    if not is_life_size(width):
         low, high = _SHOULDERS
         raise UserError(
             source,
@@ -95,12 +91,12 @@ def check_life_size(
         )
 
 
-def is_life_size(position: FloatArray, loops: Mapping[str, IntArray]) -> bool:
-    """Returns whether a garment's shoulders, with armholes in `loops`, are a person's."""
+def is_life_size(width: float) -> bool:
+    """Returns whether shoulders of this width, m, are a person's."""
     low, high = _SHOULDERS
-    return low <= shoulder_width(position, loops) <= high
+    return low <= width <= high
 
 
-def adultness(position: FloatArray, loops: Mapping[str, IntArray]) -> float:
-    """Returns how far a garment's shoulders are from an adult's: 0 for the same, else more."""
-    return abs(float(np.log(shoulder_width(position, loops) / ADULT)))
+def from_adult(width: float) -> float:
+    """Returns how far shoulders of this width, m, are from an adult's, from 0."""
+    return abs(float(np.log(width / ADULT)))

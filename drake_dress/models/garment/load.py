@@ -12,7 +12,7 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, facings, turned
-from drake_dress.models.garment.chosen import by_measure, by_name, chosen
+from drake_dress.models.garment.chosen import Chosen, by_measure, by_name, chosen
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
 from drake_dress.models.garment.label import labelled, with_openings
 from drake_dress.models.garment.life_size import (
@@ -20,9 +20,9 @@ from drake_dress.models.garment.life_size import (
     AUTO,
     JACKET,
     UNITS,
-    adultness,
     check_diagonal,
     check_life_size,
+    from_adult,
     is_life_size,
     shoulder_width,
     units_that_fit,
@@ -43,6 +43,8 @@ SPACING_RANGE = (0.005, 0.1)  # m
 WELD_RANGE = (0.0, 0.02)  # m
 SCALE_RANGE = (1e-4, 1e4)  # files from a ten-thousandth of life size to 10,000 times life size
 
+# What is taken of a file, and what is left out.
+_Parts = tuple[Sequence[Chosen], Sequence[Chosen]]
 # Called with the current task and the fraction of it that is done.
 Progress = Callable[[str, float], None]
 
@@ -228,31 +230,32 @@ def read_garment(
     source = str(path)
     options.check(source)
     progress("reading the garment", 0.0)
-    take = chosen(options.take, "take", source)
-    leave_out = chosen(options.leave_out, "leave_out", source)
-    raw = by_name(read_mesh(Path(path)), take, leave_out).scaled(options.scale)
+    parts = chosen(options.take, "take", source), chosen(options.leave_out, "leave_out", source)
+    raw = by_name(read_mesh(Path(path)), *parts).scaled(options.scale)
     progress("checking the garment", 0.3)
-    if options.unit != AUTO:
-        whole = _checked(raw, options, progress)
-    else:
-        whole = _in_likely_unit(raw, options, progress)
-    check_life_size(whole.position, whole.loops, options.scale, source)
+    if options.unit == AUTO:
+        return _in_likely_unit(raw, parts, options, progress)
+    whole = _checked(raw, parts, options, progress)
+    check_life_size(shoulder_width(whole.position, whole.loops), options.scale, source)
     return whole
 
 
-def _in_likely_unit(raw: RawMesh, options: MeshOptions, progress: Progress) -> WholeGarment:
+def _in_likely_unit(
+    raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progress
+) -> WholeGarment:
     """Returns the garment in the unit in which its shoulders are most like an adult's."""
     used = raw.position[np.unique(raw.faces)]
     diagonal = max(float(np.linalg.norm(np.ptp(used, axis=0))), 1e-12)
-    found = {}
+    found = []
     for unit in units_that_fit(diagonal):
         with suppress(UserError):
-            whole = _checked(raw, replace(options, unit=unit), progress)
-            if is_life_size(whole.position, whole.loops):
-                found[unit] = whole
+            whole = _checked(raw, parts, replace(options, unit=unit), progress)
+            width = shoulder_width(whole.position, whole.loops)
+            if is_life_size(width):
+                found.append((unit, width, whole))
     if not found:
         # as large as a jacket: what is wrong with it besides its size is told
-        like = _checked(raw.scaled(JACKET / diagonal), replace(options, unit="m"), progress)
+        like = _checked(raw.scaled(JACKET / diagonal), parts, replace(options, unit="m"), progress)
         width = shoulder_width(like.position, like.loops) * diagonal / JACKET
         scale = f"garment.mesh.scale: {options.scale * ADULT / width:.2g}"
         raise UserError(
@@ -261,14 +264,13 @@ def _in_likely_unit(raw: RawMesh, options: MeshOptions, progress: Progress) -> W
             f"is auto, but in no unit the shoulders are a person's: they are {width:.3g} wide; "
             f"with garment.mesh.unit: m and {scale} they would be {ADULT} m wide",
         )
-    unit, best = min(found.items(), key=lambda item: adultness(item[1].position, item[1].loops))
-    width = shoulder_width(best.position, best.loops)
+    unit, width, best = min(found, key=lambda item: from_adult(item[1]))
     note = f"the unit is {unit}, in which the shoulders are {width:.2f} m wide"
     return replace(best, notes=(note, *best.notes))
 
 
-def _checked(raw: RawMesh, options: MeshOptions, progress: Progress) -> WholeGarment:
-    """Returns the garment of a mesh in the options' unit, times their scale."""
+def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progress) -> WholeGarment:
+    """Returns the garment of a mesh, to which the scale was applied, in the options' unit."""
     source, factor = raw.source, UNITS[options.unit]
     raw = duplicates_merged(raw.scaled(factor))
     # first check what holds in any unit, so that a stray node is not reported as a wrong unit
@@ -276,9 +278,7 @@ def _checked(raw: RawMesh, options: MeshOptions, progress: Progress) -> WholeGar
     diagonal = float(np.linalg.norm(np.ptp(raw.position, axis=0))) / factor
     check_diagonal(diagonal, options.unit, options.scale, source)
     raw = seams_sewn(raw, options.weld)
-    raw = by_measure(
-        raw, chosen(options.take, "take", source), chosen(options.leave_out, "leave_out", source)
-    )
+    raw = by_measure(raw, *parts)
     check_one_part(raw)
     raw, notes = mended(raw)
     if notes:

@@ -88,12 +88,13 @@ def _cut_apart(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
             f"not manifold: {many.sum()} of {len(many)} edges belong to more than two faces, the "
             f"first joins {_ends(mesh, edges, int(np.argmax(many)))}; expected one layer of cloth",
         )
-    sheets = _split(mesh, edges.pairs())
-    area = face_areas(mesh.position, mesh.faces)
-    sheet = components(sheets.faces, len(sheets.position))[sheets.faces[:, 0]]
-    size = np.bincount(sheet, area)[sheet] / area.sum()
-    joined = np.concatenate([edges.pairs(), edges.smoothest(mesh.position, mesh.faces, size)])
-    result = _split(mesh, joined)
+    result = _split(mesh, edges, edges.pairs())
+    if many.any():
+        area = face_areas(mesh.position, mesh.faces)
+        sheet = components(result.faces, len(result.position))[result.faces[:, 0]]
+        size = np.bincount(sheet, area)[sheet] / area.sum()
+        smoothest = edges.smoothest(mesh.position, mesh.faces, size)
+        result = _split(mesh, edges, np.concatenate([edges.pairs(), smoothest]))
     added = len(result.position) - len(mesh.position)
     if not added:
         return mesh, []
@@ -223,9 +224,8 @@ class _Edges:
         return np.array(kept, dtype=np.int64).reshape(-1, 2)
 
 
-def _split(mesh: RawMesh, joined: IndexArray) -> RawMesh:
+def _split(mesh: RawMesh, edges: _Edges, joined: IndexArray) -> RawMesh:
     """Returns the mesh with a node for each fan of faces that pairs (p,2) of half-edges join."""
-    edges = _Edges.of(mesh.faces, len(mesh.position))
     count, n = len(mesh.faces), len(mesh.position)
     rows: list[IndexArray] = []
     columns: list[IndexArray] = []

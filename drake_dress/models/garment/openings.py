@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
+from drake_dress.models.garment.files.raw import place
 from drake_dress.models.garment.mesh import loop_length
 from drake_dress.models.sides import SIDES
 
@@ -87,17 +88,13 @@ def check_neck_and_hem(
     if upper and lower:
         return
     missing = "for the head" if lower else "at the hem" if upper else "for head and hem"
+    left, right = (place(position[loops[f"{side}_cuff"]].mean(axis=0)) for side in SIDES)
     raise UserError(
         source,
         "loops",
-        f"there is no opening {missing} besides two at ({_place(position, loops['left_cuff'])}) "
-        f"and ({_place(position, loops['right_cuff'])}) m, with +x forward and +y to the left: are "
-        "these trousers? expected a garment with two sleeves",
+        f"there is no opening {missing} besides two{left} and{right}, with +x forward and +y to "
+        "the left: are these trousers? expected a garment with two sleeves",
     )
-
-
-def _place(position: FloatArray, loop: IntArray) -> str:
-    return ", ".join(f"{x:.2f}" for x in position[loop].mean(axis=0))
 
 
 def find_armhole(

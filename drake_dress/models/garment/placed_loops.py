@@ -11,19 +11,18 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.cut import cut_along, plane_line, shortest_line
 from drake_dress.models.garment.edges import boundary_loops
+from drake_dress.models.garment.files.text import TRIPLE
+from drake_dress.models.garment.merge import gap_between
 from drake_dress.models.garment.mesh import loop_length
 from drake_dress.models.garment.openings import CUFF_GIRTH
 
-_NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
-_TRIPLE = rf"\({_NUMBER},{_NUMBER},{_NUMBER}\)"
-_NEAR = re.compile(rf"near\s*{_TRIPLE}\s*(?:m)?")
-_PLANE = re.compile(rf"plane\s*{_TRIPLE}\s*(?:m)?\s*,\s*{_TRIPLE}")
+_NEAR = re.compile(rf"near\s*{TRIPLE}\s*(?:m)?")
+_PLANE = re.compile(rf"plane\s*{TRIPLE}\s*(?:m)?\s*,\s*{TRIPLE}")
 _FARTHEST = 0.1  # of a point from the garment, m
 
 
@@ -75,7 +74,7 @@ def placed_loops(
 
 
 def _check_near(position: FloatArray, point: FloatArray, key: str, source: str) -> None:
-    off = float(KDTree(position).query(point)[0])
+    off = gap_between(position, point[None])
     if off > _FARTHEST:
         low, high = position.min(axis=0).round(2).tolist(), position.max(axis=0).round(2).tolist()
         raise UserError(
