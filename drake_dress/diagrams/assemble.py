@@ -9,6 +9,7 @@ from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
 
 from drake_dress.diagrams.arms import ArmSetup
+from drake_dress.diagrams.confirmation import Confirmation
 from drake_dress.diagrams.dressing import Dressing, make_dressing
 from drake_dress.diagrams.hardware_station import (
     at_start,
@@ -35,6 +36,7 @@ from drake_dress.models.control.local_problem import LocalProblem
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.garment.transfer import barycentric_transfer
 from drake_dress.report.log_writer import RunLogWriter
+from drake_dress.systems.release_gate import confirmed_at_once
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,9 @@ def hardware_parts(
     # Subscriptions from Python live as long as their bus, so the run opens a new one without any.
     heard = listen(p, open_bus(p.links.lcm_url), told, stopped)
     robots = at_start(p, planned, heard.joints)
-    station = make_hardware_station(p, open_bus(p.links.lcm_url), person, robots, heard)
+    asks = setup.scenario.station.hardware.release == "confirm"
+    confirm = Confirmation(page=page) if asks else confirmed_at_once
+    station = make_hardware_station(p, open_bus(p.links.lcm_url), person, robots, heard, confirm)
     return Parts(setup, station, policy, page, own=own)
 
 

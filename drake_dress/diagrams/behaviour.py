@@ -1,7 +1,7 @@
 """The person's behaviour: arms on springs, arms that follow the garment, or motions of its own.
 
     PassivePerson | ActivePerson ──set-point──▶ ArmMuscles ──┐
-                       dummy: constant tone ────────────────┴▶ (+ HandTremor) ──▶ plant
+                       dummy: constant tone ────────────────┴▶ (+ HandTremor, ArmStirring) ──▶ plant
     ActivePerson | zeros ──intent──▶ log
 
 The controller receives none of this.
@@ -14,18 +14,23 @@ from typing import Literal
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, LeafSystem, OutputPort
-from pydrake.systems.primitives import Adder, ConstantVectorSource
+from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain
 
-from drake_dress.diagrams.person import Person
+from drake_dress.diagrams.person import Person, angles_of
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.arm import Arms
+from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Turn
-from drake_dress.models.human.tremor import TremorParameters, tremor_torque
+from drake_dress.models.human.stirring import DRIVE, StirringParameters
+from drake_dress.models.human.tremor import TremorParameters, driving_torque, tremor_torque
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.active_person import ActivePerson
+from drake_dress.systems.arm_lowering import ArmLowering
 from drake_dress.systems.arm_muscles import ArmMuscles
+from drake_dress.systems.arm_stirring import ArmStirring
 from drake_dress.systems.hand_tremor import HandTremor
 from drake_dress.systems.passive_person import PassivePerson
 
@@ -45,6 +50,8 @@ class Behaviour:
         motions: of an active person.
         tremor: of any kind of person; None for steady hands.
         seed: of the tremor.
+        lowering: of the arms once both sleeves are on. A dummy's arms are lowered by somebody.
+        stirring: small motions once the coat is let go.
     """
 
     kind: Kind = "dummy"
@@ -52,6 +59,8 @@ class Behaviour:
     motions: tuple[Motion, ...] = ()
     tremor: TremorParameters | None = None
     seed: int = 0
+    lowering: Lowering = Lowering()
+    stirring: StirringParameters = StirringParameters()
 
     @property
     def turns(self) -> bool:
@@ -67,7 +76,8 @@ def add_behaviour(
     behaviour: Behaviour,
     mesh: GarmentMesh,
     garment_position: OutputPort,
-) -> OutputPort:
+    grippers_open: OutputPort,
+) -> tuple[OutputPort, InputPort | None]:
     """Adds the systems that move the person, wired to the plant.
 
     Args:
@@ -78,23 +88,38 @@ def add_behaviour(
         behaviour: of the person.
         mesh: the true garment.
         garment_position: port (3n,) of the true garment, m.
+        grippers_open: port (1,): 1 once the grippers have let go.
 
     Returns:
-        A port (2,): 1 if the left, the right arm moves by the person's own will, else 0.
+        A port (2,): 1 if the left, the right arm moves by the person's own will, else 0; and the
+        input (1,) that tells the person to lower the arms, None if that has no effect.
     """
     will: LeafSystem | None = None
+    lowering = None
+    if behaviour.lowering.duration > 0.0:
+        pose = np.clip(angles_of(behaviour.lowering.pose), *np.moveaxis(arms.limits, 1, 0))
+        lowering = builder.AddNamedSystem(
+            "arm_lowering", ArmLowering(pose, behaviour.lowering.duration, plant.time_step())
+        )
     if behaviour.kind == "dummy":
         source: LeafSystem = ConstantVectorSource(person.tone_torque(plant))
         force = builder.AddSystem(source).get_output_port()
+        if lowering is not None:
+            force = _lowered_dummy(builder, plant, person, arms, lowering, force)
     else:
-        force, will = _muscles(builder, plant, person, arms, behaviour, mesh, garment_position)
+        force, will = _muscles(
+            builder, plant, person, arms, behaviour, mesh, garment_position, lowering
+        )
     if behaviour.tremor is not None and behaviour.tremor.amplitude > 0.0:
         force = _trembling(builder, plant, person, arms, behaviour, force)
+    if behaviour.stirring.amplitude > 0.0:
+        force = _stirring(builder, plant, person, arms, behaviour.stirring, force, grippers_open)
     builder.Connect(force, plant.get_applied_generalized_force_input_port())
+    told = None if lowering is None else lowering.GetInputPort("told")
     if will is not None and will.HasOutputPort("intent"):
-        return will.GetOutputPort("intent")
+        return will.GetOutputPort("intent"), told
     none = builder.AddNamedSystem("no_intent", ConstantVectorSource(np.zeros(len(SIDES))))
-    return none.get_output_port()
+    return none.get_output_port(), told
 
 
 def _muscles(
@@ -105,6 +130,7 @@ def _muscles(
     behaviour: Behaviour,
     mesh: GarmentMesh,
     garment_position: OutputPort,
+    lowering: ArmLowering | None,
 ) -> tuple[OutputPort, LeafSystem]:
     """Returns the port of the muscles' forces, and the system that outputs their set-points."""
     own, dofs = person.own_dofs(plant), person.arm_dofs(plant)
@@ -128,17 +154,53 @@ def _muscles(
         )
     builder.AddNamedSystem(f"{behaviour.kind}_person", will)
     builder.Connect(plant.get_state_output_port(person.model), will.GetInputPort("person_state"))
-    builder.Connect(will.GetOutputPort("set_point"), muscles.GetInputPort("set_point"))
+    rates = ["set_point_rate"] if behaviour.kind == "active" else []
+    for name in ("set_point", *rates):
+        if lowering is None:
+            builder.Connect(will.GetOutputPort(name), muscles.GetInputPort(name))
+        else:
+            builder.Connect(will.GetOutputPort(name), lowering.GetInputPort(name))
+    if lowering is not None:
+        _drive(builder, lowering, muscles)
     if behaviour.kind == "active":
         builder.Connect(garment_position, will.GetInputPort("garment_position"))
-        builder.Connect(
-            will.GetOutputPort("set_point_rate"), muscles.GetInputPort("set_point_rate")
-        )
     if person.turns:
         builder.Connect(
             will.GetOutputPort("stance"), plant.get_desired_state_input_port(person.model)
         )
     return muscles.get_output_port(), will
+
+
+def _drive(builder: DiagramBuilder, lowering: ArmLowering, muscles: ArmMuscles) -> None:
+    """Makes muscles follow the lowered set-point."""
+    for name in ("set_point", "set_point_rate"):
+        builder.Connect(lowering.GetOutputPort(f"lowered_{name}"), muscles.GetInputPort(name))
+
+
+def _lowered_dummy(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    person: Person,
+    arms: Arms,
+    lowering: ArmLowering,
+    force: OutputPort,
+) -> OutputPort:
+    """Returns a dummy's `force` plus that which lowers its arms; 0 until it is told to.
+
+    It is the difference between the muscles' forces at the lowered set-point and at rest.
+    """
+    parts = []
+    rest = builder.AddSystem(ConstantVectorSource(arms.rest.ravel()))
+    builder.Connect(rest.get_output_port(), lowering.GetInputPort("set_point"))
+    for name in ("lowering_muscles", "resting_muscles"):
+        muscles = ArmMuscles(arms, plant.num_velocities(), person.arm_dofs(plant))
+        parts.append(builder.AddNamedSystem(name, muscles))
+    _drive(builder, lowering, parts[0])
+    builder.Connect(rest.get_output_port(), parts[1].GetInputPort("set_point"))
+    minus = builder.AddSystem(Gain(-1.0, plant.num_velocities()))
+    builder.Connect(parts[1].get_output_port(), minus.get_input_port())
+    change = _added(builder, parts[0].get_output_port(), minus.get_output_port())
+    return _added(builder, force, change)
 
 
 def _trembling(
@@ -151,21 +213,7 @@ def _trembling(
 ) -> OutputPort:
     """Returns `force` with the tremor's torques added."""
     assert behaviour.tremor is not None
-    dofs = person.arm_dofs(plant)
-    mass = plant.CalcMassMatrix(plant.CreateDefaultContext())
-    torque = []
-    for i, arm in enumerate(arms.arms):
-        mine, rest = dofs[4 * i : 4 * i + 4], arms.rest[i]
-        stiffness = np.diag(arms.stiffness) + arm.gravity_stiffness(rest)
-        torque.append(
-            tremor_torque(
-                behaviour.tremor,
-                mass[np.ix_(mine, mine)],
-                arms.damping,
-                stiffness,
-                arm.jacobian(rest),
-            )
-        )
+    torque = [tremor_torque(behaviour.tremor, *of_arm) for of_arm in _swinging(plant, person, arms)]
     tremor = builder.AddNamedSystem(
         "hand_tremor",
         HandTremor(
@@ -173,10 +221,57 @@ def _trembling(
             behaviour.tremor.frequency,
             behaviour.seed,
             plant.num_velocities(),
-            dofs,
+            person.arm_dofs(plant),
         ),
     )
-    both = builder.AddSystem(Adder(2, plant.num_velocities()))
-    builder.Connect(force, both.get_input_port(0))
-    builder.Connect(tremor.get_output_port(), both.get_input_port(1))
+    return _added(builder, force, tremor.get_output_port())
+
+
+def _stirring(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    person: Person,
+    arms: Arms,
+    p: StirringParameters,
+    force: OutputPort,
+    grippers_open: OutputPort,
+) -> OutputPort:
+    """Returns `force` with the torques added by which a dressed person stirs."""
+    torque = [
+        driving_torque(DRIVE, p.amplitude, p.frequency, *of_arm)
+        for of_arm in _swinging(plant, person, arms)
+    ]
+    stirring = builder.AddNamedSystem(
+        "arm_stirring",
+        ArmStirring(
+            np.concatenate(torque),
+            p.frequency,
+            plant.num_velocities(),
+            person.arm_dofs(plant),
+            plant.time_step(),
+        ),
+    )
+    builder.Connect(grippers_open, stirring.get_input_port())
+    return _added(builder, force, stirring.get_output_port())
+
+
+def _swinging(
+    plant: MultibodyPlant, person: Person, arms: Arms
+) -> list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
+    """Returns mass, damping, stiffness and hand's Jacobian of each arm at rest."""
+    dofs = person.arm_dofs(plant)
+    mass = plant.CalcMassMatrix(plant.CreateDefaultContext())
+    found = []
+    for i, arm in enumerate(arms.arms):
+        mine, rest = dofs[4 * i : 4 * i + 4], arms.rest[i]
+        stiffness = np.diag(arms.stiffness) + arm.gravity_stiffness(rest)
+        found.append((mass[np.ix_(mine, mine)], arms.damping, stiffness, arm.jacobian(rest)))
+    return found
+
+
+def _added(builder: DiagramBuilder, first: OutputPort, second: OutputPort) -> OutputPort:
+    """Returns a port with the sum of two ports."""
+    both = builder.AddSystem(Adder(2, first.size()))
+    builder.Connect(first, both.get_input_port(0))
+    builder.Connect(second, both.get_input_port(1))
     return both.get_output_port()

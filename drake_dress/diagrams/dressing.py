@@ -119,6 +119,10 @@ def _add_controllers(w: Wiring, control: ControlSetup) -> _Controllers:
     governor = add_governor(w, control)
     wire_governor(w, planning.requests, governor)
     arms = command_grippers(w, control, governor)
+    w.connect(planning.mpc, "release", w.station, "release")
+    w.connect(w.station, "grippers_open", planning.mpc, "grippers_open")
+    if w.station.HasInputPort("cue"):
+        w.connect(planning.mpc, "cue", w.station, "cue")
     return _Controllers(planning.mpc, planning.requests, governor, arms, planning.forecast)
 
 

@@ -5,6 +5,7 @@
     GARMENT_ESTIMATE              lcmt_point_cloud     nodes of the controller's garment, m, m/s
     PERSON_ESTIMATE               lcmt_point_cloud     shoulder, elbow, hand of left, then right, m
     CAMERA_<NAME>                 lcmt_image_array     images of each camera
+    GRIPPER_COMMAND_…, GRIPPER_STATUS_…, PERSON_CUE    see `end_messages.py`
 
 `drake-dress sim-station` sends and receives the same messages. Each source is supervised; see
 `models/supervision/`.
@@ -28,6 +29,12 @@ from pydrake.systems.lcm import LcmInterfaceSystem, LcmPublisherSystem, LcmSubsc
 from pydrake.systems.sensors import LcmImageArrayToImages
 
 from drake_dress.diagrams.arms import ArmSetup
+from drake_dress.diagrams.end_messages import (
+    are_open,
+    export_cue,
+    export_release,
+    status_decoders,
+)
 from drake_dress.diagrams.person import Person
 from drake_dress.diagrams.station import ARM_STATUS, Station
 from drake_dress.models.arm.chain import SerialArm
@@ -52,6 +59,7 @@ from drake_dress.systems.lcm_inbox import (
     stamp,
 )
 from drake_dress.systems.point_messages import PointReceiver, decode_points
+from drake_dress.systems.release_gate import Confirm, confirmed_at_once
 from drake_dress.systems.station_watch import StationWatch
 from drake_dress.systems.status_messages import StatusCheck
 
@@ -71,6 +79,8 @@ class Links:
         status, command: channels of the arms; _LEFT and _RIGHT are appended.
         garment, person: channels of the estimates.
         camera: channels of images; _NAME is appended.
+        gripper_command, gripper_status: channels of the grippers; _LEFT and _RIGHT are appended.
+        cue: channel of the cue that both sleeves are on.
         command_period: s. command_offset: time of the first command, s.
     """
 
@@ -80,12 +90,19 @@ class Links:
     garment: str
     person: str
     camera: str
+    gripper_command: str
+    gripper_status: str
+    cue: str
     command_period: float
     command_offset: float = 0.001
 
     def of_arm(self, kind: str, side: str) -> str:
-        """Returns the channel of an arm's `kind`, status or command."""
+        """Returns the channel of an arm's or gripper's `kind`, such as status."""
         return f"{getattr(self, kind)}_{side.upper()}"
+
+    def of_grippers(self, kind: str) -> dict[str, str]:
+        """Returns the channels of both grippers' `kind`, command or status, by side."""
+        return {side: self.of_arm(f"gripper_{kind}", side) for side in SIDES}
 
     def of_camera(self, name: str) -> str:
         """Returns the channel of a camera."""
@@ -230,8 +247,16 @@ def _image_finding(message: Any) -> Finding:
     return Finding(Fault.WRONG_SIZE, "no image, or an empty one")
 
 
-def _sources(p: HardwareParameters) -> dict[str, _Source]:
-    """Returns the sources of one listener; their checks remember the messages that it received."""
+def _sources(
+    p: HardwareParameters, released: Callable[[], bool] = lambda: False
+) -> dict[str, _Source]:
+    """Returns the sources of one listener; their checks remember the messages that it received.
+
+    Args:
+        p: parameters of the station.
+        released: returns whether the grippers have let go, so that the garment need not follow
+            them any more.
+    """
     arms = {
         f"{side}_arm": _Source(
             p.links.of_arm("status", side),
@@ -243,6 +268,8 @@ def _sources(p: HardwareParameters) -> dict[str, _Source]:
     }
 
     def grippers() -> FloatArray | None:
+        if released():
+            return None
         statuses = [source.decoder.usable for source in arms.values()]
         if any(status is None for status in statuses):
             return None
@@ -421,7 +448,12 @@ def at_start(p: HardwareParameters, planned: ArmSetup, joints: FloatArray) -> Ar
 
 
 def make_hardware_station(
-    p: HardwareParameters, lcm: DrakeLcm, person: Person, robots: ArmSetup, heard: Heard
+    p: HardwareParameters,
+    lcm: DrakeLcm,
+    person: Person,
+    robots: ArmSetup,
+    heard: Heard,
+    confirm: Confirm = confirmed_at_once,
 ) -> HardwareStation:
     """Returns a station that exchanges messages with arms and trackers of garment and person.
 
@@ -431,10 +463,13 @@ def make_hardware_station(
         person: as the scenario describes it.
         robots: the arms at their measured joint angles.
         heard: first messages of the sources.
+        confirm: returns whether the grippers may open.
     """
     builder = DiagramBuilder()
     bus = builder.AddNamedSystem("lcm", LcmInterfaceSystem(lcm))
-    sources = _sources(p)
+    commands, statuses = p.links.of_grippers("command"), p.links.of_grippers("status")
+    fingers = status_decoders(statuses)
+    sources = _sources(p, partial(are_open, fingers))
     watch = _add_watch(builder, p, sources)
     inboxes = _add_inboxes(builder, bus, sources, watch)
     builder.ExportOutput(watch.GetOutputPort("permission"), "permission")
@@ -445,6 +480,8 @@ def make_hardware_station(
         _wire_gripper(builder, side, watch, measure)
     meter = _add_meter(builder, p.links, inboxes)
     _export_estimates(builder, inboxes, heard)
+    export_release(builder, bus, commands, statuses, fingers, confirm)
+    export_cue(builder, bus, p.links.cue)
     for name in p.cameras:
         _wire_camera(builder, bus, name, sources[f"camera_{name}"])
     diagram = builder.Build()

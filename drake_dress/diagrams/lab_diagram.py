@@ -19,6 +19,11 @@ from pydrake.systems.lcm import (
 )
 
 from drake_dress.diagrams.cameras import Camera
+from drake_dress.diagrams.end_messages import (
+    receive_cue,
+    receive_release,
+    send_gripper_status,
+)
 from drake_dress.diagrams.hardware_station import control_modes
 from drake_dress.diagrams.sections.hardware import links
 from drake_dress.diagrams.setup import Setup
@@ -88,6 +93,7 @@ def make_lab(
     for side in SIDES:
         make.receive_commands(side)
         make.send_status(side)
+    make.receive_end()
     garment = [make.station.GetOutputPort(f"estimate.garment_{q}") for q in MOTION]
     make.send_points("garment", len(setup.garments.belief.rest_position), garment)
     make.send_points("person", 6, [make.noisy_person()])
@@ -169,6 +175,16 @@ class _LabMaker(Wiring):
             StatusOutbox,
         )
         self.connect(self.station, f"cheat_{side}_arm_stop", outbox, "stop")
+
+    def receive_end(self) -> None:
+        """Receives cue and commands to open the grippers, and sends the grippers' status."""
+        commands, statuses = (self.links.of_grippers(kind) for kind in ("command", "status"))
+        receive_release(self.builder, self.bus, commands, self.station.GetInputPort("release"))
+        opened = self.station.GetOutputPort("grippers_open")
+        send_gripper_status(self.builder, self.bus, statuses, opened)
+        if self.station.HasInputPort("cue"):
+            cue = self.station.GetInputPort("cue")
+            receive_cue(self.builder, self.bus, self.links.cue, cue)
 
     def noisy_person(self) -> OutputPort:
         """Returns the person's points as a tracker would report them."""

@@ -236,7 +236,7 @@ def person_arms(
     measures: BodyMeasures, posture: Posture, arms: dict[Side, ArmPose], joints: JointParameters
 ) -> Arms:
     """Returns the model of both arms that `add_person` makes from the same values."""
-    rest = np.array([_angles(arms[side]) for side in SIDES])
+    rest = np.array([angles_of(arms[side]) for side in SIDES])
     limits = np.array([getattr(joints, f"{name}_limits") for name in JOINT_NAMES]).T
     left, right = (Arm(measures, posture, side) for side in SIDES)
     return Arms(
@@ -257,7 +257,8 @@ def person_model(body: BodyMeasures, stance: Posture, person: Person) -> PersonM
     )
 
 
-def _angles(pose: ArmPose) -> list[float]:
+def angles_of(pose: ArmPose) -> list[float]:
+    """Returns abduction, extension, rotation and elbow of a pose, rad, as the joints' order."""
     return [pose.abduction, pose.extension, pose.rotation, pose.elbow_flexion]
 
 

@@ -47,9 +47,7 @@ from drake_dress.report.summary import summarize, write_summary
 from drake_dress.report.web_page import open_page
 
 DONE, NOT_DRESSED = 0, 1
-# Simulated time between checks of the stages, and time for which both sleeves must stay done, s.
-_CHUNK = 0.1
-_STAY = 1.0
+_CHUNK = 0.1  # simulated time between checks of the stages, s
 
 
 @dataclass(frozen=True)
@@ -187,7 +185,7 @@ def _simulate(
     realtime_rate: float,
     interrupt: Interrupt,
 ) -> Ending:
-    """Runs until both sleeves have stayed done for a while, time is up, or a fault ends it."""
+    """Runs until the dressing has been finished for a while, time is up, or a fault ends it."""
     simulator.set_target_realtime_rate(realtime_rate)
     station = dressing.station
     station.make_ready(partial(dressing.rehearse, stopped=interrupt.is_set))
@@ -229,7 +227,7 @@ def _simulate(
                 print(f"{now:5.1f} s  left {names[0]}, right {names[1]}", file=sys.stderr)
             finished = dressing.mpc.is_finished(context)
             done_since = min(done_since, now) if finished else np.inf
-            if now - done_since >= _STAY:
+            if now - done_since >= dressing.mpc.watch_time:
                 break
         return Ending(interrupt.is_set(), fault, 0.0 if pace is None else pace.lost)
 

@@ -10,6 +10,9 @@ With arms:
 
 Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
 
+    inputs   release                                         (1,) > 0.5: both grippers are to open
+             cue                                             (1,) > 0.5: both sleeves are on, so
+                                                             the person may lower the arms
     outputs  {left,right}_gripper.position_measured          (3,) m
              {left,right}_gripper.velocity_measured          (3,) m/s
              {left,right}_gripper.force_measured             (3,) of the garment on the gripper, N
@@ -17,6 +20,7 @@ Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always
              estimate.joint_position                         (18,) of the person's arms, m
              NAME.color_image, NAME.depth_image              of each camera
              permission                                      (1,) 0: arms must come to rest
+             grippers_open                                   (1,) 1: both have let go
              cheat_garment_position, cheat_garment_velocity  (3n,)
              cheat_contact (n,), cheat_contact_force (3n,)
              cheat_joint_position                            (18,) of the person's arms
@@ -35,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,7 +49,7 @@ from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.diagrams.arms import (
@@ -68,12 +73,13 @@ from drake_dress.diagrams.person import (
 )
 from drake_dress.models.arm.clearance import Capsules
 from drake_dress.models.arm.panda import LIMITS
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
+from drake_dress.models.cloth.releasable import ReleasableCloth
 from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.control.person_model import person_capsules
@@ -264,7 +270,7 @@ def make_simulated_station(
         motion, load = _wire_tools(builder, plant, cloth, arms)
         forces = _joined(builder, forces, load)
     builder.Connect(forces, plant.get_applied_spatial_force_input_port())
-    intent = add_behaviour(
+    intent, told = add_behaviour(
         builder,
         plant,
         person,
@@ -272,9 +278,11 @@ def make_simulated_station(
         p.behaviour,
         p.mesh,
         cloth.GetOutputPort("garment_position"),
+        cloth.GetOutputPort("grippers_open"),
     )
     _connect_grippers(builder, cloth, motion, grippers, p)
     _export_measured(builder, measured)
+    _export_end(builder, cloth, told)
     if sight is not None:
         points = person.joint_points
         export_oracles(builder, cloth, plant, points, sight.transfer, p.effects, sight.period)
@@ -359,6 +367,14 @@ def _connect_grippers(
 def _export_measured(builder: DiagramBuilder, measured: _Ports) -> None:
     for (side, quantity), port in measured.items():
         builder.ExportOutput(port, f"{side}_gripper.{quantity}_measured")
+
+
+def _export_end(builder: DiagramBuilder, cloth: ClothPlant, told: InputPort | None) -> None:
+    """Exports the ports that are used once both sleeves are on."""
+    builder.ExportInput(cloth.GetInputPort("release"), "release")
+    builder.ExportOutput(cloth.GetOutputPort("grippers_open"), "grippers_open")
+    if told is not None:
+        builder.ExportInput(told, "cue")
 
 
 def _export_truth(
@@ -492,8 +508,13 @@ def robots_at_start(
     return setup
 
 
-def plant_integrator(p: StationParameters) -> Integrator:
-    """Returns the integrator of the plant's garment, which both grippers hold."""
+def plant_integrator(p: StationParameters) -> ReleasableCloth:
+    """Returns the integrator of the plant's garment, which both grippers hold or let go."""
+    return ReleasableCloth(partial(_integrator, p), p.mesh.held)
+
+
+def _integrator(p: StationParameters, held: IntArray) -> Integrator:
+    """Returns the integrator of the plant's garment with the nodes `held` prescribed."""
     settings: ImplicitSettings | ProjectiveSettings
     if p.integrator == "projective_dynamics":
         settings = ProjectiveSettings(quasi_newton=True)
@@ -504,7 +525,7 @@ def plant_integrator(p: StationParameters) -> Integrator:
             implicitness=p.implicitness,
             buckling_wavelength=p.buckling_wavelength,
         )
-    integrator = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings))
+    integrator = _with_effects(p, Scheme(held, p.time_step, settings))
     return LayeredCloth(integrator) if p.self_collision else integrator
 
 

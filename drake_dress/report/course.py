@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOR = {"left": "#0b7a5e", "right": "#b8453b"}
-_STAGE_SHADE = ("#eef1f4", "#dbe8f5", "#dff1e4")
+_STAGE_SHADE = ("#eef1f4", "#dbe8f5", "#dff1e4", "#f6ecd2", "#efe3f3")
 _LIMIT: dict[str, Any] = {"color": "#8a2b2b", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
@@ -189,7 +189,7 @@ def _draw_stages(log: RunLog, axes: list[Axes]) -> None:
                     log.time[j],
                     ymin=0.5 * (1 - k),
                     ymax=0.5 * (2 - k),
-                    color=_STAGE_SHADE[int(np.clip(log.stage[i, k], 0, 2))],
+                    color=_STAGE_SHADE[int(np.clip(log.stage[i, k], 0, len(_STAGE_SHADE) - 1))],
                     lw=0,
                     zorder=0,
                 )

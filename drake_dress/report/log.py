@@ -275,7 +275,7 @@ class RunLog:
 
     @cached_property
     def stage(self) -> IndexArray:
-        """(T,2) 0 prepare, 1 dress, 2 done; left, right."""
+        """(T,2) indices into `STAGE_NAMES`; left, right."""
         return np.asarray(self.file["/control/stage"], dtype=np.int64)
 
     @cached_property
@@ -298,6 +298,15 @@ class RunLog:
             return float(scenario["controller"]["global_mpc"]["delay"])
         except (yaml.YAMLError, KeyError, TypeError, ValueError):
             return None
+
+    @cached_property
+    def lets_go(self) -> bool:
+        """Whether the scenario asks to lay the coat and let it go; False for older logs."""
+        try:
+            controller = yaml.safe_load(self.scenario_text)["controller"]
+            return bool(controller["finish"]["release"]) and controller["method"] != "local"
+        except (yaml.YAMLError, KeyError, TypeError):
+            return False
 
     def solves(self, controller: str) -> IndexArray:
         """Returns (T,) number of solves of a controller since the previous sample.

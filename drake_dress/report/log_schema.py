@@ -33,7 +33,7 @@ ARM_SERIES = (
     ("v_peak", "rad/s"),
     ("torque_peak", "N m"),
 )
-STAGE_NAMES = ("prepare", "dress", "done")
+STAGE_NAMES = ("prepare", "dress", "done", "lay", "released")
 # How far ahead of a sample the logged forecast of the person is, s.
 FORECAST_AHEAD = 1.0
 INTENT_NAMES = (

@@ -106,7 +106,7 @@ class Sample:
         gripper_position: Side to (3,), m.
         gripper_force: Side to (3,) of the garment on the gripper, N.
         dressing: Side to (s, l in m, theta in rad).
-        stage: (2,) 0 prepare, 1 dress, 2 done; left, right.
+        stage: (2,) index into `STAGE_NAMES`; left, right.
         global_solve_time, local_solve_time: Duration of the last solve, s; NaN if none ended.
         global_solves, local_solves: Number of solves since the previous sample; None: 1 if there is
             a solve time, else 0.

@@ -86,7 +86,8 @@ class DressingScene:
 
     def show_stage(self, stage: npt.ArrayLike) -> None:
         """Writes the stages (2,) of left and right above the garment's first position."""
-        names = [STAGE_NAMES[int(np.clip(s, 0, 2))] for s in np.ravel(np.asarray(stage))]
+        last = len(STAGE_NAMES) - 1
+        names = [STAGE_NAMES[int(np.clip(s, 0, last))] for s in np.ravel(np.asarray(stage))]
         label = f"left: {names[0]}   right: {names[1]}"
         if label == self.label or self._label_at is None:
             return

@@ -25,6 +25,7 @@ from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arms import ArmMeasures, measure_arms
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
+from drake_dress.report.release import Release, ReleaseRules, judge_release
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class SuccessRules:
         min_arm_distance: Least distance between the arms, and of the arms without their hands to
             the person, at every sample, m. Joints must also stay within their limits of position,
             speed and torque.
+        release: Criteria after the grippers have let go.
     """
 
     min_s: float = 1.9
@@ -46,6 +48,7 @@ class SuccessRules:
     max_penetration: float = 5e-3
     max_edge_strain: float = 0.10
     min_arm_distance: float = 0.05
+    release: ReleaseRules = ReleaseRules()
 
 
 def summarize(
@@ -63,8 +66,11 @@ def summarize(
     over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` is the
     strain of the worst edge at its worst sample. `max_contact_force_N` is the largest force at one
     node, `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
-    time from which both sleeves stay on (s and linking number). `late_plans` is the share of the
-    global controller's solves that took longer than the modelled delay. `layers_crossed_at_end`
+    time from which both sleeves stay on (s and linking number) until the coat is laid. `stays_on`
+    is whether both are still on 3 s after the grippers have let go, None if they have not.
+    `collar_to_neck_m` is the final distance of the collar's back from the nape. `late_plans` is the
+    share of the global controller's solves that took longer than the modelled delay.
+    `layers_crossed_at_end`
     counts edges that pierce another layer. `safety_cut_s` gives, for each side and each flag that
     the safety governor raised, the total time of the samples with that flag; None if not logged.
     Hardware runs add `command_rate_hz`, `command_latency_ms` (from the sending of a status to the
@@ -83,10 +89,13 @@ def summarize(
     rules = rules or SuccessRules()
     m = measures if measures is not None else measure(log)
     arms = measure_arms(log)
-    reason = _reason(log, m, rules) or _arm_reason(log, arms, rules)
+    release = judge_release(log, m, rules.release)
+    reason = _reason(log, m, release, rules) or _arm_reason(log, arms, rules)
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
     summary |= _sleeve_figures(log, m)
-    summary |= _course_figures(log, m, rules, wall_time)
+    summary["stays_on"] = release.stays_on
+    summary["collar_to_neck_m"] = release.collar_to_neck
+    summary |= _course_figures(log, m, release.held, rules, wall_time)
     summary |= _solve_figures(log)
     summary["late_plans"] = _late_plans(log)
     summary["safety_cut_s"] = _safety_cuts(log)
@@ -116,7 +125,7 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     return summary
 
 
-def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
+def _reason(log: RunLog, m: Measures, release: Release, rules: SuccessRules) -> str | None:
     """Returns a sentence on the first broken rule, with its figure; None if there is none."""
     if log.ended_by is not None:
         return log.ended_by
@@ -125,22 +134,43 @@ def _reason(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     if not m.finite.all():
         t = log.time[np.argmin(m.finite)]
         return f"simulation diverged: positions or forces not finite at t = {t:.2f} s"
-    broken = _sleeve_that_is_off(log, m, rules) or _too_large_force(log, m, rules)
+    broken = (
+        _sleeve_that_is_off(log, m, release.held, rules)
+        or _not_let_go(log, release, rules)
+        or _too_large_force(log, m, rules)
+    )
     # penetration and strain of an estimate reflect errors of the estimate, so do not judge them
     return broken if broken or log.estimated else _damage(log, m, rules)
 
 
-def _sleeve_that_is_off(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
+def _sleeve_that_is_off(log: RunLog, m: Measures, held: int, rules: SuccessRules) -> str | None:
+    """Returns a sentence on a sleeve that is off when the coat is laid, after `held` samples."""
+    last = max(held, 1) - 1
     for side in SIDES:
-        s = log.dressing[side][-1, 0]
+        s = log.dressing[side][last, 0]
         if not s >= rules.min_s:
-            far = _to_shoulder(log, side)
+            far = _to_shoulder(log, side, last)
             short = "" if far is None else f", armhole {100.0 * far:.1f} cm from the shoulder"
             return f"{side} sleeve not on: s = {s:.2f} < {rules.min_s:g}{short}"
     for k, side in enumerate(SIDES):
-        linking = int(m.linking[-1, k])
+        linking = int(m.linking[last, k])
         if abs(linking) != 1:
             return f"{side} arm outside the sleeve: linking number {linking}"
+    return None
+
+
+def _not_let_go(log: RunLog, release: Release, rules: SuccessRules) -> str | None:
+    """Returns a sentence on a coat that was not let go, or does not stay on; None if it does."""
+    if not log.lets_go:
+        return None
+    collar, most = release.collar_to_neck, rules.release.max_collar_to_neck
+    off = "" if collar is None else f"collar {100.0 * collar:.1f} cm from the neck"
+    if release.opened is None:
+        return "the coat was not let go" + (f": {off}" if off else "")
+    if release.reason is not None:
+        return release.reason
+    if collar is not None and collar > most:
+        return f"{off}, expected at most {100.0 * most:g} cm"
     return None
 
 
@@ -183,12 +213,12 @@ def _sleeve_figures(log: RunLog, m: Measures) -> dict[str, Any]:
 
 
 def _course_figures(
-    log: RunLog, m: Measures, rules: SuccessRules, wall_time: float
+    log: RunLog, m: Measures, held: int, rules: SuccessRules, wall_time: float
 ) -> dict[str, Any]:
     """Returns times and the largest forces, strains and penetrations of the run."""
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
     on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
-    dressed = first_lasting(on.all(axis=1))
+    dressed = first_lasting(on.all(axis=1)[:held])
     duration = _duration(log)
     return {
         "dressing_time_s": None if dressed is None else float(log.time[dressed]),
@@ -228,13 +258,13 @@ def _duration(log: RunLog) -> float:
     return float(log.time[-1] - log.time[0]) if len(log) else 0.0
 
 
-def _to_shoulder(log: RunLog, side: Side) -> float | None:
-    """Returns the final distance of the armhole from the shoulder along the arm, m."""
+def _to_shoulder(log: RunLog, side: Side, sample: int = -1) -> float | None:
+    """Returns the distance of the armhole from the shoulder along the arm at a sample, m."""
     if not len(log):
         return None
-    s = log.dressing[side][-1, 0]
+    s = log.dressing[side][sample, 0]
     k = 3 * SIDES.index(side)
-    shoulder, elbow, hand = log.joint_position[len(log) - 1][k : k + 3]
+    shoulder, elbow, hand = log.joint_position[sample][k : k + 3]
     if not (np.isfinite(s) and np.isfinite([shoulder, elbow, hand]).all()):
         return None
     return ArmAxis(hand, elbow, shoulder).to_shoulder(float(s))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.detection import find_proximity
-from drake_dress.models.cloth.contact.grasp import Pressing, press
+from drake_dress.models.cloth.contact.grasp import Pressing, not_pressing, press
+from drake_dress.models.cloth.contact.modes import FREE, HELD
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.contact.wrenches import body_wrenches
 from drake_dress.models.cloth.layered import Integrator
@@ -44,6 +46,7 @@ class ClothPlant(LeafSystem):
         - left_gripper_velocity
         - right_gripper_position
         - right_gripper_velocity
+        - release (optional)
         output_ports:
         - garment_position
         - garment_velocity
@@ -52,11 +55,13 @@ class ClothPlant(LeafSystem):
         - left_gripper_force
         - right_gripper_force
         - person_forces
+        - grippers_open
 
     garment_position, garment_velocity: (3n,) row-major (n,3), m, m/s, world. contact: (n,) 0 none,
     1 stick, 2 slip. contact_force: (3n,) of the person on the garment, N. *_gripper_force: (3,)
     of the garment on the gripper, N. person_forces: list of ExternallyAppliedSpatialForce, one for
-    each body in contact. All outputs depend on discrete state only.
+    each body in contact. release: (1,) above 0.5 both grippers let go, for good. grippers_open:
+    (1,) whether they have. All outputs depend on discrete state only.
 
     Held cloth is displaced by a person who moves into it (`contact/grasp.py`).
 
@@ -122,6 +127,7 @@ class ClothPlant(LeafSystem):
         # force of the person on the held nodes, N
         self._pressing = self.DeclareDiscreteState(np.zeros(3 * held_count))
         self._mount = self.DeclareDiscreteState(MountState.at_rest(self._person.limb_count).flat())
+        self._open = self.DeclareDiscreteState([0.0])
         # surroundings of the step in progress; NaN before the first step
         self._around = self.DeclareDiscreteState(np.full(self._surroundings.size, np.nan))
 
@@ -137,6 +143,7 @@ class ClothPlant(LeafSystem):
             )
             for side in SIDES
         ]
+        self._release = self.DeclareVectorInputPort("release", 1)
 
     def _declare_outputs(self) -> None:
         """Declares the output ports, which depend on discrete state only."""
@@ -155,13 +162,17 @@ class ClothPlant(LeafSystem):
             self._calc_person_forces,
             ticket,
         )
+        self.DeclareVectorOutputPort("grippers_open", 1, self._calc(self._open), ticket)
 
     def obstacles(self, context: Context) -> Obstacles:
         """Returns the person's capsules in the world, from the body input ports."""
         return self._person.obstacles(self._poses.Eval(context), self._velocities.Eval(context))
 
     def rehearse(self, context: Context) -> None:
-        """Steps the garment in contact with the person, then flattened, to compile all kernels."""
+        """Steps the garment on the person, then flattened, held and let go.
+
+        This compiles all kernels and makes all factors.
+        """
         bodies = self.obstacles(context)
         if not bodies.count:
             return
@@ -179,8 +190,9 @@ class ClothPlant(LeafSystem):
         x[:, thin] = x[:, thin].mean() + _REHEARSED_FLATNESS * (x[:, thin] - x[:, thin].mean())
         flat = ClothState.at_rest(x)
         flat.tangled[: len(flat.x) // 2] = 1
-        self._steps.begin(flat, self._surroundings.flat(bodies, still))
-        self._steps.end()
+        for held in (still, still[:0]):
+            self._steps.begin(flat, self._surroundings.flat(bodies, held))
+            self._steps.end()
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         # between the end of a step and the start of the next, do only what cannot be done while a
@@ -188,6 +200,10 @@ class ClothPlant(LeafSystem):
         h = self.cloth.time_step
         target = np.stack([p.Eval(context) + h * v.Eval(context) for p, v in self._grip])
         bodies = self.obstacles(context)
+        lets_go = self._release.HasValue(context) and self._release.Eval(context)[0] > 0.5
+        if lets_go or self._are_open(context):
+            self._update_free(context, discrete, bodies)
+            return
         if self._mounts.rigid:
             taken, pressing = self._taken(target, bodies)
             after = self._stepped(context)
@@ -198,9 +214,33 @@ class ClothPlant(LeafSystem):
             taken, pressing = self._taken(target + mount.held, bodies)
             discrete.set_value(self._mount, mount.flat())
         velocity = (taken - after.x[self.cloth.held]) / h
-        around = self._surroundings.flat(bodies, velocity)
-        self._begin(after, around)
+        self._go_on(context, discrete, after, self._surroundings.flat(bodies, velocity), pressing)
 
+    def _update_free(self, context: Context, discrete: DiscreteValues, bodies: Obstacles) -> None:
+        """Updates the state once the grippers have let go."""
+        after = _let_go(self._stepped(context))
+        if not self._mounts.rigid:
+            mount = self._mounted(context, after)
+            bodies = displaced(bodies, self._person.limb_of, mount.limb, mount.limb_rate)
+            discrete.set_value(self._mount, mount.flat())
+        discrete.set_value(self._open, [1.0])
+        around = self._surroundings.flat(bodies, np.zeros((0, 3)))
+        self._go_on(context, discrete, after, around, not_pressing(len(self.cloth.held)))
+
+    def _are_open(self, context: Context) -> bool:
+        """Returns whether both grippers have let go."""
+        return bool(context.get_discrete_state(self._open).value()[0] > 0.5)
+
+    def _go_on(
+        self,
+        context: Context,
+        discrete: DiscreteValues,
+        after: ClothState,
+        around: FloatArray,
+        pressing: Pressing,
+    ) -> None:
+        """Starts the next step, from `after` and with `around`, and stores the state."""
+        self._begin(after, around)
         discrete.set_value(self._around, around)
         discrete.set_value(self._x, after.x.ravel())
         discrete.set_value(self._v, after.v.ravel())
@@ -265,6 +305,8 @@ class ClothPlant(LeafSystem):
     def _mounted(self, context: Context, state: ClothState) -> MountState:
         """Returns the deflection of grippers and limbs at the end of this step."""
         pulled = [-state.reaction[self.cloth.held[self._side == i]].sum(axis=0) for i in (0, 1)]
+        if self._are_open(context):
+            pulled = [np.zeros(3), np.zeros(3)]
         mount = MountState.of(context.get_discrete_state(self._mount).value())
         force = limb_forces(self._person.limb_of, len(mount.limb), state.owner, state.reaction)
         h = self.cloth.time_step
@@ -291,15 +333,19 @@ class ClothPlant(LeafSystem):
 
     def _calc_contact_force(self, context: Context, output: BasicVector) -> None:
         reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3).copy()
-        reaction[self.cloth.held] = (
-            context.get_discrete_state(self._pressing).value().reshape(-1, 3)
-        )
+        if not self._are_open(context):
+            reaction[self.cloth.held] = (
+                context.get_discrete_state(self._pressing).value().reshape(-1, 3)
+            )
         output.SetFromVector(reaction.ravel())
 
     def _calc_gripper_force(self, side: int) -> Callable[[Context, BasicVector], None]:
         nodes = self.cloth.held[self._side == side]
 
         def calc(context: Context, output: BasicVector) -> None:
+            if self._are_open(context):
+                output.SetFromVector(np.zeros(3))
+                return
             reaction = context.get_discrete_state(self._reaction).value().reshape(self._n, 3)
             pressing = context.get_discrete_state(self._pressing).value().reshape(-1, 3)
             pulled = -reaction[nodes].sum(axis=0)
@@ -325,3 +371,13 @@ def _after(bodies: Obstacles, h: float) -> Obstacles:
     """Returns the capsules `h` s later, with zero velocity."""
     end = bodies.velocity + np.cross(bodies.angular_velocity, bodies.b - bodies.a)
     return Obstacles.resting(bodies.a + h * bodies.velocity, bodies.b + h * end, bodies.radius)
+
+
+def _let_go(state: ClothState) -> ClothState:
+    """Returns the state without the grippers' forces on the nodes that they held so far."""
+    held = state.mode == HELD
+    if not held.any():
+        return state
+    mode, reaction = state.mode.copy(), state.reaction.copy()
+    mode[held], reaction[held] = FREE, 0.0
+    return replace(state, mode=mode, reaction=reaction)

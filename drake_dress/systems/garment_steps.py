@@ -46,19 +46,27 @@ class Surroundings:
     @property
     def size(self) -> int:
         """Size of the array."""
-        return 12 * len(self.radius) + 3 * self.held_count
+        return 12 * len(self.radius) + 3 * self.held_count + 1
 
     def flat(self, capsules: Obstacles, held_velocity: FloatArray) -> FloatArray:
-        """Returns the array of `size` that packs capsules and the held nodes' velocities (k,3)."""
+        """Returns the array of `size` that packs capsules and the held nodes' velocities (k,3).
+
+        The velocities are (0,3) once the nodes are let go.
+        """
         c = capsules
-        parts = (c.a, c.b, c.velocity, c.angular_velocity, held_velocity)
+        held = np.zeros((self.held_count, 3))
+        is_holding = len(held_velocity) > 0
+        if is_holding:
+            held[:] = held_velocity
+        parts = (c.a, c.b, c.velocity, c.angular_velocity, held, np.array([float(is_holding)]))
         return np.concatenate([p.ravel() for p in parts])
 
     def of(self, flat: FloatArray) -> tuple[Obstacles, FloatArray]:
-        """Returns the capsules and held velocities (k,3) packed in an array."""
+        """Returns the capsules and held velocities (k,3), or (0,3), packed in an array."""
         end = 12 * len(self.radius)
         a, b, velocity, omega = flat[:end].reshape(4, -1, 3)
-        return Obstacles(a, b, self.radius, velocity, omega), flat[end:].reshape(-1, 3)
+        held = flat[end:-1].reshape(-1, 3)
+        return Obstacles(a, b, self.radius, velocity, omega), held if flat[-1] > 0.5 else held[:0]
 
 
 class Steps(Protocol):

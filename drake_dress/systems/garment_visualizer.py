@@ -28,7 +28,7 @@ class GarmentVisualizer(LeafSystem):
         output_ports: []
 
     garment_position: (3n,) row-major (n,3), m. targets: (6,) target positions of the left and
-    the right armhole, m; NaN hides one. stage: (2,) 0 prepare, 1 dress, 2 done; written above
+    the right armhole, m; NaN hides one. stage: (2,) index into `STAGE_NAMES`; written above
     the garment. gripper_position: (6,) left, right, m. forecast: a `Forecast`, of which
     elbows and hands `FORECAST_AHEAD` from now are drawn. All in the world frame. The person is
     drawn by Drake's MeshcatVisualizer.

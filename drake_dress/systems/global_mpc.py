@@ -15,6 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import Decision, DressingPolicy, PolicyState
+from drake_dress.models.dressing.finish import Phase
 from drake_dress.models.dressing.stages import Stage
 from drake_dress.models.immutable import Immutable
 from drake_dress.systems.worker_process import WorkerProcess
@@ -23,6 +24,8 @@ from drake_dress.systems.worker_process import WorkerProcess
 _LOOKING_PERIOD = 0.01
 # Polling period for the request to stop a rehearsal, s.
 _REHEARSAL_STEP = 0.05
+# Time for which both sleeves must stay on if the coat is not let go, s.
+_STAY = 1.0
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,10 @@ class _Solve:
         now: float,
         steps: float,
         radius: np.ndarray | None = None,
+        are_open: bool = False,
     ) -> _Finished:
         begin = clock.perf_counter()
-        # a policy from before there were radii takes none
-        more = () if radius is None else (radius,)
-        state, decision = self.policy.decide(memory, x, v, joints, now, steps, *more)
+        state, decision = self.policy.decide(memory, x, v, joints, now, steps, radius, are_open)
         return _Finished(decision, state, joints, clock.perf_counter() - begin)
 
 
@@ -89,18 +91,23 @@ class GlobalMpc(LeafSystem):
         - garment_velocity
         - predicted_joint_position
         - predicted_radius (optional)
+        - grippers_open (optional)
         output_ports:
         - plan
         - stage
         - target
         - solve_time
         - age
+        - release
+        - cue
 
     garment_*: (3m,) of the controller's garment, m, m/s. predicted_radius: ((N+1)·6,) of the balls
-    that hold the predicted joints with probability 0.9, m. plan: GlobalPlan. stage: (2,) 0 prepare,
-    1 dress, 2 done. target: (6,) target positions of left and right armhole, m. solve_time: (2,)
-    wall time of the last finished solve, s, and the number of finished solves. age: (1,) time since
-    the observation that the plan in use is based on, s.
+    that hold the predicted joints with probability 0.9, m. grippers_open: (1,) 1 once both have let
+    go. plan: GlobalPlan. stage: (2,) 0 prepare, 1 dress, 2 done, 3 lay, 4 released. target: (6,)
+    target positions of left and right armhole, m. solve_time: (2,) wall time of the last finished
+    solve, s, and the number of finished solves. age: (1,) time since the observation that the plan
+    in use is based on, s. release: (1,) 1 once the coat is laid: the grippers are to open. cue:
+    (1,) 1 from the time on at which the coat is being laid: the person may lower the arms.
 
     A solve starts from the observation at k·period, and its plan is used from k·period + delay on,
     however long the solve takes: the run is the same on any machine. Solves run on a background
@@ -164,6 +171,7 @@ class GlobalMpc(LeafSystem):
         self.DeclareVectorInputPort("garment_velocity", 3 * m)
         self.DeclareVectorInputPort("predicted_joint_position", 18 * (n + 1))
         self.DeclareVectorInputPort("predicted_radius", 6 * (n + 1))
+        self._open = self.DeclareVectorInputPort("grippers_open", 1)
         self._declare_outputs()
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._begin)
         if waits:
@@ -189,6 +197,10 @@ class GlobalMpc(LeafSystem):
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), shown)
         self.DeclareVectorOutputPort("age", 1, self._calc_age)
+        self.DeclareVectorOutputPort(
+            "release", 1, self._calc_release, {self.abstract_state_ticket(self._plan)}
+        )
+        self.DeclareVectorOutputPort("cue", 1, self._calc_cue, shown)
 
     def rehearse(
         self, x: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool]
@@ -227,6 +239,8 @@ class GlobalMpc(LeafSystem):
             decision.plan.armhole[first - 1 :],
             decision.assignment,
             finished.joints[first:] if p.plans else None,
+            decision.release,
+            finished.state.finish.phase == Phase.RELEASED,
         )
 
     def failure(self, context: Context) -> str | None:
@@ -234,16 +248,26 @@ class GlobalMpc(LeafSystem):
         return self._progress_in(context).failure
 
     def is_finished(self, context: Context) -> bool:
-        """Returns whether both sleeves are done and still on, from this system's own context.
+        """Returns whether nothing is left to do, from this system's own context.
 
-        The stages are those of the plan in use, about a second old. A sleeve may have slipped since
-        then, so the current observation is checked, too.
+        If the coat is let go in the end, the grippers have opened. Otherwise both sleeves are done
+        and still on. The stages are those of the plan in use, about a second old. A sleeve may have
+        slipped since then, so the current observation is checked, too.
         """
+        if self._policy.finish.release:
+            memory: PolicyState = context.get_abstract_state(self._memory).get_value()
+            return memory.finish.phase == Phase.RELEASED
         if np.any(context.get_discrete_state(self._shown).value()[:2] < Stage.DONE):
             return False
         x = self.get_input_port(0).Eval(context).reshape(-1, 3)
         joints = self.get_input_port(2).Eval(context).reshape(-1, 6, 3)
         return self._policy.planner.are_on(x, joints[0])
+
+    @property
+    def watch_time(self) -> float:
+        """Time for which a run goes on after `is_finished` holds, s."""
+        finish = self._policy.finish
+        return finish.watch_time if finish.release else _STAY
 
     def _progress_in(self, context: Context) -> _Progress:
         progress: _Progress = context.get_abstract_state(self._progress).get_value()
@@ -264,7 +288,8 @@ class GlobalMpc(LeafSystem):
         # count missed periods as elapsed
         periods = max(1, round((now - progress.begun_at) / self._period))
         steps = periods * self._period / self._policy.parameters.time_step
-        pending = self._submit(memory, x, v, joints, now, steps, radius)
+        are_open = self._open.HasValue(context) and bool(self._open.Eval(context)[0] > 0.5)
+        pending = self._submit(memory, x, v, joints, now, steps, radius, are_open)
         self._set_progress(state, _Progress(pending, now))
 
     def _set_progress(self, state: State, progress: _Progress) -> None:
@@ -307,11 +332,10 @@ class GlobalMpc(LeafSystem):
         state.get_mutable_abstract_state(self._plan).set_value(plan)
         state.get_mutable_abstract_state(self._memory).set_value(finished.state)
         shown = context.get_discrete_state(self._shown).value()
-        stages: tuple[Stage, Stage] = finished.state.stages.stage
         state.get_mutable_discrete_state(self._shown).SetFromVector(
             np.concatenate(
                 [
-                    [float(s) for s in stages],
+                    [float(s) for s in finished.state.shown],
                     finished.decision.target[-1].ravel(),
                     [finished.solve_time, shown[9] + 1.0, progress.begun_at],
                 ]
@@ -321,6 +345,14 @@ class GlobalMpc(LeafSystem):
     def _calc_age(self, context: Context, output: BasicVector) -> None:
         seen = float(context.get_discrete_state(self._shown).value()[10])
         output.SetFromVector([context.get_time() - seen])
+
+    def _calc_cue(self, context: Context, output: BasicVector) -> None:
+        stages = context.get_discrete_state(self._shown).value()[:2]
+        output.SetFromVector([float(np.all(stages > Stage.DONE))])
+
+    def _calc_release(self, context: Context, output: BasicVector) -> None:
+        plan: GlobalPlan = context.get_abstract_state(self._plan).get_value()
+        output.SetFromVector([float(plan.release)])
 
     def _show(self, rows: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource, PassThrough
 
 from drake_dress.diagrams.behaviour import Behaviour, Kind, add_behaviour
 from drake_dress.diagrams.person import (
@@ -23,11 +23,13 @@ from drake_dress.diagrams.person import (
 )
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.active import ActiveParameters
-from drake_dress.models.human.body import ArmPose, BodyMeasures
+from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
 from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
+from drake_dress.models.human.stirring import StirringParameters
 from drake_dress.models.human.tremor import TremorParameters
-from drake_dress.models.sides import Side
+from drake_dress.models.sides import SIDES, Side
 from tests.systems.draped import draped_station
 
 M = BodyMeasures()
@@ -35,6 +37,7 @@ JOINTS = JointParameters(6.0, 3.0, 3.6, 1.2)
 POSE = ArmPose(*np.deg2rad([13.0, 46.0, 0.0, 10.0]))
 ARMS: dict[Side, ArmPose] = {"left": POSE, "right": POSE}
 MESH = make_coat(CoatParameters(), 0.05)
+STAYS = Behaviour(lowering=Lowering(duration=0.0), stirring=StirringParameters(amplitude=0.0))
 PERIOD = 0.004
 
 
@@ -57,6 +60,11 @@ class Scene:
         one.body_index, one.p_BoBq_B = BodyIndex(body), point
         one.F_Bq_W = SpatialForce(np.zeros(3), force)
         self.plant.get_applied_spatial_force_input_port().FixValue(self.context, [one])
+
+    def tell(self, name: str, value: float) -> None:
+        """Sets the input `told` or `opened`."""
+        context = self.simulator.get_mutable_context()
+        self.diagram.GetInputPort(name).FixValue(context, [value])
 
     def joints(self) -> np.ndarray:
         return joint_positions(self.plant, self.context, self.person)
@@ -84,10 +92,25 @@ def scene(behaviour: Behaviour, garment: np.ndarray | None = None) -> Scene:
     x = MESH.rest_position + [-2.0, 0.0, 1.4] if garment is None else garment
     nodes = builder.AddSystem(ConstantVectorSource(x.ravel()))
     arms = person_arms(M, "standing", ARMS, JOINTS)
-    intent = add_behaviour(builder, plant, person, arms, behaviour, MESH, nodes.get_output_port())
+    opened = builder.AddSystem(PassThrough(1))
+    intent, told = add_behaviour(
+        builder,
+        plant,
+        person,
+        arms,
+        behaviour,
+        MESH,
+        nodes.get_output_port(),
+        opened.get_output_port(),
+    )
     builder.ExportOutput(intent, "intent")
+    builder.ExportInput(opened.get_input_port(), "opened")
+    if told is not None:
+        builder.ExportInput(told, "told")
     diagram = builder.Build()
-    return Scene(diagram, plant, person, Simulator(diagram))
+    made = Scene(diagram, plant, person, Simulator(diagram))
+    made.tell("opened", 0.0)
+    return made
 
 
 def passive(**following: float) -> Behaviour:
@@ -108,9 +131,9 @@ def state(s: Scene) -> np.ndarray:
     return s.context.get_discrete_state_vector().CopyToVector()
 
 
-def test_dummy_has_nothing_but_its_constant_tone() -> None:
-    plain = scene(Behaviour())
-    assert names(plain.diagram) == {"MultibodyPlant", "ConstantVectorSource"}
+def test_dummy_that_stays_as_it_is_has_nothing_but_its_constant_tone() -> None:
+    plain = scene(STAYS)
+    assert names(plain.diagram) == {"MultibodyPlant", "ConstantVectorSource", "PassThrough"}
     tones = [
         system
         for system in plain.diagram.GetSystems()
@@ -139,7 +162,13 @@ def test_dummy_moves_to_the_bit_as_a_plant_with_tone_alone() -> None:
 
 def test_station_of_a_dummy_has_no_system_of_a_behaviour() -> None:
     station = draped_station(
-        mesh=MESH, measures=M, arms=ARMS, joints=JOINTS, time_step=0.01, body_time_step=0.01
+        mesh=MESH,
+        measures=M,
+        arms=ARMS,
+        joints=JOINTS,
+        time_step=0.01,
+        body_time_step=0.01,
+        behaviour=STAYS,
     )
     assert names(station.diagram) == {
         "MultibodyPlant",
@@ -359,3 +388,32 @@ def test_arms_model_is_that_of_the_plant() -> None:
         angles = q[dofs].reshape(2, 4)
         expected = [a.gravity_torque(b) for a, b in zip(arms.arms, angles, strict=True)]
         np.testing.assert_allclose(gravity, np.concatenate(expected), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["dummy", "passive", "active"])
+def test_arms_are_lowered_when_told_and_stir_once_the_coat_is_let_go(kind: Kind) -> None:
+    s = scene(Behaviour(kind=kind))
+    pose = Lowering().pose
+    down = [arm_points(M, "standing", side, pose)[2] for side in SIDES]
+    s.simulator.AdvanceTo(1.0)
+    before = s.joints()
+    s.tell("told", 1.0)
+    _, way = s.record(5.0)
+    np.testing.assert_allclose(s.joints()[[2, 5]], down, atol=0.01)
+    # smoothly, and without haste
+    hands = np.linalg.norm(np.diff(way[:, [2, 5]], axis=0), axis=2) / 0.02
+    assert hands.max() < 0.6
+    np.testing.assert_allclose(way[0], before, atol=2e-3)
+    s.tell("opened", 1.0)
+    _, stirred = s.record(10.0)
+    swing = np.ptp(stirred[-150:, [2, 5]], axis=0)
+    assert (np.linalg.norm(swing, axis=1) > 0.04).all()
+    assert (np.linalg.norm(swing, axis=1) < 0.2).all()
+
+
+def test_who_is_not_told_keeps_the_arms() -> None:
+    s = scene(Behaviour())
+    start = s.joints()
+    s.tell("told", 0.0)
+    s.simulator.AdvanceTo(3.0)
+    np.testing.assert_allclose(s.joints(), start, atol=1e-6)

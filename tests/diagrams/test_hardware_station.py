@@ -152,7 +152,9 @@ def test_both_stations_have_the_same_ports() -> None:
         }
 
     assert ports(pair.station.diagram) == ports(pair.simulated.diagram)
-    assert len(ports(pair.station.diagram)) == 4 + 16 + 2 + 6 + 3 + 1 + 2
+    # arms, their status, whether they stopped, grippers, estimates, permission, camera, and the
+    # end: release, cue, and whether grippers are open
+    assert len(ports(pair.station.diagram)) == 4 + 16 + 2 + 6 + 3 + 1 + 2 + 3
 
 
 def test_images_arrive_as_they_were_taken() -> None:

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, System
 
 from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
+from drake_dress.models.dressing.finish import FinishState
 from drake_dress.models.human.learned.predictor import LearnedPredictor
 from drake_dress.systems.global_mpc import GlobalMpc
 from drake_dress.systems.human_forecast import HumanForecast
@@ -103,7 +104,7 @@ class _Policy(DressingPolicy):
     mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
 
     def initial_state(self) -> Any:
-        return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)), before=0.0)
+        return SimpleNamespace(shown=(0, 0), finish=FinishState(), before=0.0)
 
     def decide(
         self,
@@ -114,6 +115,7 @@ class _Policy(DressingPolicy):
         time: float,
         elapsed_steps: float = 5.0,
         radius: Any = None,
+        are_open: bool = False,
     ) -> Any:
         n = self.parameters.horizon
         if x[0, 0] < 0.0:
@@ -121,8 +123,10 @@ class _Policy(DressingPolicy):
         asked = 0.5 * state.before + x[0, 0] + 10.0 * time + 100.0 * elapsed_steps
         asked += 0.0 if radius is None else 1e3 * radius[0, 0]
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), asked), armhole=np.zeros((n, 2, 3)))
-        after = SimpleNamespace(stages=state.stages, before=asked)
-        return after, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
+        after = SimpleNamespace(shown=state.shown, finish=state.finish, before=asked)
+        return after, SimpleNamespace(
+            plan=plan, assignment="some", target=np.zeros((n, 2, 3)), release=False
+        )
 
 
 def _fix(mpc: GlobalMpc, context: Context, x: float, ports: int = 3) -> None:

@@ -16,6 +16,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from drake_dress.models.control.local_control import GlobalPlan
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
+from drake_dress.models.dressing.finish import FinishParameters, FinishState
 from drake_dress.systems.global_mpc import GlobalMpc
 
 pytestmark = pytest.mark.alone
@@ -32,7 +33,7 @@ class _Policy(DressingPolicy):
     planner: Any = None
 
     def initial_state(self) -> Any:
-        return SimpleNamespace(stages=SimpleNamespace(stage=(0, 0)))
+        return SimpleNamespace(shown=(0, 0), finish=FinishState())
 
     def decide(
         self,
@@ -43,6 +44,7 @@ class _Policy(DressingPolicy):
         time: float,
         elapsed_steps: float = 5.0,
         radius: Any = None,
+        are_open: bool = False,
     ) -> Any:
         n = self.parameters.horizon
         if time > _FAILS:
@@ -52,7 +54,9 @@ class _Policy(DressingPolicy):
                 os._exit(3)
             sleep({"hangs": 600.0, "is late": 1.3}[self.ends])
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), 0.1), armhole=np.zeros((n, 2, 3)))
-        return state, SimpleNamespace(plan=plan, assignment="some", target=np.zeros((n, 2, 3)))
+        return state, SimpleNamespace(
+            plan=plan, assignment="some", target=np.zeros((n, 2, 3)), release=False
+        )
 
 
 def test_a_controller_that_has_no_plan_any_more_asks_for_rest() -> None:
@@ -109,6 +113,7 @@ def test_a_run_is_finished_while_sleeves_that_are_done_are_still_on() -> None:
 
     policy = _Policy("hangs")
     policy.planner = SimpleNamespace(are_on=are_on)
+    policy.finish = FinishParameters(release=False)
     mpc = GlobalMpc(policy, _PERIOD, _DELAY, waits=True)
     context = mpc.CreateDefaultContext()
     for port in range(3):

@@ -21,11 +21,19 @@ from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth import material
 from drake_dress.models.control import costs, local_model, policy, safety, task_parameters
 from drake_dress.models.control.own_costs import COSTS
-from drake_dress.models.dressing import stages
+from drake_dress.models.dressing import finish, stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.load import MeshOptions
-from drake_dress.models.human import body, following, motions, prediction, tremor
+from drake_dress.models.human import (
+    body,
+    following,
+    lowering,
+    motions,
+    prediction,
+    stirring,
+    tremor,
+)
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
@@ -283,6 +291,28 @@ class Tremor(Mirror):
 
 
 @dataclass
+class Lowering:
+    """Both arms are lowered once both sleeves are on; see models/human/lowering.py.
+
+    Attributes:
+        abduction_deg: sideways elevation of the lowered arms, degrees.
+        extension_deg: backward extension of the lowered arms, degrees.
+        elbow_deg: elbow flexion of the lowered arms, degrees.
+        duration: time that it takes, s. 0 keeps the arms where they are.
+    """
+
+    abduction_deg: float = 12.0
+    extension_deg: float = 5.0
+    elbow_deg: float = 15.0
+    duration: float = lowering.Lowering.duration
+
+
+@mirror_of(stirring.StirringParameters)
+class Stirring(Mirror):
+    """Small motions of both arms once the coat is let go; see models/human/stirring.py."""
+
+
+@dataclass
 class Behaviour:
     """The person's own motions. The controller does not know them.
 
@@ -294,6 +324,8 @@ class Behaviour:
         max_hand_speed: greatest hand speed of the person's own motions, m/s.
         max_joint_speed: greatest joint speed of the person's own motions, rad/s.
         tremor: tremor of both hands; none if empty.
+        lowering: both arms are lowered once both sleeves are on; a dummy's arms by somebody.
+        stirring: small motions of both arms once the coat is let go.
     """
 
     kind: str = "dummy"
@@ -302,6 +334,8 @@ class Behaviour:
     max_hand_speed: float = ActiveParameters.max_hand_speed
     max_joint_speed: float = ActiveParameters.max_joint_speed
     tremor: Tremor | None = None
+    lowering: Lowering = field(default_factory=Lowering)
+    stirring: Stirring = field(default_factory=Stirring)
 
 
 @dataclass
@@ -376,6 +410,11 @@ class Approach(Mirror):
 @mirror_of(stages.StageParameters, without=("waiting_progress",))
 class Stages(Mirror):
     """Thresholds between the stages of a dressing; see models/dressing/stages.py."""
+
+
+@mirror_of(finish.FinishParameters)
+class Finish(Mirror):
+    """Laying the coat and letting it go; see models/dressing/finish.py."""
 
 
 @mirror_of(task_parameters.TaskParameters, without=("progress_rate", "approach_distance", "stages"))
@@ -501,6 +540,7 @@ class Controller:
         global_mpc: the global controller.
         tasks: targets of the sleeves.
         stages: thresholds between the stages.
+        finish: laying the coat on the shoulders and letting it go.
         local: the local controller.
         predictor: how the person's arms are predicted to move.
         constant_velocity: settings of the predictor of that name.
@@ -516,6 +556,7 @@ class Controller:
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
     tasks: Tasks = field(default_factory=Tasks)
     stages: Stages = field(default_factory=Stages)
+    finish: Finish = field(default_factory=Finish)
     local: Local = field(default_factory=Local)
     predictor: str = "still"
     constant_velocity: ConstantVelocity = field(default_factory=ConstantVelocity)
@@ -697,6 +738,12 @@ class Hardware:
         garment_channel: channel of the garment estimates.
         person_channel: channel of the person estimates.
         camera_channel: channel of the camera images; `_NAME` is appended.
+        gripper_command_channel: channel of the commands to open the grippers; `_LEFT` and `_RIGHT`
+            are appended.
+        gripper_status_channel: channel of the grippers' status; `_LEFT` and `_RIGHT` are appended.
+        cue_channel: channel of the cue that both sleeves are on, so that the person may lower the
+            arms.
+        release: `confirm` asks before the grippers open, `automatic` does not.
         status_rate: rate of the lab's arm status, Hz.
         estimate_rate: rate of the lab's estimates, Hz.
         stale_status: age of an arm's status at which the arms hold, s. A late message that is older
@@ -719,6 +766,10 @@ class Hardware:
     garment_channel: str = "GARMENT_ESTIMATE"
     person_channel: str = "PERSON_ESTIMATE"
     camera_channel: str = "CAMERA"
+    gripper_command_channel: str = "GRIPPER_COMMAND"
+    gripper_status_channel: str = "GRIPPER_STATUS"
+    cue_channel: str = "PERSON_CUE"
+    release: str = "confirm"
     status_rate: float = 200.0
     estimate_rate: float = 50.0
     stale_status: float = 0.05

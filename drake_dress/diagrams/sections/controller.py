@@ -58,6 +58,7 @@ def controller_policy(
         spread_share=g.spread_share,
         budget=budget,
         weights=model_of(g.weights),
+        finish=model_of(c.finish),
         tasks=model_of(
             c.tasks,
             progress_rate=g.progress_step / g.time_step,

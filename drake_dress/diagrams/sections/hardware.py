@@ -33,6 +33,9 @@ def links(section: schema.Station) -> Links:
         garment=h.garment_channel,
         person=h.person_channel,
         camera=h.camera_channel,
+        gripper_command=h.gripper_command_channel,
+        gripper_status=h.gripper_status_channel,
+        cue=h.cue_channel,
         command_period=1.0 / section.arms.rate,
     )
 

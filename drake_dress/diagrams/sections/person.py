@@ -11,6 +11,7 @@ from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture
+from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.sides import SIDES, Side
 
 
@@ -57,7 +58,15 @@ def behaviour(b: schema.Behaviour, seed: int) -> Behaviour:
         motions=tuple(motion(m) for m in b.motions),
         tremor=model_of(b.tremor) if b.tremor is not None else None,
         seed=seed,
+        lowering=lowering(b.lowering),
+        stirring=model_of(b.stirring),
     )
+
+
+def lowering(values: schema.Lowering) -> Lowering:
+    """Returns how the arms are lowered; degrees become radians."""
+    angles = np.deg2rad([values.abduction_deg, values.extension_deg, 0.0, values.elbow_deg])
+    return Lowering(ArmPose(*angles), values.duration)
 
 
 def motion(values: schema.Motion) -> motions.Motion:

@@ -62,6 +62,8 @@ class Weights:
             1/m².
         passage_radius: radius of the cylinder that stands for the forearm, m.
         passage_length: length of the cylinder that stands for the forearm, m.
+        collar: weight of the collar's distance from the nape, and of the grippers' deviation from
+            a level line just above the shoulders, while the coat is laid, 1/m².
     """
 
     position: float = 1.0
@@ -82,6 +84,7 @@ class Weights:
     passage: float = 3.0
     passage_radius: float = 0.06
     passage_length: float = 0.25
+    collar: float = 10.0
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class Plan:
         cost: final cost; initial_cost: cost of the initial guess.
         iterations: accepted gradient steps; evaluations: rollouts.
         reason: why the descent stopped: "small_step", "no_descent", "iterations" or "budget";
-            "no_plan" if none was requested.
+            "no_plan" if none was requested, "released" if the grippers have let go.
         armhole: (N,2,3) predicted armhole centres, m.
         force: (N,2) predicted gripper force, N.
         work: iterations of the linear solver.

@@ -44,6 +44,8 @@ class GlobalPlan(Immutable):
         assignment: tasks of the sleeves; None before the first plan.
         joints: (N+1,6,3) the person's joints that the plan assumed, m; None if the plan is to rest
             and the local controller tracks the targets by itself.
+        release: whether the coat is laid, so that the grippers are to open.
+        is_released: whether they have opened, so that nothing ties them to the garment.
     """
 
     start: float
@@ -52,6 +54,8 @@ class GlobalPlan(Immutable):
     armhole: FloatArray
     assignment: Assignment | None = None
     joints: FloatArray | None = None
+    release: bool = False
+    is_released: bool = False
 
     @classmethod
     def resting(cls) -> GlobalPlan:
@@ -176,6 +180,22 @@ class LocalController:
             self.parameters.max_speed,
         )
 
+    def _following(
+        self, plan: GlobalPlan, x: FloatArray, gripper: FloatArray, time: float
+    ) -> LocalPlan:
+        """Returns the plan's own motion of the grippers; arguments as of `solve`."""
+        centers = np.stack([sleeve.p_c for sleeve in self.planner.sleeves(x)])
+        nominal, _ = continued(plan, centers, gripper, time, self.parameters)
+        n = self.parameters.horizon
+        return LocalPlan(
+            time,
+            self.parameters.time_step,
+            nominal.velocity,
+            np.concatenate([nominal.sleeve, nominal.gripper], axis=1).reshape(-1, 12),
+            np.zeros((n, 6, 12)),
+            self.parameters.max_speed,
+        )
+
     def solve(
         self,
         state: LocalState,
@@ -200,6 +220,8 @@ class LocalController:
         p = self.parameters
         if plan.assignment is None:
             return LocalOutcome(LocalState(), self.resting(time), None)
+        if plan.is_released:
+            return LocalOutcome(LocalState(), self._following(plan, x, gripper, time), None)
         seen = _Seen(self.planner.sleeves(x), joints, joints_step, time)
         centers = np.stack([sleeve.p_c for sleeve in seen.sleeves])
         nominal, foreseen = continued(plan, centers, gripper, time, p)

@@ -13,6 +13,7 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.human.body import Capsule
 from drake_dress.models.human.heading import heading
+from drake_dress.models.human.neck import find_neck
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,12 @@ class PersonModel:
         """Middle of the shoulders (3,) in the torso's frame, m."""
         middle: FloatArray = self.shoulders.mean(axis=0)
         return middle
+
+    @cached_property
+    def neck_radius(self) -> float:
+        """Radius of the neck, m; 0 if there is no neck."""
+        k = find_neck(self.torso[0], self.torso[1], self.neck)
+        return 0.0 if k is None else float(self.radii[k])
 
     @property
     def _of_torso(self) -> list[Capsule]:

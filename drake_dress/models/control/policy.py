@@ -14,13 +14,27 @@ from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget
 from drake_dress.models.control.costs import GarmentCost, Weights
 from drake_dress.models.control.global_mpc import GlobalController, Plan
+from drake_dress.models.control.laying import (
+    CollarPosition,
+    GrippersOverShoulders,
+    collar_target,
+    laying_target,
+    way_back,
+)
 from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
-from drake_dress.models.control.situation import HeldGarment, Situation
+from drake_dress.models.control.situation import HeldGarment, Situation, SleeveTarget
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
+from drake_dress.models.dressing.finish import (
+    FinishParameters,
+    FinishState,
+    Phase,
+    advance_finish,
+)
 from drake_dress.models.dressing.sleeve import find_entry
-from drake_dress.models.dressing.stages import StageState
+from drake_dress.models.dressing.stages import StageState, Task
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.nape import find_nape
 from drake_dress.models.human.heading import headings
 from drake_dress.models.immutable import Immutable
 from drake_dress.models.sides import SIDES
@@ -43,6 +57,7 @@ class PolicyParameters:
         plans: whether to plan with the garment model. If not, plans are to rest, and the local
             controller works alone.
         budget: limits of a solve.
+        finish: settings of laying the coat and letting it go.
     """
 
     time_step: float = 0.2
@@ -56,6 +71,7 @@ class PolicyParameters:
     spread_share: float = 0.5
     plans: bool = True
     budget: Budget = Budget(iterations=3200)
+    finish: FinishParameters = FinishParameters()
 
 
 @dataclass(frozen=True)
@@ -64,15 +80,25 @@ class PolicyState(Immutable):
 
     stages: StageState
     velocity: FloatArray
+    finish: FinishState = FinishState()
+
+    @property
+    def shown(self) -> tuple[int, int]:
+        """Stages of left and right sleeve, as in the log."""
+        return self.finish.stages(self.stages.stage)
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A plan with its tasks; `target` (N,2,3) holds the targets of the armhole centres, m."""
+    """A plan with its tasks; `target` (N,2,3) holds the targets of the armhole centres, m.
+
+    `release` tells whether the coat is laid, so that the grippers are to open.
+    """
 
     plan: Plan
     assignment: Assignment
     target: FloatArray
+    release: bool = False
 
 
 class DressingPolicy:
@@ -106,6 +132,11 @@ class DressingPolicy:
             settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
         self.planner = TaskPlanner(mesh, parameters.tasks)
+        self._collar = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
+        # a garment without a neck's edge, or a plan to rest, cannot be laid
+        lays = parameters.finish.release and parameters.plans and self._collar is not None
+        self.finish = replace(parameters.finish, release=lays)
+        self._margin = material.margin
         held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
         left, right = (x.mean(axis=0) for x in held)
         # (k,3) positions of the held nodes relative to left and right gripper, m
@@ -124,7 +155,11 @@ class DressingPolicy:
             parameters.weights,
             parameters.max_speed,
             parameters.max_iterations,
-            costs=costs,
+            costs=(
+                CollarPosition(parameters.weights.collar, self._collar),
+                GrippersOverShoulders(parameters.weights.collar),
+                *costs,
+            ),
         )
 
     def initial_state(self) -> PolicyState:
@@ -140,6 +175,7 @@ class DressingPolicy:
         time: float,
         elapsed_steps: float = 5.0,
         radius: FloatArray | None = None,
+        are_open: bool = False,
     ) -> tuple[PolicyState, Decision]:
         """Returns the next state and the decision.
 
@@ -154,41 +190,91 @@ class DressingPolicy:
                 of its plan is being executed, and is the initial guess of the descent.
             radius: (N+1,6) of the balls about `joints` that hold the person's with probability 0.9,
                 m; None: the prediction tells none.
+            are_open: whether both grippers have opened.
         """
         p = self.parameters
         stages, assignment = self.planner.assign(state.stages, x, joints[0], time)
+        finish = self._advanced(state, stages, assignment, x, joints[0], are_open, time)
+        if finish.phase != Phase.DRESSING:
+            # the sleeves sink as the coat is laid, which is no reason to draw them again
+            stages = state.stages
+            assignment = replace(assignment, tasks=(Task.LAY, Task.LAY))
+        state = replace(state, stages=stages, finish=finish)
         targets = self.planner.targets(assignment, self.planner.sleeves(x), joints, p.time_step)
         target = np.stack([t.position for t in targets], axis=1)
+        if finish.phase == Phase.RELEASED:
+            back = way_back(self.finish, joints, time - finish.since, p.time_step)
+            return state, Decision(self._moving(x, back, "released"), assignment, target)
         if not p.plans:
-            return replace(state, stages=stages), Decision(self._rest(x), assignment, target)
-        obstacles = person_obstacles(self.person, joints, p.time_step)
-        guess = later(state.velocity, elapsed_steps)
-        leftward = headings(joints[1:]).leftward
-        least = p.tasks.stages.creeping_progress
-        settling = all(fact.linked and fact.s >= least for fact in assignment.facts)
-        away = None if radius is None else kept_away(obstacles, radius, p.spread_share)
-        plan = self.controller.solve(
-            Situation(x, v, targets, obstacles, leftward, away),
-            guess,
-            p.committed_steps,
-            p.budget,
-            p.tasks.settling_speed if settling else p.max_speed,
-        )
-        return replace(state, stages=stages, velocity=plan.velocity), Decision(
-            plan, assignment, target
+            return state, Decision(
+                self._moving(x, 0.0 * state.velocity, "no_plan"), assignment, target
+            )
+        plan = self._planned(state, x, v, joints, targets, assignment, elapsed_steps, radius)
+        laid = finish.phase == Phase.LAID
+        return replace(state, velocity=plan.velocity), Decision(plan, assignment, target, laid)
+
+    def _advanced(
+        self,
+        state: PolicyState,
+        stages: StageState,
+        assignment: Assignment,
+        x: FloatArray,
+        joints: FloatArray,
+        are_open: bool,
+        time: float,
+    ) -> FinishState:
+        """Returns how far the coat is laid and let go."""
+        if self._collar is None:
+            return state.finish
+        place = collar_target(self.person, self._collar, self._margin, joints)
+        off = float(np.linalg.norm(self._collar.at(x) - place))
+        return advance_finish(
+            state.finish, stages.stage, assignment.facts, off, are_open, self.finish, time
         )
 
-    def _rest(self, x: FloatArray) -> Plan:
-        """Returns the plan that keeps the grippers, and the garment with them, where they are."""
+    def _planned(
+        self,
+        state: PolicyState,
+        x: FloatArray,
+        v: FloatArray,
+        joints: FloatArray,
+        targets: tuple[SleeveTarget, SleeveTarget],
+        assignment: Assignment,
+        elapsed_steps: float,
+        radius: FloatArray | None,
+    ) -> Plan:
+        """Returns the plan of the global controller; arguments as of `decide`."""
+        p, lays = self.parameters, state.finish.phase != Phase.DRESSING
+        obstacles = person_obstacles(self.person, joints, p.time_step)
+        away = None if radius is None else kept_away(obstacles, radius, p.spread_share)
+        laying, max_speed = None, p.max_speed
+        if lays and self._collar is not None:
+            height, max_speed = self.finish.gripper_height, self.finish.max_speed
+            laying = laying_target(self.person, self._collar, self._margin, height, joints[1:])
+        elif all(
+            fact.linked and fact.s >= p.tasks.stages.creeping_progress for fact in assignment.facts
+        ):
+            max_speed = p.tasks.settling_speed
+        leftward = headings(joints[1:]).leftward
+        return self.controller.solve(
+            Situation(x, v, targets, obstacles, leftward, away, laying),
+            later(state.velocity, elapsed_steps),
+            p.committed_steps,
+            p.budget,
+            max_speed,
+        )
+
+    def _moving(self, x: FloatArray, velocity: FloatArray, reason: str) -> Plan:
+        """Returns a plan of given velocities (N,2,3), m/s, in which the sleeves stay in place."""
         n = self.parameters.horizon
         centers = np.stack([sleeve.p_c for sleeve in self.planner.sleeves(x)])
         return Plan(
-            velocity=np.zeros((n, 2, 3)),
+            velocity=velocity,
             cost=0.0,
             initial_cost=0.0,
             iterations=0,
             evaluations=0,
-            reason="no_plan",
+            reason=reason,
             armhole=np.tile(centers, (n, 1, 1)),
             force=np.zeros((n, 2)),
         )

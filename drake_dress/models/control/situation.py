@@ -34,6 +34,19 @@ class SleeveTarget:
 
 
 @dataclass(frozen=True)
+class LayingTarget:
+    """Where the coat is laid, at each of the N steps.
+
+    Attributes:
+        collar: (N,3) of the middle of the collar's back, m.
+        height: (N,) of the middle between the grippers, m.
+    """
+
+    collar: FloatArray
+    height: FloatArray
+
+
+@dataclass(frozen=True)
 class Situation:
     """The garment now, its targets, and the predicted person.
 
@@ -42,6 +55,7 @@ class Situation:
         v: (n,3) their velocities, m/s.
         targets: of left and right sleeve.
         obstacles: the predicted person at the start of each of the N steps.
+        laying: where the coat is laid; None before both sleeves are on.
         kept_away: the person as grippers keep away from it, wider where it is uncertain; None: as
             in `obstacles`.
         leftward: (N,3) horizontal unit vectors to the person's left. None disables the cost of the
@@ -54,6 +68,7 @@ class Situation:
     obstacles: Sequence[Obstacles]
     leftward: FloatArray | None = None
     kept_away: Sequence[Obstacles] | None = None
+    laying: LayingTarget | None = None
 
 
 @dataclass(frozen=True)

@@ -308,6 +308,8 @@ class TaskPlanner:
         time_step: float,
     ) -> SleeveTarget:
         task = given.tasks[side]
+        if task == Task.LAY:
+            return self._target_laid(arms[side])
         if task in (Task.PREPARE, Task.REST) or not given.facts[side].linked:
             target = self._target_off_arm(given, side, arms[side], to, sleeves, time_step)
             if task == Task.REST:
@@ -398,6 +400,12 @@ class TaskPlanner:
         slips = task == Task.WAIT and fact.s < p.stages.waiting_progress
         weight = p.dressing_position if both or slips else 1.0
         return SleeveTarget(position, direction, weight, p.dressing_direction)
+
+    @staticmethod
+    def _target_laid(arm: _Arm) -> SleeveTarget:
+        """Returns the target of a sleeve while the coat is laid: none, at the shoulder."""
+        direction = np.stack([axis.D(2.0) for axis in arm.axes[1:]])
+        return SleeveTarget(arm.shoulder[1:], direction, 0.0, 0.0)
 
     def _drawn_progress(self, given: Assignment, side: int, times: Sequence[float]) -> list[float]:
         """Returns the target s of a sleeve on its arm at `times` from now, s.

@@ -37,6 +37,7 @@ class Task(IntEnum):
     DRESS = 2  # J_d
     WAIT = 3  # J_w
     HOLD = 4  # both are done: the sleeve keeps its place on the arm
+    LAY = 5  # no cost of its own: the collar is brought to the nape
 
 
 Place = tuple[float, float, float]

@@ -128,8 +128,6 @@ def tremor_torque(
 ) -> FloatArray:
     """Returns the amplitude (4,), N·m, of the joint torques that cause the tremor `p` of a hand.
 
-    x = J (K − ω²M + iωD)⁻¹ τ describes the hand's ellipse; its semi-major axis is the amplitude.
-
     Args:
         p: amplitude and frequency.
         mass: M (4,4) of the arm in its rest pose, kg·m².
@@ -137,9 +135,34 @@ def tremor_torque(
         stiffness: K (4,4), gravity's included, N·m/rad.
         jacobian: J (3,4) of the hand, m/rad.
     """
-    omega = 2.0 * np.pi * p.frequency
+    return driving_torque(_DRIVE, p.amplitude, p.frequency, mass, damping, stiffness, jacobian)
+
+
+def driving_torque(
+    drive: FloatArray,
+    amplitude: float,
+    frequency: float,
+    mass: FloatArray,
+    damping: FloatArray,
+    stiffness: FloatArray,
+    jacobian: FloatArray,
+) -> FloatArray:
+    """Returns the amplitude (4,), N·m, of the joint torques that swing a hand.
+
+    x = J (K − ω²M + iωD)⁻¹ τ describes the hand's ellipse; its semi-major axis is the amplitude.
+
+    Args:
+        drive: (4,) relative torques of the joints.
+        amplitude: of the hand, m.
+        frequency: Hz.
+        mass: M (4,4) of the arm in its rest pose, kg·m².
+        damping: D (4,), N·m·s/rad.
+        stiffness: K (4,4), gravity's included, N·m/rad.
+        jacobian: J (3,4) of the hand, m/rad.
+    """
+    omega = 2.0 * np.pi * frequency
     dynamic = stiffness - omega**2 * mass + 1j * omega * np.diag(damping)
-    hand = jacobian @ np.linalg.solve(dynamic, _DRIVE)
+    hand = jacobian @ np.linalg.solve(dynamic, drive)
     longest = np.linalg.svd(np.stack([hand.real, hand.imag]), compute_uv=False)[0]
-    torque: FloatArray = p.amplitude / longest * _DRIVE
+    torque: FloatArray = amplitude / longest * drive
     return torque

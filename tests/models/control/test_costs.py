@@ -24,9 +24,11 @@ from drake_dress.models.control.costs import (
     Weights,
     dressing_costs,
 )
-from drake_dress.models.control.situation import HeldGarment, Situation, SleeveTarget
+from drake_dress.models.control.laying import CollarPosition, GrippersOverShoulders
+from drake_dress.models.control.situation import HeldGarment, LayingTarget, Situation, SleeveTarget
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.garment.nape import find_nape
 from drake_dress.models.sides import SIDES
 
 MESH = make_coat(CoatParameters(), 0.06)
@@ -35,6 +37,7 @@ COUNT = (len(MESH.grasp["left"]), len(MESH.grasp["right"]))
 LOOPS = (np.asarray(MESH.loops["left_armhole"]), np.asarray(MESH.loops["right_armhole"]))
 SIGNS = (loop_orientation(MESH, "left"), loop_orientation(MESH, "right"))
 GARMENT = HeldGarment(COUNT, LOOPS, (float(SIGNS[0]), float(SIGNS[1])), 0.3, find_entry(MESH))
+NAPE = find_nape(MESH.rest_position, MESH.faces, MESH.loops)
 COSTS = dressing_costs(Weights(), GARMENT)
 seeds = st.integers(0, 2**31)
 
@@ -85,7 +88,14 @@ def drawn(seed: int) -> PlannedStep:
     ball = Obstacles(near[None], near[None], np.array([0.03]), np.zeros((1, 3)), np.zeros((1, 3)))
     left = np.cross(x[HELD[0]] - x[HELD[-1]], rng.normal(0.0, 1.0, 3))
     left /= np.linalg.norm(left)
-    situation = Situation(x, np.zeros_like(x), (targets[0], targets[1]), [ball], left[None])
+    situation = Situation(
+        x,
+        np.zeros_like(x),
+        (targets[0], targets[1]),
+        [ball],
+        left[None],
+        laying=LayingTarget(x[:1] + rng.normal(0.0, 0.1, (1, 3)), rng.normal(0.0, 0.1, 1)),
+    )
     return step_at(x, rng.normal(0.0, 5.0, (len(HELD), 3)), situation)
 
 
@@ -99,6 +109,8 @@ def alone(cost: SleeveCost | GarmentCost, of_sleeve: bool) -> StageCosts:
 ALL = [
     *(pytest.param(alone(c, True), id=type(c).__name__) for c in COSTS.of_sleeves),
     *(pytest.param(alone(c, False), id=type(c).__name__) for c in COSTS.of_garment),
+    pytest.param(alone(CollarPosition(2.0, NAPE), False), id="CollarPosition"),
+    pytest.param(alone(GrippersOverShoulders(2.0), False), id="GrippersOverShoulders"),
     pytest.param(alone(_Lift(), False), id="own"),
 ]
 

@@ -47,7 +47,7 @@ def press(x: FloatArray, side: IntArray, bodies: Obstacles, stiffness: float) ->
         bodies: bodies of the person at that time.
         stiffness: stiffness of a gripper's arm and grasp, N/m.
     """
-    pressing = Pressing(np.zeros((2, 3)), np.zeros_like(x), np.full(len(x), -1, dtype=np.int32))
+    pressing = not_pressing(len(x))
     if not len(x) or not bodies.count:
         return pressing
     inside = find_proximity(x, bodies, 0.0).gap < -_DEPTH
@@ -65,3 +65,8 @@ def press(x: FloatArray, side: IntArray, bodies: Obstacles, stiffness: float) ->
             pressing.force[rows[deepest]] += stiffness * out
             pressing.owner[rows[deepest]] = near.owner[deepest]
     return pressing
+
+
+def not_pressing(count: int) -> Pressing:
+    """Returns the pressing on `count` held nodes that nothing presses on."""
+    return Pressing(np.zeros((2, 3)), np.zeros((count, 3)), np.full(count, -1, dtype=np.int32))

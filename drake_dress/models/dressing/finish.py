@@ -1,0 +1,132 @@
+"""What follows once both sleeves are on: the coat is laid on the shoulders and let go.
+
+    DRESSING   both sleeves are done ──▶ LAYING
+    LAYING     the collar lies on the nape ──▶ LAID;  a sleeve is lost ──▶ DRESSING
+    LAID       the grippers have opened ──▶ RELEASED
+    RELEASED   the grippers move away
+
+A coat that hangs from the grippers is not on: its collar is at the height of the ears.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+from drake_dress.models.dressing.stages import SleeveFacts, Stage
+
+
+class Phase(IntEnum):
+    """Phase of both sleeves together."""
+
+    DRESSING = 0
+    LAYING = 1
+    LAID = 2
+    RELEASED = 3
+
+
+# Stages of both sleeves in these phases, as written in the log, after those of `Stage`.
+LAY, RELEASED = 3, 4
+
+
+@dataclass(frozen=True)
+class FinishParameters:
+    """Settings of laying the coat and letting it go.
+
+    Attributes:
+        release: whether the coat is laid and let go. If not, the grippers hold it in the end.
+        laid_distance: distance of the collar from its place below which the coat is laid, m.
+        open_distance: greatest distance at which the grippers open if the collar comes no nearer,
+            m.
+        stall_time: time without progress after which the collar counts as coming no nearer, s.
+        stall_progress: approach of the collar that counts as progress, m.
+        least_time: shortest time for which the coat is laid, s. The person lowers the arms
+            meanwhile.
+        lost_progress: progress s of a sleeve below which it counts as lost. The centre of an
+            armhole sinks from 1.95 to 1.8 as the coat is laid.
+        gripper_height: height of the grippers above the skin of the shoulders while the coat is
+            laid, m. The robot's hands keep 3 cm.
+        max_speed: greatest speed of a gripper while the coat is laid, m/s.
+        away_speed: speed at which the grippers move away, m/s.
+        away_distance: distance that they move backward and upward, m.
+        watch_time: time from the release to the end of a run, s.
+    """
+
+    release: bool = True
+    laid_distance: float = 0.015
+    open_distance: float = 0.04
+    stall_time: float = 2.0
+    stall_progress: float = 0.005
+    least_time: float = 3.5
+    lost_progress: float = 1.6
+    gripper_height: float = 0.04
+    max_speed: float = 0.06
+    away_speed: float = 0.1
+    away_distance: float = 0.25
+    watch_time: float = 3.0
+
+
+@dataclass(frozen=True)
+class FinishState:
+    """Phase, and the memory that switching needs.
+
+    Attributes:
+        phase: of both sleeves.
+        best: least distance of the collar from its place while it is laid, m.
+        since: time of `best`, or at which the phase RELEASED began, s.
+        begun: time at which the phase LAYING began, s.
+    """
+
+    phase: Phase = Phase.DRESSING
+    best: float = float("inf")
+    since: float = 0.0
+    begun: float = 0.0
+
+    def stages(self, given: tuple[Stage, Stage]) -> tuple[int, int]:
+        """Returns the stages of left and right sleeve as logged, `given` those of the dressing."""
+        if self.phase == Phase.DRESSING:
+            return int(given[0]), int(given[1])
+        return (RELEASED, RELEASED) if self.phase == Phase.RELEASED else (LAY, LAY)
+
+
+def advance_finish(
+    state: FinishState,
+    stages: tuple[Stage, Stage],
+    facts: tuple[SleeveFacts, SleeveFacts],
+    off: float,
+    are_open: bool,
+    parameters: FinishParameters,
+    time: float,
+) -> FinishState:
+    """Returns the new state.
+
+    Args:
+        state: state so far.
+        stages: of left and right sleeve.
+        facts: of left and right sleeve.
+        off: distance of the collar from its place, m.
+        are_open: whether both grippers have opened.
+        parameters: settings.
+        time: current time, s.
+    """
+    p = parameters
+    if state.phase == Phase.RELEASED or not p.release:
+        return state
+    if are_open:
+        return replace(state, phase=Phase.RELEASED, since=time)
+    if state.phase == Phase.DRESSING:
+        if any(stage != Stage.DONE for stage in stages):
+            return state
+        return FinishState(Phase.LAYING, off, time, time)
+    if any(not fact.linked or fact.s < p.lost_progress for fact in facts):
+        return FinishState()
+    if state.phase == Phase.LAID:
+        return state
+    if off < state.best - p.stall_progress:
+        state = replace(state, best=off, since=time)
+    if time - state.begun < p.least_time:
+        return state
+    stalled = time - state.since > p.stall_time
+    if off < p.laid_distance or (stalled and off < p.open_distance):
+        return replace(state, phase=Phase.LAID)
+    return state

@@ -1,0 +1,84 @@
+"""Laying the coat and letting it go: when, and when not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drake_dress.models.dressing.finish import (
+    FinishParameters,
+    FinishState,
+    Phase,
+    advance_finish,
+)
+from drake_dress.models.dressing.stages import SleeveFacts, Stage
+
+P = FinishParameters()
+ON = SleeveFacts(linked=True, s=1.95, hand_distance=0.5, prepared_error=0.5, passed=0.0)
+OFF = replace(ON, linked=False, s=0.0)
+DONE = (Stage.DONE, Stage.DONE)
+
+
+def laid(
+    offs: list[float], are_open: bool = False, p: FinishParameters = P, period: float = 0.5
+) -> FinishState:
+    """Returns the state after the collar had these distances, m, at successive times."""
+    state = FinishState()
+    for k, off in enumerate(offs):
+        state = advance_finish(state, DONE, (ON, ON), off, are_open, p, k * period)
+    return state
+
+
+@pytest.mark.parametrize("stage", [Stage.PREPARE, Stage.DRESS])
+def test_nothing_is_laid_before_both_sleeves_are_done(stage: Stage) -> None:
+    for stages in ((stage, Stage.DONE), (Stage.DONE, stage)):
+        state = advance_finish(FinishState(), stages, (ON, ON), 0.0, False, P, 1.0)
+        assert state == FinishState()
+        assert state.stages(stages) == stages
+
+
+def test_it_is_laid_once_the_collar_lies_on_the_nape() -> None:
+    approach = [0.1] * 8
+    assert laid(approach).phase == Phase.LAYING
+    assert laid([*approach, 0.5 * P.laid_distance]).phase == Phase.LAID
+    assert laid([*approach, 0.5 * P.laid_distance]).stages(DONE) == (3, 3)
+
+
+def test_the_person_has_time_to_lower_the_arms() -> None:
+    for count in range(2, 20):
+        is_laid = laid([0.0] * count).phase == Phase.LAID
+        assert is_laid == ((count - 1) * 0.5 >= P.least_time)
+
+
+def test_a_collar_that_comes_no_nearer_is_let_go_only_near_the_nape() -> None:
+    near, far = 0.9 * P.open_distance, 1.1 * P.open_distance
+    assert laid([near] * 20).phase == Phase.LAID
+    assert laid([far] * 200).phase == Phase.LAYING
+    coming = [0.5 - 0.012 * k for k in range(39)]
+    assert laid(coming).phase == Phase.LAYING, "it still comes nearer"
+
+
+def test_grippers_that_have_opened_do_not_close() -> None:
+    state = laid([0.0] * 12)
+    state = advance_finish(state, DONE, (ON, ON), 0.0, True, P, 7.0)
+    assert state.phase == Phase.RELEASED
+    assert state.since == 7.0
+    assert state.stages(DONE) == (4, 4)
+    after = advance_finish(state, (Stage.PREPARE, Stage.DRESS), (OFF, ON), 1.0, True, P, 8.0)
+    assert after == state
+
+
+@given(side=st.sampled_from([0, 1]), s=st.floats(0.0, 1.59), linked=st.booleans())
+def test_a_sleeve_that_is_lost_is_dressed_again(side: int, s: float, linked: bool) -> None:
+    lost = replace(ON, s=s, linked=linked)
+    for state in (laid([0.1] * 3), laid([0.0] * 12)):
+        facts = (lost, ON) if side == 0 else (ON, lost)
+        assert advance_finish(state, DONE, facts, 0.0, False, P, 9.0) == FinishState()
+
+
+def test_without_release_the_coat_is_held() -> None:
+    p = replace(P, release=False)
+    assert laid([0.0] * 50, p=p) == FinishState()
