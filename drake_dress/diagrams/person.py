@@ -16,9 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from pydrake.geometry import Capsule as CapsuleShape
-from pydrake.geometry import Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
@@ -44,9 +42,11 @@ from drake_dress.models.human.body import (
     Capsule,
     Posture,
     body_capsules,
+    capsule_arrays,
     shoulder_joint,
 )
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.shapes import limb_shape
 
 Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
@@ -250,10 +250,11 @@ def person_arms(
 
 def person_model(body: BodyMeasures, stance: Posture, person: Person) -> PersonModel:
     """Returns the controllers' model of a person: capsules, shoulders and limb radii."""
+    of_arms = [c for c in person.capsules if c.body != "torso"]
     return PersonModel(
         capsules=person.capsules,
         shoulders=np.stack([shoulder_joint(body, stance, side) for side in SIDES]),
-        radius=(body.upper_arm_radius, body.forearm_radius, body.hand_radius),
+        radius=capsule_arrays(of_arms)[2].reshape(2, 3, 2),
     )
 
 
@@ -346,18 +347,8 @@ def _limb(mass: float, radius: float, length: float) -> SpatialInertia:
 
 
 def _register(plant: MultibodyPlant, body: RigidBody, capsule: Capsule, name: str) -> None:
-    axis = capsule.b_B - capsule.a_B
-    length = float(np.linalg.norm(axis))
-    center = 0.5 * (capsule.a_B + capsule.b_B)
-    if length < 1e-9:
-        plant.RegisterVisualGeometry(
-            body, RigidTransform(center), Sphere(capsule.radius), name, _SKIN
-        )
-        return
-    rotation = RotationMatrix.MakeFromOneVector(axis / length, 2)
-    plant.RegisterVisualGeometry(
-        body, RigidTransform(rotation, center), CapsuleShape(capsule.radius, length), name, _SKIN
-    )
+    shape, X_BG = limb_shape(capsule.a_B, capsule.b_B, capsule.radii)
+    plant.RegisterVisualGeometry(body, X_BG, shape, name, _SKIN)
 
 
 def joint_positions(plant: MultibodyPlant, context: Context, person: Person) -> FloatArray:

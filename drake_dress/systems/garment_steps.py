@@ -36,7 +36,7 @@ class Surroundings:
     """Packs all inputs of a step other than the garment into one array.
 
     Attributes:
-        radius: (m,) radii of the capsules, m.
+        radius: (m,2) radii of the limbs at both ends, m.
         held_count: Number of nodes with prescribed motion.
     """
 
@@ -49,13 +49,13 @@ class Surroundings:
         return 12 * len(self.radius) + 3 * self.held_count
 
     def flat(self, capsules: Obstacles, held_velocity: FloatArray) -> FloatArray:
-        """Returns the array of `size` that packs capsules and the held nodes' velocities (k,3)."""
+        """Returns the array of `size` that packs limbs and the held nodes' velocities (k,3)."""
         c = capsules
         parts = (c.a, c.b, c.velocity, c.angular_velocity, held_velocity)
         return np.concatenate([p.ravel() for p in parts])
 
     def of(self, flat: FloatArray) -> tuple[Obstacles, FloatArray]:
-        """Returns the capsules and held velocities (k,3) packed in an array."""
+        """Returns the limbs and held velocities (k,3) packed in an array."""
         end = 12 * len(self.radius)
         a, b, velocity, omega = flat[:end].reshape(4, -1, 3)
         return Obstacles(a, b, self.radius, velocity, omega), flat[end:].reshape(-1, 3)

@@ -16,6 +16,7 @@ plus the arm's radius minus half the shoulder width (2.5 cm by default).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
@@ -122,12 +123,31 @@ class ArmPose:
 
 @dataclass(frozen=True)
 class Capsule:
-    """A capsule fixed in `body`; a sphere if a_B equals b_B. Ends (3,), m, radius, m."""
+    """A round cone fixed in `body`: a capsule if its radii are equal, a sphere if a_B equals b_B.
+
+    Attributes:
+        body: name of the body.
+        a_B, b_B: (3,) ends of its axis, m.
+        radius: radius at end a, m.
+        end_radius: radius at end b, m; None: the same.
+    """
 
     body: str
     a_B: FloatArray
     b_B: FloatArray
     radius: float
+    end_radius: float | None = None
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radii at both ends, m."""
+        return self.radius, self.radius if self.end_radius is None else self.end_radius
+
+
+def capsule_arrays(capsules: Sequence[Capsule]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns ends (k,3), (k,3), in the frames of their bodies, and radii (k,2), m."""
+    a, b = (np.array([getattr(c, end) for c in capsules]).reshape(-1, 3) for end in ("a_B", "b_B"))
+    return a, b, np.array([c.radii for c in capsules]).reshape(-1, 2)
 
 
 def shoulder_height(measures: BodyMeasures, posture: Posture) -> float:
