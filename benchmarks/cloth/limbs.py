@@ -21,7 +21,7 @@ from benchmarks.cloth.measure import Session
 from benchmarks.cloth.scene import SOFT
 from benchmarks.cloth.table import Table, milliseconds
 from benchmarks.figures import Figure, at_most
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.modes import SLIP, STICK
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.elements import Elements, make_elements
@@ -162,7 +162,7 @@ def _elements(mesh: GarmentMesh) -> Elements:
     return make_elements(mesh.rest_position, mesh.faces)
 
 
-def _touching(mode: FloatArray) -> int:
+def _touching(mode: IntArray) -> int:
     return int(np.count_nonzero((mode == STICK) | (mode == SLIP)))
 
 

@@ -65,7 +65,7 @@ def add_body_contact(
     for side, pose in arms.items():
         upper, fore = arm_rotations(side, pose)
         shoulder = shoulder_joint(measures, posture, side)
-        elbow = shoulder + upper @ np.array([0.0, 0.0, -measures.upper_arm_length])
+        elbow = shoulder + upper @ np.array([0.0, 0.0, -measures.of(side).upper_arm_length])
         rest = {f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (fore, elbow)}
         limbs = [c for c in capsules if c.body in rest]
         for number, capsule in enumerate(limbs):

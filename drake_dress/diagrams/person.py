@@ -45,6 +45,7 @@ from drake_dress.models.human.body import (
     capsule_arrays,
     shoulder_joint,
 )
+from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.shapes import limb_shape
 
@@ -194,9 +195,10 @@ def add_person(
     bodies: dict[str, RigidBody] = {"torso": torso}
     points: list[tuple[int, FloatArray]] = []
     for side in SIDES:
-        upper, fore = _add_arm(plant, model, torso, measures, posture, side, arms[side], joints)
+        own = measures.of(side)
+        upper, fore = _add_arm(plant, model, torso, own, posture, side, arms[side], joints)
         bodies[f"{side}_upper_arm"], bodies[f"{side}_forearm"] = upper, fore
-        hand = np.array([0.0, 0.0, -measures.forearm_length])
+        hand = np.array([0.0, 0.0, -own.forearm_length])
         points += [
             (int(upper.index()), np.zeros(3)),
             (int(fore.index()), np.zeros(3)),
@@ -206,13 +208,13 @@ def add_person(
         for i, c in enumerate(capsules):
             _register(plant, bodies[c.body], c, f"{c.body}_{i}")
         add_body_contact(plant, bodies, capsules, measures, posture, arms)
-    limb = [measures.upper_arm_radius, measures.forearm_radius, measures.hand_radius]
+    radius = [r for side in SIDES for r in measures.of(side).joint_radii]
     return Person(
         model,
         capsules,
         {name: body.index() for name, body in bodies.items()},
         points,
-        np.array(limb * 2),
+        np.array(radius),
         origin,
         turns,
     )
@@ -300,11 +302,12 @@ def _add_arm(
     link = SpatialInertia.SolidSphereWithMass(0.05, 0.03)
     first = plant.AddRigidBody(f"{side}_shoulder_1", model, link)
     second = plant.AddRigidBody(f"{side}_shoulder_2", model, link)
+    of_upper, of_fore = m.arm_masses
     upper = plant.AddRigidBody(
-        f"{side}_upper_arm", model, _limb(m.upper_arm_mass, m.upper_arm_radius, m.upper_arm_length)
+        f"{side}_upper_arm", model, _limb(of_upper, m.upper_arm_radii, m.upper_arm_length)
     )
     fore = plant.AddRigidBody(
-        f"{side}_forearm", model, _limb(m.forearm_mass, m.forearm_radius, m.forearm_length)
+        f"{side}_forearm", model, _limb(of_fore, m.forearm_radii, m.forearm_length)
     )
     at_shoulder = RigidTransform(shoulder_joint(m, posture, side))
     at_elbow = RigidTransform(np.array([0.0, 0.0, -m.upper_arm_length]))
@@ -339,10 +342,16 @@ def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None) -> FixedOf
     return FixedOffsetFrame(f"{name}_frame", parent.body_frame(), X_PJ or RigidTransform())
 
 
-def _limb(mass: float, radius: float, length: float) -> SpatialInertia:
-    """Returns the inertia of a solid capsule from the origin down to −length."""
-    unit = UnitInertia.SolidCapsule(radius, length, np.array([0.0, 0.0, 1.0]))
-    center = np.array([0.0, 0.0, -0.5 * length])
+def _limb(mass: float, radii: tuple[float, float], length: float) -> SpatialInertia:
+    """Returns the inertia of a solid round cone from the origin down to −length."""
+    axis = np.array([0.0, 0.0, 1.0])
+    if radii[0] == radii[1]:
+        unit = UnitInertia.SolidCapsule(radii[0], length, axis)
+        center = np.array([0.0, 0.0, -0.5 * length])
+    else:
+        s = solid(length, radii)
+        unit = UnitInertia.AxiallySymmetric(s.about_axis, s.across, axis)
+        center = np.array([0.0, 0.0, -s.center])
     return SpatialInertia(mass, np.zeros(3), unit).Shift(-center)
 
 

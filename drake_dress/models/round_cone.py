@@ -151,11 +151,14 @@ class SolidCone:
 
 
 def solid(length: float, radii: tuple[float, float]) -> SolidCone:
-    """Returns the mass properties of a round cone; radii, m, differ by less than the length, m.
+    """Returns the mass properties of a round cone with a length and radii at both ends, m.
 
     It is a body of revolution of two caps and a frustum, in which the squared radius R² at the
     height z is a polynomial. So Gauss-Legendre quadrature is exact.
     """
+    if abs(radii[0] - radii[1]) >= length:
+        r, about = max(radii), 0.4 * max(radii) ** 2
+        return SolidCone(4.0 / 3.0 * np.pi * r**3, length * (radii[1] > radii[0]), about, about)
     cosine = (radii[0] - radii[1]) / length
     sine = np.sqrt(1.0 - cosine * cosine)
     low, high = cosine * radii[0], length + cosine * radii[1]
