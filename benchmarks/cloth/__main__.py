@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.cloth import limbs
 from benchmarks.cloth.comparison import figures_beside_peers
 from benchmarks.cloth.measure import Session
 from benchmarks.cloth.processes import measure_at_once, measure_in_turn, scene_module
@@ -18,7 +19,17 @@ from benchmarks.parser import OneLineParser, at_least_one, output_file, output_f
 from drake_dress.interrupt import caught_interrupt
 
 # The paper's scenes in its order, then additional ones.
-SCENES = ("draping", "placement", "tube", "tracking", "growth", "backward", "carrying", "layers")
+SCENES = (
+    "draping",
+    "placement",
+    "tube",
+    "tracking",
+    "growth",
+    "backward",
+    "carrying",
+    "layers",
+    "limbs",
+)
 _PACKAGES = ("numba", "numpy", "scipy", "mujoco-core", "mujoco", "newton", "warp-lang")
 _QUICK_LIMIT = 1.0
 
@@ -58,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json:
         write_figures(
             options.json,
-            figures_beside_peers(results),
+            [*figures_beside_peers(results), *limbs.figures(results.get("limbs"))],
             [],
             about=about,
             quick=options.quick,

@@ -1,16 +1,14 @@
 """Contact of the arms with trunk, legs and each other.
 
-The model is Drake's compliant point contact between capsules as thick as the limbs. An arm that
+The model is Drake's compliant point contact between shapes as thick as the limbs. An arm that
 overlaps the torso in the rest pose, such as one that hangs at the side, is taken to be compressed
-there: its capsule is thinner by the overlap, so that the rest pose stays in equilibrium.
+there: its shape is thinner by the overlap, so that the rest pose stays in equilibrium.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
-from pydrake.geometry import Capsule as CapsuleShape
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import AddContactMaterial, ProximityProperties
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
@@ -22,9 +20,11 @@ from drake_dress.models.human.body import (
     Capsule,
     Posture,
     arm_rotations,
+    capsule_arrays,
     shoulder_joint,
 )
 from drake_dress.models.sides import Side
+from drake_dress.report.shapes import limb_shape
 
 # Stiffness of each surface, N/m; two in series have half of it. An arm that the garment pulls
 # against the chest with 20 N sinks in by 4 mm, like flesh.
@@ -60,38 +60,33 @@ def add_body_contact(
         c for c in capsules if c.body == "torso" and not abs(c.a_B[1]) == abs(c.b_B[1]) == half
     ]
     for number, capsule in enumerate(trunk):
-        _collide(plant, bodies["torso"], capsule, capsule.radius, f"contact_{number}")
+        _collide(plant, bodies["torso"], capsule, 0.0, f"contact_{number}")
     still = _placed(trunk, np.eye(3), np.zeros(3))
     for side, pose in arms.items():
         upper, fore = arm_rotations(side, pose)
         shoulder = shoulder_joint(measures, posture, side)
-        elbow = shoulder + upper @ np.array([0.0, 0.0, -measures.upper_arm_length])
+        elbow = shoulder + upper @ np.array([0.0, 0.0, -measures.of(side).upper_arm_length])
         rest = {f"{side}_upper_arm": (upper, shoulder), f"{side}_forearm": (fore, elbow)}
         limbs = [c for c in capsules if c.body in rest]
         for number, capsule in enumerate(limbs):
             pairs = np.array([[0, k] for k in range(len(trunk))])
             gap = clearance(_placed([capsule], *rest[capsule.body]), still, pairs).distance.min()
-            radius = capsule.radius + min(0.0, float(gap))
-            if radius > _LEAST_RADIUS:
+            overlap = max(0.0, -float(gap))
+            if min(capsule.radii) - overlap > _LEAST_RADIUS:
                 name = f"{side}_contact_{number}"
-                _collide(plant, bodies[capsule.body], capsule, radius, name)
+                _collide(plant, bodies[capsule.body], capsule, overlap, name)
 
 
 def _placed(capsules: list[Capsule], rotation: FloatArray, origin: FloatArray) -> Capsules:
     """Returns a body's capsules in the torso's frame."""
-    return Capsules(
-        np.stack([c.a_B for c in capsules]) @ rotation.T + origin,
-        np.stack([c.b_B for c in capsules]) @ rotation.T + origin,
-        np.array([c.radius for c in capsules]),
-    )
+    a, b, radius = capsule_arrays(capsules)
+    return Capsules(a @ rotation.T + origin, b @ rotation.T + origin, radius)
 
 
 def _collide(
-    plant: MultibodyPlant, body: RigidBody, capsule: Capsule, radius: float, name: str
+    plant: MultibodyPlant, body: RigidBody, capsule: Capsule, thinner: float, name: str
 ) -> None:
-    axis = capsule.b_B - capsule.a_B
-    length = float(np.linalg.norm(axis))
-    center = 0.5 * (capsule.a_B + capsule.b_B)
+    """Registers a capsule's collision geometry, with radii less by `thinner`, m."""
     skin = ProximityProperties()
     AddContactMaterial(
         dissipation=_DISSIPATION,
@@ -99,8 +94,6 @@ def _collide(
         friction=CoulombFriction(_FRICTION, _FRICTION),
         properties=skin,
     )
-    if length < 1e-9:
-        plant.RegisterCollisionGeometry(body, RigidTransform(center), Sphere(radius), name, skin)
-        return
-    turned = RigidTransform(RotationMatrix.MakeFromOneVector(axis / length, 2), center)
-    plant.RegisterCollisionGeometry(body, turned, CapsuleShape(radius, length), name, skin)
+    first, second = (r - thinner for r in capsule.radii)
+    shape, X_BG = limb_shape(capsule.a_B, capsule.b_B, (first, second), collides=True)
+    plant.RegisterCollisionGeometry(body, X_BG, shape, name, skin)

@@ -16,9 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from pydrake.geometry import Capsule as CapsuleShape
-from pydrake.geometry import Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
@@ -44,9 +42,12 @@ from drake_dress.models.human.body import (
     Capsule,
     Posture,
     body_capsules,
+    capsule_arrays,
     shoulder_joint,
 )
+from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side
+from drake_dress.report.shapes import limb_shape
 
 Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
@@ -194,9 +195,10 @@ def add_person(
     bodies: dict[str, RigidBody] = {"torso": torso}
     points: list[tuple[int, FloatArray]] = []
     for side in SIDES:
-        upper, fore = _add_arm(plant, model, torso, measures, posture, side, arms[side], joints)
+        own = measures.of(side)
+        upper, fore = _add_arm(plant, model, torso, own, posture, side, arms[side], joints)
         bodies[f"{side}_upper_arm"], bodies[f"{side}_forearm"] = upper, fore
-        hand = np.array([0.0, 0.0, -measures.forearm_length])
+        hand = np.array([0.0, 0.0, -own.forearm_length])
         points += [
             (int(upper.index()), np.zeros(3)),
             (int(fore.index()), np.zeros(3)),
@@ -206,13 +208,13 @@ def add_person(
         for i, c in enumerate(capsules):
             _register(plant, bodies[c.body], c, f"{c.body}_{i}")
         add_body_contact(plant, bodies, capsules, measures, posture, arms)
-    limb = [measures.upper_arm_radius, measures.forearm_radius, measures.hand_radius]
+    radius = [r for side in SIDES for r in measures.of(side).joint_radii]
     return Person(
         model,
         capsules,
         {name: body.index() for name, body in bodies.items()},
         points,
-        np.array(limb * 2),
+        np.array(radius),
         origin,
         turns,
     )
@@ -250,10 +252,11 @@ def person_arms(
 
 def person_model(body: BodyMeasures, stance: Posture, person: Person) -> PersonModel:
     """Returns the controllers' model of a person: capsules, shoulders and limb radii."""
+    of_arms = [c for c in person.capsules if c.body != "torso"]
     return PersonModel(
         capsules=person.capsules,
         shoulders=np.stack([shoulder_joint(body, stance, side) for side in SIDES]),
-        radius=(body.upper_arm_radius, body.forearm_radius, body.hand_radius),
+        radius=capsule_arrays(of_arms)[2].reshape(2, 3, 2),
     )
 
 
@@ -300,11 +303,12 @@ def _add_arm(
     link = SpatialInertia.SolidSphereWithMass(0.05, 0.03)
     first = plant.AddRigidBody(f"{side}_shoulder_1", model, link)
     second = plant.AddRigidBody(f"{side}_shoulder_2", model, link)
+    of_upper, of_fore = m.arm_masses
     upper = plant.AddRigidBody(
-        f"{side}_upper_arm", model, _limb(m.upper_arm_mass, m.upper_arm_radius, m.upper_arm_length)
+        f"{side}_upper_arm", model, _limb(of_upper, m.upper_arm_radii, m.upper_arm_length)
     )
     fore = plant.AddRigidBody(
-        f"{side}_forearm", model, _limb(m.forearm_mass, m.forearm_radius, m.forearm_length)
+        f"{side}_forearm", model, _limb(of_fore, m.forearm_radii, m.forearm_length)
     )
     at_shoulder = RigidTransform(shoulder_joint(m, posture, side))
     at_elbow = RigidTransform(np.array([0.0, 0.0, -m.upper_arm_length]))
@@ -339,26 +343,22 @@ def _fixed(name: str, parent: RigidBody, X_PJ: RigidTransform | None) -> FixedOf
     return FixedOffsetFrame(f"{name}_frame", parent.body_frame(), X_PJ or RigidTransform())
 
 
-def _limb(mass: float, radius: float, length: float) -> SpatialInertia:
-    """Returns the inertia of a solid capsule from the origin down to −length."""
-    unit = UnitInertia.SolidCapsule(radius, length, np.array([0.0, 0.0, 1.0]))
-    center = np.array([0.0, 0.0, -0.5 * length])
+def _limb(mass: float, radii: tuple[float, float], length: float) -> SpatialInertia:
+    """Returns the inertia of a solid round cone from the origin down to −length."""
+    axis = np.array([0.0, 0.0, 1.0])
+    if radii[0] == radii[1]:
+        unit = UnitInertia.SolidCapsule(radii[0], length, axis)
+        center = np.array([0.0, 0.0, -0.5 * length])
+    else:
+        s = solid(length, radii)
+        unit = UnitInertia.AxiallySymmetric(s.about_axis, s.across, axis)
+        center = np.array([0.0, 0.0, -s.center])
     return SpatialInertia(mass, np.zeros(3), unit).Shift(-center)
 
 
 def _register(plant: MultibodyPlant, body: RigidBody, capsule: Capsule, name: str) -> None:
-    axis = capsule.b_B - capsule.a_B
-    length = float(np.linalg.norm(axis))
-    center = 0.5 * (capsule.a_B + capsule.b_B)
-    if length < 1e-9:
-        plant.RegisterVisualGeometry(
-            body, RigidTransform(center), Sphere(capsule.radius), name, _SKIN
-        )
-        return
-    rotation = RotationMatrix.MakeFromOneVector(axis / length, 2)
-    plant.RegisterVisualGeometry(
-        body, RigidTransform(rotation, center), CapsuleShape(capsule.radius, length), name, _SKIN
-    )
+    shape, X_BG = limb_shape(capsule.a_B, capsule.b_B, capsule.radii)
+    plant.RegisterVisualGeometry(body, X_BG, shape, name, _SKIN)
 
 
 def joint_positions(plant: MultibodyPlant, context: Context, person: Person) -> FloatArray:

@@ -10,6 +10,7 @@ from drake_dress.diagrams.scenario import resolved_yaml
 from drake_dress.diagrams.setup import Setup
 from drake_dress.diagrams.station import Station
 from drake_dress.file_output import RUN_FILES
+from drake_dress.models.human.body import capsule_arrays
 from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 
@@ -32,7 +33,7 @@ def open_run_log(out: Path, setup: Setup, station: Station, forecast: bool = Fal
             version=__version__,
             seed=scenario.seed,
             radius=person.radius,
-            capsule_radius=[c.radius for c in person.capsules],
+            capsule_radius=capsule_arrays(person.capsules)[2],
             estimate_garment=garments.belief,
             bases=arm_bases(station.robots),
             estimated=station.in_real_time,

@@ -29,6 +29,7 @@ from drake_dress.models.human.body import (
     Posture,
     arm_points,
     body_capsules,
+    capsule_arrays,
 )
 from drake_dress.models.sides import SIDES, Side
 
@@ -163,9 +164,7 @@ class PersonShape:
         names = self.LIMB_NAMES
         self.limb = np.array([names.index(c.body) if c.body in names else -1 for c in capsules])
         self.posed = np.concatenate([arm_points(sizes, stance, side, arms[side]) for side in SIDES])
-        self._radius = np.array([c.radius for c in capsules])
-        self._a = np.array([c.a_B for c in capsules])
-        self._b = np.array([c.b_B for c in capsules])
+        self._a, self._b, self._radius = capsule_arrays(capsules)
         # a hand is a sphere of the forearm's limb: both ends of its axis coincide
         self._hand = np.array([np.array_equal(c.a_B, c.b_B) for c in capsules]) & (self.limb >= 0)
 

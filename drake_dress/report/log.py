@@ -221,19 +221,21 @@ class RunLog:
 
     @cached_property
     def capsules(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Ends (T,c,3), (T,c,3) and radius (c,) of the person's capsules, m.
+        """Ends (T,c,3), (T,c,3) and radii (c,2) at both ends of the person's capsules, m.
 
-        If the log has none: the four limbs between the joints, each with its joints' mean radius.
+        If the log has none: the four limbs between the joints, with the joints' radii.
         """
         if "/human/capsule_radius" in self.file:
+            radius = self._read("/human/capsule_radius")
+            end = "/human/capsule_end_radius"
             return (
                 self._read("/human/capsule_a"),
                 self._read("/human/capsule_b"),
-                self._read("/human/capsule_radius"),
+                np.column_stack([radius, self._read(end) if end in self.file else radius]),
             )
         first, second = [0, 1, 3, 4], [1, 2, 4, 5]
-        radius = 0.5 * (self.joint_radius[first] + self.joint_radius[second])
-        return self.joint_position[:, first], self.joint_position[:, second], radius
+        radii = np.column_stack([self.joint_radius[first], self.joint_radius[second]])
+        return self.joint_position[:, first], self.joint_position[:, second], radii
 
     @cached_property
     def intent(self) -> IndexArray | None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.round_cone import both_radii
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log_schema import (
     ARM_SERIES,
@@ -40,7 +41,8 @@ class LogContent:
         seed: Seed of the run.
         radius: (6,) limb radius at shoulder, elbow, hand of left, then of right, m.
         joint_names: Names of these six joints.
-        capsule_radius: (c,) radii of the person's capsules, m; None: no capsules are logged.
+        capsule_radius: (c,2) radii of the person's capsules at both ends, m, or (c,); None: no
+            capsules are logged.
         estimate_garment: The controller's garment; None: its positions are not logged.
         bases: X_WB (4,4) of each arm, if samples have arms.
         estimated: Whether garment and person are estimates because the truth is not known; contact
@@ -225,7 +227,9 @@ def _add_estimated_garment(layout: _Layout, garment: GarmentMesh) -> None:
 
 
 def _add_capsules(layout: _Layout, radius: npt.ArrayLike) -> None:
-    capsules = np.asarray(radius, dtype=np.float64).ravel()
-    layout.constant("/human/capsule_radius", capsules, "m")
+    radii = both_radii(np.asarray(radius, dtype=np.float64))
+    layout.constant("/human/capsule_radius", radii[:, 0], "m")
+    if np.any(radii[:, 1] != radii[:, 0]):
+        layout.constant("/human/capsule_end_radius", radii[:, 1], "m")
     for end in "ab":
-        layout.add(f"/human/capsule_{end}", (len(capsules), 3), "m", "world", dtype="f8")
+        layout.add(f"/human/capsule_{end}", (len(radii), 3), "m", "world", dtype="f8")

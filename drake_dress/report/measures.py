@@ -119,7 +119,7 @@ def penetration_depth(
         edges: (E,2) node indices.
         a: (c,3) first ends of the capsules, m.
         b: (c,3) second ends of the capsules, m.
-        radius: (c,) radii of the capsules, m.
+        radius: (c,2) radii of the capsules at both ends, m.
     """
     x = position.astype(np.float64)
     middles = 0.5 * (x[edges[:, 0]] + x[edges[:, 1]])

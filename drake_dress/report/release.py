@@ -98,5 +98,5 @@ def _collar_to_neck(log: RunLog) -> float | None:
     neck = find_neck(a, b, 0.5 * (joints[0] + joints[3]))
     if collar is None or neck is None or not (np.isfinite(x).all() and np.isfinite(joints).all()):
         return None
-    ends = nape(joints, float(log.joint_radius[0]), float(radius[neck]))
+    ends = nape(joints, float(log.joint_radius[0]), float(radius[neck, 0]))
     return distance_to_nape(collar.at(x), ends)

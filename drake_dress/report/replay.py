@@ -7,8 +7,8 @@ import time as clock
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Capsule, Mesh, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import Mesh, Meshcat, Rgba
+from pydrake.math import RigidTransform
 
 from drake_dress.errors import UserError
 from drake_dress.interrupt import caught_interrupt
@@ -19,6 +19,7 @@ from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.scene import DressingScene
+from drake_dress.report.shapes import limb_pose, limb_shape
 from drake_dress.report.web_page import open_page
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
@@ -121,9 +122,8 @@ class MeshcatReplay:
 
     def _add_bodies(self) -> None:
         a, b, radius = self._log.capsules
-        for k, r in enumerate(radius):
-            length = float(np.linalg.norm(b[0, k] - a[0, k]))
-            shape = Capsule(float(r), length) if length > 1e-6 else Sphere(float(r))
+        for k, (r_a, r_b) in enumerate(radius):
+            shape, _ = limb_shape(a[0, k], b[0, k], (float(r_a), float(r_b)))
             self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
         poses = arm_poses(self._log, np.array([0]))[0]
         for arm, base in enumerate(poses[:, 0]):
@@ -151,12 +151,7 @@ class MeshcatReplay:
             self.scene.show_forecast(log.forecast.joint_position[i], log.forecast.radius[i])
         first, second, _ = log.capsules
         for k, (a, b) in enumerate(zip(first[i], second[i], strict=True)):
-            axis = b - a
-            rotation = RotationMatrix()
-            if np.linalg.norm(axis) > 1e-6:
-                rotation = RotationMatrix.MakeFromOneVector(axis, 2)
-            pose = RigidTransform(rotation, 0.5 * (a + b))
-            self._meshcat.SetTransform(f"dressing/person/{k}", pose)
+            self._meshcat.SetTransform(f"dressing/person/{k}", limb_pose(a, b))
         for arm, poses in enumerate(arm_poses(log, np.array([i]))[0]):
             for k, X in enumerate(poses):
                 self._meshcat.SetTransform(f"dressing/arms/{arm}/{k}", RigidTransform(X))

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.common import MemoryFile
 from pydrake.geometry import (
     Box,
-    Capsule,
     ClippingRange,
     ColorRenderCamera,
     Cylinder,
     GeometryInstance,
-    InMemoryMesh,
     LightParameter,
     MakeRenderEngineVtk,
     Mesh,
@@ -25,7 +22,6 @@ from pydrake.geometry import (
     Rgba,
     SceneGraph,
     Shape,
-    Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
@@ -33,6 +29,7 @@ from pydrake.systems.sensors import CameraInfo
 from drake_dress.models.arm.description import link_meshes
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
+from drake_dress.report.shapes import limb_shape, mesh_shape
 
 _Color = tuple[float, float, float]
 
@@ -79,7 +76,7 @@ def render_still(
     Args:
         faces: (F,3) triangles of the garment; their normals point outward.
         position: (n,3) nodes, world, m.
-        person: Ends (c,3), (c,3) and radii (c,) of the person's capsules, world, m.
+        person: Ends (c,3), (c,3) and radii (c,2) of the person's capsules, world, m.
         grippers: (g,3) positions of the grippers, world, m.
         camera: Camera pose.
         size: Width and height, pixels.
@@ -106,10 +103,10 @@ def render_still(
 def floor_height(
     position: FloatArray, capsule_a: FloatArray, capsule_b: FloatArray, capsule_radius: FloatArray
 ) -> float:
-    """Returns a height just below the garment (n,3) and capsules (c,3), (c,3), (c,), m."""
+    """Returns a height just below the garment (n,3) and capsules (c,3), (c,3), (c,2), m."""
     low = float(position[:, 2].min())
     if len(capsule_radius):
-        ends = np.minimum(capsule_a[:, 2], capsule_b[:, 2]) - capsule_radius
+        ends = np.stack([capsule_a[:, 2], capsule_b[:, 2]], axis=1) - capsule_radius
         low = min(low, float(ends.min()))
     return low - 0.005
 
@@ -148,9 +145,11 @@ class _Scene:
     def add_garment(self, faces: IntArray, position: FloatArray) -> None:
         """Adds a garment with nodes (n,3), m: its outside, and the lining behind it."""
         normals = node_normals(faces, position)
-        self.add(_mesh(faces, position, normals), RigidTransform(), OUTSIDE_COLOR)
+        self.add(mesh_shape(faces, position, normals, "garment"), RigidTransform(), OUTSIDE_COLOR)
         lining = position - _LINING_OFFSET * normals
-        self.add(_mesh(faces[:, ::-1], lining, -normals), RigidTransform(), LINING_COLOR)
+        self.add(
+            mesh_shape(faces[:, ::-1], lining, -normals, "garment"), RigidTransform(), LINING_COLOR
+        )
 
     def add_arms(self, poses: FloatArray, floor: float) -> None:
         """Adds robot arms with bases and links at `poses` (a,8,4,4), on columns from the floor."""
@@ -165,14 +164,9 @@ class _Scene:
     def add_capsules(
         self, first: FloatArray, second: FloatArray, radius: FloatArray, color: _Color
     ) -> None:
-        """Adds capsules with ends (c,3), (c,3) and radii (c,), m; spheres for zero length."""
-        for a, b, r in zip(first, second, radius, strict=True):
-            length = float(np.linalg.norm(b - a))
-            if length > 1e-6:
-                rotation = RotationMatrix.MakeFromOneVector(b - a, 2)
-                self.add(Capsule(r, length), RigidTransform(rotation, 0.5 * (a + b)), color)
-            else:
-                self.add(Sphere(r), RigidTransform(a), color)
+        """Adds limbs with ends (c,3), (c,3) and radii (c,2) at both, m."""
+        for a, b, radii in zip(first, second, radius, strict=True):
+            self.add(*limb_shape(a, b, (radii[0], radii[1])), color)
 
     def picture(self, camera: CameraPose, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
         """Returns the camera image (height, width, 3), RGB."""
@@ -180,14 +174,6 @@ class _Scene:
         query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
         image = query.RenderColorImage(_camera(camera, size), graph.world_frame_id(), _pose(camera))
         return np.array(image.data[:, :, :3])
-
-
-def _mesh(faces: IntArray, position: FloatArray, normals: FloatArray) -> Mesh:
-    lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in position]
-    lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in normals]
-    lines += [f"f {i}//{i} {j}//{j} {k}//{k}" for i, j, k in faces + 1]
-    text = "\n".join(lines) + "\n"
-    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "garment")))
 
 
 def _render_parameters(brightness: float) -> RenderEngineVtkParams:

@@ -36,7 +36,7 @@ class Surroundings:
     """Packs all inputs of a step other than the garment into one array.
 
     Attributes:
-        radius: (m,) radii of the capsules, m.
+        radius: (m,2) radii of the limbs at both ends, m.
         held_count: Number of nodes with prescribed motion.
     """
 
@@ -49,7 +49,7 @@ class Surroundings:
         return 12 * len(self.radius) + 3 * self.held_count + 1
 
     def flat(self, capsules: Obstacles, held_velocity: FloatArray) -> FloatArray:
-        """Returns the array of `size` that packs capsules and the held nodes' velocities (k,3).
+        """Returns the array of `size` that packs limbs and the held nodes' velocities (k,3).
 
         The velocities are (0,3) once the nodes are let go.
         """
@@ -62,7 +62,7 @@ class Surroundings:
         return np.concatenate([p.ravel() for p in parts])
 
     def of(self, flat: FloatArray) -> tuple[Obstacles, FloatArray]:
-        """Returns the capsules and held velocities (k,3), or (0,3), packed in an array."""
+        """Returns the limbs and held velocities (k,3), or (0,3), packed in an array."""
         end = 12 * len(self.radius)
         a, b, velocity, omega = flat[:end].reshape(4, -1, 3)
         held = flat[end:-1].reshape(-1, 3)

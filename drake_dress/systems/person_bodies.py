@@ -11,7 +11,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.human.body import Capsule
+from drake_dress.models.human.body import Capsule, capsule_arrays
 from drake_dress.systems.body_frames import frames
 
 
@@ -27,7 +27,7 @@ class PersonBodies:
         body_of: (k,) for each capsule, the position of its body in `index`.
         limb_of: (k,) for each capsule, the number of its limb; −1 on the trunk and legs.
         limb_count: Number of limbs: upper arms and forearms.
-        radius: (k,) radii of the capsules, m.
+        radius: (k,2) radii of the capsules at both ends, m.
     """
 
     def __init__(self, capsules: Sequence[Capsule], body_indices: Mapping[str, BodyIndex]) -> None:
@@ -37,9 +37,7 @@ class PersonBodies:
         self.body_of = np.array([names.index(c.body) for c in capsules], dtype=np.int32)
         self.limb_of = np.array([limbs.index(c.body) if c.body in limbs else -1 for c in capsules])
         self.limb_count = len(limbs)
-        self.radius = np.array([c.radius for c in capsules])
-        self._a = np.array([c.a_B for c in capsules])
-        self._b = np.array([c.b_B for c in capsules])
+        self._a, self._b, self.radius = capsule_arrays(capsules)
 
     def obstacles(
         self, poses: Sequence[RigidTransform], velocities: Sequence[SpatialVelocity]

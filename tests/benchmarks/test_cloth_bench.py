@@ -22,6 +22,7 @@ from benchmarks.cloth import (
     garments,
     growth,
     layers,
+    limbs,
     measure,
     motions,
     placement,
@@ -189,6 +190,23 @@ def test_backward_is_finite_in_contact(session: Session) -> None:
     assert run["finite"]
     assert run["adjoint_median_s"] > 0.0
     assert "backward" in backward.tables(result)[0].text()
+    _assert_json(result)
+
+
+def test_tapered_limbs_are_touched_and_timed_beside_capsules(session: Session) -> None:
+    result = limbs.measure(session)
+    assert [run["step"] for run in result["runs"]] == ["plant", "controller, with adjoint"]
+    for run in result["runs"]:
+        assert min(run["contacts"]) > 5
+        assert min(run["ratio"], run["arithmetic_ratio"]) > 0.0
+        # a taper of a millionth is touched where capsules are
+        assert run["contacts"][1] == pytest.approx(run["contacts"][0], rel=0.1)
+    body = limbs.body_in_coat(garments.jacket(0.06), 0.2, 0.3, 0.0)
+    assert result["limbs"] == body.count == 11
+    np.testing.assert_allclose(body.radius[:, 0] / body.radius[:, 1], 1.5)
+    assert len(limbs.figures(result)) == 4
+    assert not limbs.figures(None)
+    assert "11 limbs" in limbs.tables(result)[0].text()
     _assert_json(result)
 
 

@@ -105,7 +105,7 @@ class Lab:
             "garment": mesh.rest_position + (hung - held).mean(axis=0),
             "person": np.vstack([self.p.beliefs.person.pose.shoulders[[i, i, i]] for i in (0, 1)]),
         }
-        upper, fore = self.p.beliefs.person.pose.limbs
+        upper, fore = self.p.beliefs.person.pose.limbs[0]
         self.points["person"][[1, 4], 2] -= upper
         self.points["person"][[2, 5], 2] -= upper + fore
 

@@ -10,7 +10,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from drake_dress.diagrams.person import JointParameters, add_person, joint_positions
 from drake_dress.models.arm.clearance import Capsules, clearance
-from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, body_capsules
+from drake_dress.models.human.body import (
+    ArmPose,
+    BodyMeasures,
+    Posture,
+    body_capsules,
+    capsule_arrays,
+)
 from drake_dress.models.sides import Side
 
 M = BodyMeasures()
@@ -23,12 +29,16 @@ TRUNK = 3  # capsules of the chest come first
 
 
 def drawn(
-    posture: Posture, arms: dict[Side, ArmPose], forces: dict[int, list[float]], duration: float
+    posture: Posture,
+    arms: dict[Side, ArmPose],
+    forces: dict[int, list[float]],
+    duration: float,
+    body: BodyMeasures | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns joints (6,3), m, before and after `forces` (3,), N, acted on some of them."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.004)
-    person = add_person(plant, M, posture, arms, JointParameters(2.0, 1.0, 1.5, 0.4))
+    person = add_person(plant, body or M, posture, arms, JointParameters(2.0, 1.0, 1.5, 0.4))
     plant.Finalize()
     diagram = builder.Build()
     simulator = Simulator(diagram)
@@ -76,6 +86,31 @@ def test_an_arm_that_is_drawn_inward_stops_at_the_chest(posture: Posture, side: 
     _, joints = drawn(posture, OPEN, {3 * side + 1: [0.0, 20.0 * inward, 0.0]}, 2.0)
     # it touches, and sinks into the flesh under 20 N and the springs
     assert -0.002 < into_chest(joints, chest(posture)) < 0.01
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_tapered_arm_stops_at_a_tapered_trunk(side: int) -> None:
+    body = BodyMeasures(
+        elbow_radius=0.036,
+        wrist_radius=0.026,
+        waist_width=0.27,
+        waist_depth=0.18,
+        hip_width=0.34,
+        hip_depth=0.21,
+    )
+    inward = 1.0 if side else -1.0
+    trunk = Capsules(*capsule_arrays(body_capsules(body, "standing")[:9]))
+
+    def depth(joints: np.ndarray) -> float:
+        first, second = joints[[0, 1, 3, 4]], joints[[1, 2, 4, 5]]
+        arms = Capsules(first, second, np.array([body.upper_arm_radii, body.forearm_radii] * 2))
+        pairs = np.array([[i, j] for i in range(4) for j in range(9)])
+        return -float(clearance(arms, trunk, pairs).distance.min())
+
+    _, free = drawn("standing", OPEN, {}, 0.1, body)
+    assert depth(free) < 0.0
+    _, joints = drawn("standing", OPEN, {3 * side + 1: [0.0, 20.0 * inward, 0.0]}, 2.0, body)
+    assert -0.002 < depth(joints) < 0.01
 
 
 def test_hands_do_not_go_through_each_other() -> None:

@@ -19,16 +19,25 @@ from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_dress.diagrams.person import JointParameters, Person, add_person, joint_positions
+from drake_dress.diagrams.person import (
+    JointParameters,
+    Person,
+    add_person,
+    joint_positions,
+    person_arms,
+)
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.body import (
+    ArmMeasures,
     ArmPose,
     BodyMeasures,
     Posture,
     arm_points,
     shoulder_height,
 )
+from drake_dress.models.human.measures import FOREARM_MASS
+from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side
 
 M = BodyMeasures()
@@ -46,9 +55,10 @@ def make(
     arms: dict[Side, ArmPose] = OPEN,
     joints: JointParameters = JOINTS,
     position: FloatArray | None = None,
+    measures: BodyMeasures = M,
 ) -> tuple[MultibodyPlant, Person]:
     plant = MultibodyPlant(0.002)
-    person = add_person(plant, M, posture, arms, joints, position)
+    person = add_person(plant, measures, posture, arms, joints, position)
     plant.Finalize()
     return plant, person
 
@@ -256,9 +266,39 @@ def test_limb_radii_and_masses_are_those_measured() -> None:
     context = plant.CreateDefaultContext()
     for side in SIDES:
         body = plant.get_body(person.body_indices[f"{side}_forearm"])
-        assert body.get_mass(context) == pytest.approx(M.forearm_mass)
+        assert body.get_mass(context) == FOREARM_MASS
         center = body.CalcCenterOfMassInBodyFrame(context)
         np.testing.assert_allclose(center, [0.0, 0.0, -0.5 * M.forearm_length], atol=1e-12)
+
+
+def test_tapered_arms_have_the_mass_properties_of_round_cones() -> None:
+    body = replace(
+        M, elbow_radius=0.035, wrist_radius=0.025, left=ArmMeasures(upper_arm_length=0.2)
+    )
+    plant, person = make(measures=body)
+    context = plant.CreateDefaultContext()
+    for side in SIDES:
+        own = body.of(side)
+        for name, length, radii, mass in (
+            ("upper_arm", own.upper_arm_length, own.upper_arm_radii, own.arm_masses[0]),
+            ("forearm", own.forearm_length, own.forearm_radii, own.arm_masses[1]),
+        ):
+            limb = plant.get_body(person.body_indices[f"{side}_{name}"])
+            assert limb.get_mass(context) == mass
+            center = limb.CalcCenterOfMassInBodyFrame(context)
+            expected = solid(length, radii)
+            np.testing.assert_allclose(center, [0.0, 0.0, -expected.center], atol=1e-12)
+            inertia = limb.CalcSpatialInertiaInBodyFrame(context).Shift(center)
+            moments = inertia.CalcRotationalInertia().get_moments() / mass
+            across, about = expected.across, expected.about_axis
+            np.testing.assert_allclose(moments, [across, across, about], rtol=1e-9)
+    np.testing.assert_array_equal(person.radius, [0.045, 0.038, 0.04] * 2)
+    # the tone holds the arms where they are
+    model = person_arms(body, "standing", OPEN, JOINTS)
+    torque = person.tone_torque(plant)[person.arm_dofs(plant)].reshape(2, 4)
+    for arm, rest, found in zip(model.arms, model.rest, torque, strict=True):
+        # bodies between the hinges of a shoulder weigh, too, but have no lever
+        np.testing.assert_allclose(found, -arm.gravity_torque(rest), atol=1e-9)
 
 
 def test_a_pose_past_a_limit_is_kept_as_the_person_holds_it() -> None:

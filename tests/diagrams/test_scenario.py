@@ -31,6 +31,7 @@ from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.learned.forecast import PersonHistory, PersonPredictor
 from drake_dress.models.human.learned.weights import SHIPPED
+from drake_dress.models.human.measures import FOREARM_MASS, UPPER_ARM_MASS
 from drake_dress.models.human.motions import Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.prediction import (
     PREDICTORS,
@@ -50,9 +51,11 @@ garment:
   mesh: {file: a.obj, unit: cm, loops: {left_cuff: [1, 2, 3]}, grasp: {left: [4]}}
 person:
   posture: sitting
-  measures: {shoulder_width: 0.4}
+  measures: {shoulder_width: 0.4, waist_girth: 0.8, elbow_radius: 0.04}
+  left_measures: {forearm_length: 0.3, wrist_girth: 0.16}
+  right_measures: {hand_radius: 0.035}
   left_arm: {abduction_deg: 20.0}
-  joints: {shoulder_stiffness: 3.0}
+  joints: {shoulder_stiffness: 3.0, elbow_limits_deg: [0, 120]}
   behaviour:
     kind: active
     following: {time_constant: 0.5, return_time_constant: 20.0}
@@ -209,6 +212,8 @@ def test_seed_alone_decides_what_varies(tmp_path: Path) -> None:
     assert 0.95 <= first.garment.coat.scale <= 1.05
 
 
+# of limbs whose masses follow from their volumes
+MASSES = {"upper_arm_mass": UPPER_ARM_MASS, "forearm_mass": FOREARM_MASS}
 WIDTHS = st.fixed_dictionaries(
     {
         "coat_scale": st.floats(0.001, 0.05),
@@ -244,8 +249,9 @@ def test_variation_acts_on_every_measure_and_within_its_width(
         ),
     ):
         ratios = {}
-        for name, value in plain.items():
-            if name.startswith("grasp"):
+        for name, before in plain.items():
+            value = MASSES.get(name, before)
+            if name.startswith("grasp") or value is None:
                 assert varied[name] == value
                 continue
             power = 3 if name.endswith("mass") else 1

@@ -144,8 +144,9 @@ def write(
     samples: list[Sample],
     seed: int = 3,
     scenario: str = "seed: 3\n",
+    taper: float = 1.0,
 ) -> Path:
-    """Writes samples to a log and returns its path."""
+    """Writes samples to a log and returns its path; limbs end with `taper` times their radius."""
     _, _, radius = capsules(dressed_joints(garment))
     with RunLogWriter(
         path,
@@ -155,7 +156,7 @@ def write(
             version="0.0",
             seed=seed,
             radius=np.full(6, ARM_RADIUS),
-            capsule_radius=radius,
+            capsule_radius=np.column_stack([radius, taper * radius]),
             estimate_garment=garment,
             forecast=bool(samples) and samples[0].forecast is not None,
         ),

@@ -50,6 +50,24 @@ def eager_writer(path: Path, garment: GarmentMesh) -> RunLogWriter:
     )
 
 
+def test_tapered_limbs_have_a_radius_at_each_end(
+    tmp_path: Path, garment: GarmentMesh, samples: list[Sample]
+) -> None:
+    radius = synthetic.capsules(np.asarray(samples[0].joint_position))[2]
+    tapered = np.column_stack([radius, np.linspace(0.5, 1.0, len(radius)) * radius])
+    for name, given in (("tapered", tapered), ("plain", radius)):
+        content = synthetic.content(garment, capsule_radius=given)
+        with RunLogWriter(tmp_path / f"{name}.h5", content) as log:
+            log.append(samples[0])
+    with RunLog.open(tmp_path / "tapered.h5") as log:
+        np.testing.assert_array_equal(log.capsules[2], tapered)
+        np.testing.assert_array_equal(log.file["/human/capsule_radius"], radius)
+    with RunLog.open(tmp_path / "plain.h5") as log:
+        np.testing.assert_array_equal(log.capsules[2], np.column_stack([radius, radius]))
+        # logs of persons without tapered limbs are as they were
+        assert "/human/capsule_end_radius" not in log.file
+
+
 def test_what_is_read_is_what_was_written(
     path: Path, garment: GarmentMesh, samples: list[Sample]
 ) -> None:

@@ -36,6 +36,23 @@ def test_nothing_is_loaded_from_elsewhere(page: Path) -> None:
 
 
 @needs_chromium
+def test_limbs_that_grow_toward_their_ends_look_thicker(page: Path, tmp_path: Path) -> None:
+    garment = synthetic.coat(0.05)
+    grown = synthetic.write(tmp_path / "run.h5", garment, synthetic.dressing(garment), taper=1.8)
+    with RunLog.open(grown) as log:
+        write_replay_html(log, tmp_path / "replay.html")
+
+    def skin(of: Path, name: str) -> float:
+        picture = screenshot(f"{of.as_uri()}#t=0", tmp_path, name)[170:530]
+        red, blue = picture[:, :, 0], picture[:, :, 2]
+        return float(((red > blue + 0.12) & (red > 0.4)).mean())
+
+    plain = skin(page, "plain")
+    assert plain > 0.002
+    assert skin(tmp_path / "replay.html", "grown") > 1.15 * plain
+
+
+@needs_chromium
 def test_garment_moves_and_the_rest_stays(page: Path, tmp_path: Path) -> None:
     first = screenshot(f"{page.as_uri()}#t=0", tmp_path, "first")
     again = screenshot(f"{page.as_uri()}#t=0", tmp_path, "again")

@@ -8,14 +8,14 @@ from drake_dress.report.stills import CameraPose, node_normals, render_still
 from tests.report import synthetic
 
 
-def _picture(offset: float) -> np.ndarray:
+def _picture(offset: float, taper: float = 1.0) -> np.ndarray:
     garment = synthetic.coat(0.05)
-    joints = synthetic.dressed_joints(garment)
+    first, second, radius = synthetic.capsules(synthetic.dressed_joints(garment))
     position = garment.rest_position + [0.0, offset, synthetic.SHOULDER_HEIGHT]
     return render_still(
         garment.faces,
         position,
-        synthetic.capsules(joints),
+        (first, second, np.stack([radius, taper * radius], axis=1)),
         grippers=np.array([[0.0, 0.3, 1.5]]),
         camera=CameraPose((2.8, 0.4, 1.5), (0.0, 0.0, 1.1)),
         size=(320, 240),
@@ -39,6 +39,14 @@ def test_person_is_skin_coloured_and_background_light() -> None:
     skin = (picture[:, :, 0] > picture[:, :, 2] + 40.0) & (picture[:, :, 0] > 120.0)
     assert skin.mean() > 0.005
     assert picture[:20].mean() > 220.0
+
+
+def test_limbs_that_grow_toward_their_ends_show_more_skin() -> None:
+    def skin(picture: np.ndarray) -> float:
+        there = (picture[:, :, 0] > picture[:, :, 2] + 40.0) & (picture[:, :, 0] > 120.0)
+        return float(there.mean())
+
+    assert skin(_picture(0.0, 2.0)) > 1.2 * skin(_picture(0.0))
 
 
 def test_normals_of_a_flat_sheet_are_its_normal() -> None:

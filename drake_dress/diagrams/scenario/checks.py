@@ -8,6 +8,7 @@ from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Behaviour,
     Controller,
+    Joints,
     Motion,
     Safety,
     Scenario,
@@ -17,6 +18,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.human import motions
+from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.supervision.injection import sources_of
 
 
@@ -142,6 +144,18 @@ def check_cameras(source: str, scenario: Scenario) -> None:
                 source,
                 f"lab.faults[{i}].source",
                 f"is {fault.source!r}, expected {' or '.join(own)} with kind {fault.kind}",
+            )
+
+
+def check_joints(source: str, joints: Joints) -> None:
+    """Checks that the limits of each joint are a smaller and a larger angle."""
+    for name in JOINT_NAMES:
+        limits = getattr(joints, f"{name}_limits_deg")
+        if limits is not None and not (len(limits) == 2 and limits[0] < limits[1]):
+            raise UserError(
+                source,
+                f"person.joints.{name}_limits_deg",
+                f"is {limits}, expected the smallest and the largest angle in degrees",
             )
 
 

@@ -114,8 +114,9 @@ def markdown_table() -> str:
 def _groups(name: str, schema: type, values: Any, note: str) -> Iterator[Group]:
     """Yields a group and all groups below it, except the effects, which are no schema fields."""
     hints = typing.get_type_hints(schema)
-    doc = inspect.getdoc(schema.MODEL if issubclass(schema, Mirror) else schema) or ""
-    texts = _entries(doc)
+    texts = _entries(inspect.getdoc(schema) or "")
+    if issubclass(schema, Mirror):
+        texts |= _entries(inspect.getdoc(schema.MODEL) or "")
     keys, below = [], []
     for entry in dataclasses.fields(schema):
         hint, optional, many = _unwrapped(hints[entry.name])

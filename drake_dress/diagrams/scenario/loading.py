@@ -18,10 +18,12 @@ from drake_dress.diagrams.scenario.checks import (
     check_controller,
     check_costs,
     check_hardware,
+    check_joints,
     check_safety,
 )
 from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
-from drake_dress.diagrams.scenario.schema import SCHEMAS, GlobalMpc, Scenario
+from drake_dress.diagrams.scenario.girths import replace_girths
+from drake_dress.diagrams.scenario.schema import SCHEMAS, GlobalMpc, Measures, Scenario
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.scenario.typed import check_ranges, field_type, kind_of, typed
 from drake_dress.errors import UserError
@@ -64,14 +66,18 @@ def checked_scenario(scenario: Scenario, source: str = "scenario") -> Scenario:
     Raises:
         UserError: a value is unusable.
     """
-    return _checked(source, read_yaml(source, resolved_yaml(scenario)))
+    # all values are written, so those that are the default count as not given
+    return _checked(source, read_yaml(source, resolved_yaml(scenario)), vars(Measures()))
 
 
-def _checked(source: str, content: dict[str, Any]) -> Scenario:
+def _checked(
+    source: str, content: dict[str, Any], defaults: dict[str, float | None] | None = None
+) -> Scenario:
     """Returns the scenario that the content of a file describes."""
     _resolve_delay(source, content)
     fill_in_fidelity(content)
     content = typed(source, "", content, Scenario)
+    replace_girths(source, content, defaults or {})
     _fill_in_by_name(content)
     try:
         scenario: Scenario = yaml_load_typed(schema=Scenario, data=write_yaml(content))
@@ -82,6 +88,7 @@ def _checked(source: str, content: dict[str, Any]) -> Scenario:
     check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
     check_controller(source, scenario.controller)
     check_costs(source, scenario.controller.costs)
+    check_joints(source, scenario.person.joints)
     check_behaviour(source, scenario.person.behaviour)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)

@@ -27,7 +27,9 @@ class Mirror:
         def __getattr__(self, name: str) -> Any: ...
 
 
-def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirror]], type[Any]]:
+def mirror_of(
+    model: type, without: Collection[str] = (), lengths: Collection[str] = ()
+) -> Callable[[type[Mirror]], type[Any]]:
     """Returns a decorator that gives a class the fields of a model's settings.
 
     If a field of the model is itself a settings class, or a tuple of them, the mirror of that class
@@ -36,6 +38,7 @@ def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirr
     Args:
         model: frozen dataclass or named tuple, all of whose fields have defaults.
         without: its fields that the scenario has elsewhere.
+        lengths: further optional numbers, which are replaced by the model's when it is loaded.
     """
 
     def decorate(cls: type[Mirror]) -> type[Any]:
@@ -46,6 +49,7 @@ def mirror_of(model: type, without: Collection[str] = ()) -> Callable[[type[Mirr
                 continue
             default = getattr(model(), name)
             entries.append((name, _plain_type(hints[name]), _field(default)))
+        entries += [(name, float | None, _field(None)) for name in lengths]
         namespace = {"__doc__": cls.__doc__, "__module__": cls.__module__, "MODEL": model}
         made = dataclasses.make_dataclass(
             cls.__name__, entries, bases=(Mirror,), namespace=namespace
@@ -63,7 +67,12 @@ def model_of(values: Mirror, **elsewhere: Any) -> Any:
         values: the group.
         elsewhere: fields of the model that the group omits.
     """
-    given = {e.name: _frozen(getattr(values, e.name)) for e in dataclasses.fields(values)}
+    names = set(_field_names(values.MODEL))
+    given = {
+        e.name: _frozen(getattr(values, e.name))
+        for e in dataclasses.fields(values)
+        if e.name in names
+    }
     return values.MODEL(**given, **elsewhere)
 
 

@@ -1,5 +1,6 @@
 """Allowed words and ranges of a scenario's values."""
 
+import math
 import re
 from dataclasses import fields
 
@@ -135,6 +136,10 @@ _RANGES: dict[str, tuple[float, float]] = {
     "shoulder_damping": (0.0, 1000.0),
     "elbow_stiffness": (0.0, 1000.0),
     "elbow_damping": (0.0, 1000.0),
+    **{
+        f"{name}_limits_deg": (-180.0, 180.0)
+        for name in ("abduction", "extension", "rotation", "elbow")
+    },
     "abduction_deg": (-30.0, 150.0),
     "extension_deg": (-150.0, 70.0),
     "rotation_deg": (-70.0, 70.0),
@@ -363,8 +368,29 @@ _OF_MEASURES: dict[str, tuple[float, float]] = {
     "thigh_radius": (0.03, 0.20),
     "upper_arm_mass": (0.1, 8.0),
     "forearm_mass": (0.1, 6.0),
+    "elbow_radius": (0.012, 0.12),
+    "wrist_radius": (0.01, 0.08),
+    "knee_radius": (0.02, 0.15),
+    "ankle_radius": (0.015, 0.10),
+    "neck_base_radius": (0.02, 0.20),
+    "neck_length": (0.03, 0.25),
+    "waist_width": (0.12, 0.80),
+    "waist_depth": (0.08, 0.70),
+    "hip_depth": (0.08, 0.60),
+    "chest_girth": (0.35, 2.0),
+    "waist_girth": (0.35, 2.2),
+    "hip_girth": (0.35, 2.2),
 }
-_RANGES |= {f"measures.{name}": bounds for name, bounds in _OF_MEASURES.items()}
+_OF_MEASURES |= {
+    f"{name.removesuffix('_radius')}_girth": (2.0 * math.pi * low, 2.0 * math.pi * high)
+    for name, (low, high) in _OF_MEASURES.items()
+    if name.endswith("_radius")
+}
+_RANGES |= {
+    f"{group}.{name}": bounds
+    for group in ("measures", "left_measures", "right_measures")
+    for name, bounds in _OF_MEASURES.items()
+}
 
 
 def choices_of(key: str) -> tuple[str, ...] | None:

@@ -26,15 +26,16 @@ from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.load import MeshOptions
 from drake_dress.models.human import (
-    body,
     following,
     lowering,
+    measures,
     motions,
     prediction,
     stirring,
     tremor,
 )
 from drake_dress.models.human.active import ActiveParameters
+from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
@@ -156,9 +157,42 @@ class Material:
     margin: float = material.Material.margin
 
 
-@mirror_of(body.BodyMeasures)
+@mirror_of(measures.BodyMeasures, without=("left", "right"), lengths=GIRTHS)
 class Measures(Mirror):
-    """Body sizes, m, and masses, kg; see models/human/body.py."""
+    """Body sizes, m, and masses, kg; see models/human/measures.py.
+
+    Attributes:
+        upper_arm_girth: girth of the upper arm instead of its radius, m.
+        elbow_girth: girth of the arm above the elbow instead of its radius, m.
+        forearm_girth: girth of the forearm below the elbow instead of its radius, m.
+        wrist_girth: girth of the wrist instead of its radius, m.
+        hand_girth: girth of the hand instead of its radius, m.
+        neck_girth: girth of the neck below the head instead of its radius, m.
+        neck_base_girth: girth of the neck at the shoulders instead of its radius, m.
+        head_girth: girth of the head instead of its radius, m.
+        thigh_girth: girth of the thigh instead of its radius, m.
+        knee_girth: girth of the knee instead of its radius, m.
+        ankle_girth: girth of the ankle instead of its radius, m.
+        chest_girth: girth of the chest instead of its width, m. Without chest_depth, that is 0.625
+            of the width.
+        waist_girth: girth of the waist instead of its width, m. Without waist_depth, that is 0.73
+            of the width.
+        hip_girth: girth of the hips instead of their width, m. Without hip_depth, that is 0.7 of
+            the width.
+    """
+
+
+@mirror_of(measures.ArmMeasures, lengths=ARM_GIRTHS)
+class SideMeasures(Mirror):
+    """Sizes of one arm, m, and masses, kg, where they differ from `person.measures`.
+
+    Attributes:
+        upper_arm_girth: girth of the upper arm instead of its radius, m.
+        elbow_girth: girth of the arm above the elbow instead of its radius, m.
+        forearm_girth: girth of the forearm below the elbow instead of its radius, m.
+        wrist_girth: girth of the wrist instead of its radius, m.
+        hand_girth: girth of the hand instead of its radius, m.
+    """
 
 
 @dataclass
@@ -180,19 +214,31 @@ class Arm:
 
 @dataclass
 class Joints:
-    """Springs and dampers of the person's arm joints.
+    """Springs, dampers and limits of the person's arm joints.
 
     Attributes:
         shoulder_stiffness: stiffness of each shoulder joint, N·m/rad.
         shoulder_damping: damping of each shoulder joint, N·m·s/rad.
         elbow_stiffness: stiffness of the elbow, N·m/rad.
         elbow_damping: damping of the elbow, N·m·s/rad.
+        abduction_limits_deg: smallest and largest sideways elevation, degrees. If empty, -0.6 to
+            2.6 rad, that is -34 to 149 degrees.
+        extension_limits_deg: smallest and largest backward extension, degrees. If empty, -2.6 to
+            1.2 rad, that is -149 to 69 degrees.
+        rotation_limits_deg: smallest and largest rotation about the arm's own axis, degrees. If
+            empty, -1.2 to 1.2 rad, that is -69 to 69 degrees.
+        elbow_limits_deg: smallest and largest elbow flexion, degrees. If empty, 0 to 2.5 rad, that
+            is 0 to 143 degrees.
     """
 
     shoulder_stiffness: float = JointParameters.shoulder_stiffness
     shoulder_damping: float = JointParameters.shoulder_damping
     elbow_stiffness: float = JointParameters.elbow_stiffness
     elbow_damping: float = JointParameters.elbow_damping
+    abduction_limits_deg: list[float] | None = None
+    extension_limits_deg: list[float] | None = None
+    rotation_limits_deg: list[float] | None = None
+    elbow_limits_deg: list[float] | None = None
 
 
 @mirror_of(following.FollowingParameters)
@@ -345,14 +391,18 @@ class Person:
     Attributes:
         posture: standing or sitting.
         measures: body sizes.
+        left_measures: sizes of the left arm that differ.
+        right_measures: sizes of the right arm that differ.
         left_arm: rest pose of the left arm.
         right_arm: rest pose of the right arm.
-        joints: springs and dampers of the arm joints.
+        joints: springs, dampers and limits of the arm joints.
         behaviour: the person's own motions.
     """
 
     posture: str = "standing"
     measures: Measures = field(default_factory=Measures)
+    left_measures: SideMeasures = field(default_factory=SideMeasures)
+    right_measures: SideMeasures = field(default_factory=SideMeasures)
     left_arm: Arm = field(default_factory=Arm)
     right_arm: Arm = field(default_factory=Arm)
     joints: Joints = field(default_factory=Joints)

@@ -10,10 +10,19 @@ from dataclasses import fields
 import numpy as np
 
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
-from drake_dress.diagrams.scenario.schema import Coat, Measures, Scenario, Variation
+from drake_dress.diagrams.scenario.schema import (
+    Coat,
+    Person,
+    Scenario,
+    SideMeasures,
+    Variation,
+)
+from drake_dress.diagrams.sections.person import measures
+from drake_dress.models.sides import SIDES
 
 # Added to the seed for the generators of the later groups.
 _COAT, _PERSON = 1, 2
+_MASSES = ("upper_arm_mass", "forearm_mass")
 
 Draw = Callable[[float], float]
 
@@ -40,7 +49,7 @@ def apply_variation(scenario: Scenario) -> Scenario:
     if v.coat_measures > 0.0:
         _vary_coat(drawn.garment.coat, v.coat_measures, _uniform(scenario.seed, _COAT))
     if v.person_scale > 0.0 or v.person_measures > 0.0:
-        _vary_person(drawn.person.measures, v, _uniform(scenario.seed, _PERSON))
+        _vary_person(drawn.person, v, _uniform(scenario.seed, _PERSON))
     drawn.variation = Variation()
     return drawn
 
@@ -52,13 +61,33 @@ def _vary_coat(coat: Coat, width: float, draw: Draw) -> None:
         setattr(coat, name, getattr(whole, name) / coat.scale * (1.0 + draw(width)))
 
 
-def _vary_person(measures: Measures, v: Variation, draw: Draw) -> None:
+def _vary_person(person: Person, v: Variation, draw: Draw) -> None:
+    """Scales all sizes and masses; an arm that differs is scaled as both arms are."""
     scale = 1.0 + draw(v.person_scale)
-    for entry in fields(measures):
+    body = measures(person)
+    masses = dict(zip(_MASSES, body.arm_masses, strict=True))
+    for side, group in zip(SIDES, (person.left_measures, person.right_measures), strict=True):
+        for name, mass in zip(_MASSES, body.of(side).arm_masses, strict=True):
+            if mass != masses[name]:
+                setattr(group, name, mass)
+    for entry in fields(person.measures):
+        value = getattr(person.measures, entry.name)
         # a body that is a tenth larger in all lengths weighs a third more
-        whole = scale**3 if entry.name.endswith("mass") else scale
+        whole = scale**3 if entry.name in _MASSES else scale
+        if entry.name in _MASSES:
+            value = masses[entry.name]
+        groups = [g for g in (person.left_measures, person.right_measures) if _has(g, entry.name)]
+        if value is None and not groups:
+            continue
         own = 1.0 + draw(v.person_measures)
-        setattr(measures, entry.name, getattr(measures, entry.name) * whole * own)
+        if value is not None:
+            setattr(person.measures, entry.name, value * whole * own)
+        for group in groups:
+            setattr(group, entry.name, getattr(group, entry.name) * whole * own)
+
+
+def _has(group: SideMeasures, name: str) -> bool:
+    return getattr(group, name, None) is not None
 
 
 def _uniform(*seed: int) -> Draw:

@@ -76,7 +76,7 @@ def beliefs(b: schema.Beliefs, p: StationParameters) -> Beliefs:
     body, mesh = p.measures, p.mesh
     pose = PoseBounds(
         shoulders=np.stack([shoulder_joint(body, p.posture, side) for side in SIDES]),
-        limbs=(body.upper_arm_length, body.forearm_length),
+        limbs=tuple((own.upper_arm_length, own.forearm_length) for own in map(body.of, SIDES)),
         limits=person_arms(body, p.posture, p.arms, p.joints).limits,
         point_error=b.point_error,
         length_share=b.limb_share,

@@ -10,14 +10,19 @@ from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
-from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture
+from drake_dress.models.human.arm import JOINT_NAMES
+from drake_dress.models.human.body import ArmMeasures, ArmPose, BodyMeasures, Posture
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.sides import SIDES, Side
 
 
 def measures(person: schema.Person) -> BodyMeasures:
     """Returns the dimensions of the body."""
-    body: BodyMeasures = model_of(person.measures)
+    sides: tuple[ArmMeasures, ...] = tuple(
+        model_of(values) for values in (person.left_measures, person.right_measures)
+    )
+    left, right = (own if own.given else None for own in sides)
+    body: BodyMeasures = model_of(person.measures, left=left, right=right)
     return body
 
 
@@ -41,8 +46,13 @@ def arm(values: schema.Arm) -> ArmPose:
 
 
 def joints(person: schema.Person) -> JointParameters:
-    """Returns stiffness, damping and limits of the arms' joints."""
-    return JointParameters(**vars(person.joints))
+    """Returns stiffness, damping and limits of the arms' joints; degrees become radians."""
+    values = dict(vars(person.joints))
+    for name in JOINT_NAMES:
+        limits = values.pop(f"{name}_limits_deg")
+        if limits is not None:
+            values[f"{name}_limits"] = tuple(np.deg2rad(limits).tolist())
+    return JointParameters(**values)
 
 
 def behaviour(b: schema.Behaviour, seed: int) -> Behaviour:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.geodesics import Reach, reach
 from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.body import BodyMeasures, Posture
+from drake_dress.models.human.measures import FOREARM_MASS, UPPER_ARM_MASS
 from drake_dress.models.sides import SIDES
 
 _SITTING = 0.35  # share of persons who sit
@@ -102,14 +104,17 @@ def draw_reach(rng: np.random.Generator) -> Reach:
 
 
 def _draw_measures(rng: np.random.Generator) -> BodyMeasures:
+    # sizes that follow from others are not drawn
+    plain = {f.name: f.default for f in fields(BodyMeasures) if isinstance(f.default, float)}
+    plain |= {"upper_arm_mass": UPPER_ARM_MASS, "forearm_mass": FOREARM_MASS}
     for _ in range(_ATTEMPTS):
         scale = rng.uniform(*_STATURE)
-        values = {}
-        for entry in fields(BodyMeasures):
+        values: dict[str, Any] = {}
+        for name, default in plain.items():
             # a body that is a tenth larger in all lengths weighs a third more
-            whole = scale**3 if entry.name.endswith("mass") else scale
+            whole = scale**3 if name.endswith("mass") else scale
             own = 1.0 + _MEASURE * float(np.clip(rng.normal(), -_OUTLIERS, _OUTLIERS))
-            values[entry.name] = float(getattr(BodyMeasures, entry.name)) * whole * own
+            values[name] = default * whole * own
         try:
             return BodyMeasures(**values)
         except UserError:

@@ -1,4 +1,12 @@
-"""Distances between capsules, and their rates as arms move."""
+"""Distances between round cones, and their rates as arms move.
+
+The distance of two round cones is the least over both axes, with shares s and t,
+
+    f(s, t) = |x(s) - y(t)| - r_x(s) - r_y(t),
+
+which is convex. So the least is where the slopes vanish, if that is on both axes, else at the end
+of one. An arm's own shapes are capsules.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +16,17 @@ import numba as nb
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray, IndexArray
-from drake_dress.models.vector3 import length
+from drake_dress.models.round_cone import both_radii, nearest_share
+from drake_dress.models.vector3 import dot, length
 
 
 @dataclass(frozen=True)
 class Capsules:
-    """K capsules.
+    """K capsules or round cones.
 
     Attributes:
         first, second: (K,3) ends of their axes, m.
-        radius: (K,) m.
+        radius: (K,) m, or (K,2) at both ends.
     """
 
     first: FloatArray
@@ -67,36 +76,44 @@ def clearance(a: Capsules, b: Capsules, pairs: IndexArray) -> Clearance:
     """Returns the distances between capsules of `a` and of `b`, for `pairs` (M,2) of indices."""
     here, there, away = (np.empty((len(pairs), 3)) for _ in range(3))
     distance = np.empty(len(pairs))
+    radii, other_radii = both_radii(a.radius), both_radii(b.radius)
     _find_clearance(
-        a.first, a.second, a.radius, b.first, b.second, b.radius, pairs, distance, here, there, away
+        a.first, a.second, radii, b.first, b.second, other_radii, pairs, distance, here, there, away
     )
     return Clearance(pairs, distance, here, there, away)
 
 
 @nb.njit(cache=True, nogil=True)
 def _find_clearance(  # type: ignore[no-untyped-def]
-    a, b, radius, c, d, other_radius, pairs, distance, here, there, away
+    a, b, radius, c, d, other, pairs, distance, here, there, away
 ):
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
-        distance[m] = find_gap(a[i], b[i], c[j], d[j], here[m], there[m], away[m])
-        distance[m] -= radius[i] + other_radius[j]
+        distance[m] = find_gap(
+            a[i], b[i], radius[i], c[j], d[j], other[j], here[m], there[m], away[m]
+        )
 
 
 @nb.njit(cache=True, nogil=True)
-def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
-    """Returns the distance of segments a–b and c–d, m, and writes their nearest points.
+def find_gap(a, b, radius, c, d, other, here, there, away):  # type: ignore[no-untyped-def]
+    """Returns the distance of round cones about a–b and c–d, m, and writes their nearest points.
 
     Args:
         a: (3,) one end, m.
         b: (3,) the other.
-        c: (3,) one end of the other segment, m.
+        radius: (2,) radii at both, m.
+        c: (3,) one end of the other axis, m.
         d: (3,) the other.
-        here: (3,) written: the nearest point of the first, m.
+        other: (2,) radii at both, m.
+        here: (3,) written: the nearest point of the first axis, m.
         there: (3,) written: the nearest point of the other.
         away: (3,) written: unit vector from there to here.
     """
-    s, t = nearest(a, b, c, d)
+    growth, growing = radius[1] - radius[0], other[1] - other[0]
+    if growth == 0.0 and growing == 0.0:
+        s, t = nearest(a, b, c, d)
+    else:
+        s, t = _nearest_of_cones(a, b, growth, c, d, growing)
     for k in range(3):
         here[k] = a[k] + s * (b[k] - a[k])
         there[k] = c[k] + t * (d[k] - c[k])
@@ -112,7 +129,41 @@ def find_gap(a, b, c, d, here, there, away):  # type: ignore[no-untyped-def]
             away[0], away[1], away[2], size = 0.0, 0.0, 1.0, 1.0
     for k in range(3):
         away[k] /= size
-    return apart
+    return apart - ((radius[0] + s * growth) + (other[0] + t * growing))
+
+
+@nb.njit(cache=True, nogil=True)
+def _nearest_of_cones(a, b, growth, c, d, growing):  # type: ignore[no-untyped-def]
+    """Returns the shares s, t of both axes with the least f; see the module."""
+    u, w, r = b - a, d - c, a - c
+    uu, ww, uw, ur, wr = dot(u, u), dot(w, w), dot(u, w), dot(u, r), dot(w, r)
+    det = uu * ww - uw * uw
+    if det > 1e-12 * uu * ww:
+        # slopes vanish where the unit vector n from there to here has n·u = growth, n·w = -growing
+        in_plane = (ww * growth**2 + 2.0 * uw * growth * growing + uu * growing**2) / det
+        if in_plane < 1.0:
+            across = u[0] * (w[1] * r[2] - w[2] * r[1])
+            across += u[1] * (w[2] * r[0] - w[0] * r[2])
+            across += u[2] * (w[0] * r[1] - w[1] * r[0])
+            size = np.abs(across) / np.sqrt(det * (1.0 - in_plane))
+            along, other = size * growth - ur, -size * growing - wr
+            s = (ww * along - uw * other) / det
+            t = (uw * along - uu * other) / det
+            if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+                return s, t
+    least, best_s, best_t = np.inf, 0.0, 0.0
+    for end in range(2):
+        x = b if end == 1 else a
+        t = nearest_share(x, c, d, growing)
+        value = length(x - c - t * w) - end * growth - t * growing
+        if value < least:
+            least, best_s, best_t = value, float(end), t
+        y = d if end == 1 else c
+        s = nearest_share(y, a, b, growth)
+        value = length(y - a - s * u) - s * growth - end * growing
+        if value < least:
+            least, best_s, best_t = value, s, float(end)
+    return best_s, best_t
 
 
 @nb.njit(cache=True, nogil=True)

@@ -34,6 +34,7 @@ from drake_dress.models.arm.clearance import (
 )
 from drake_dress.models.arm.joint_bounds import find_rate_bounds
 from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.round_cone import both_radii
 from drake_dress.models.vector3 import length
 
 # DAQP's kinds of rows.
@@ -154,7 +155,7 @@ class ArmPair:
             np.stack([goal.velocity for goal in goals]),
             np.stack([goal.rotation for goal in goals]),
             step,
-            (seen.first, seen.second, seen.radius),
+            (seen.first, seen.second, both_radii(seen.radius)),
             self.free_links,
         )
         solution, _, flag, _ = daqp.solve(cost, slope, rows, upper, lower, kinds)
@@ -188,7 +189,7 @@ def _compiled(arm: SerialArm, shape: ArmShape) -> _Arm:
     limits, capsules = arm.limits, shape.capsules
     of_arm = (arm.base, arm.joints, arm.tool)
     of_limits = (limits.lower, limits.upper, limits.speed, limits.acceleration)
-    of_shape = (capsules.first, capsules.second, capsules.radius)
+    of_shape = (capsules.first, capsules.second, both_radii(capsules.radius))
     # one layout in memory, for which kernels are compiled once
     plain = [np.ascontiguousarray(v, dtype=np.float64) for v in (*of_arm, *of_limits, *of_shape)]
     owner = np.ascontiguousarray(shape.link, dtype=np.int64)
@@ -203,7 +204,7 @@ def _programme(arms, home, p, q, rate, position, velocity, rotation, step, perso
     each gripper. Rows: the grippers' velocities (6), then the rates of distances.
 
     position, velocity (2,3) and rotation (2,3,3) are the goals'; person is first (K,3), second
-    (K,3), radius (K,) of its capsules; other arguments as in `ArmPair` and `ArmPair.rates`.
+    (K,3), radius (K,2) of its capsules; other arguments as in `ArmPair` and `ArmPair.rates`.
     """
     n = q.shape[1]
     size = 2 * n + 2
@@ -295,8 +296,17 @@ def _keep_apart(arms, links, person, free_links, p, step, rows, least):  # type:
     place_capsules(links[1], arms[1].owner, arms[1].first, arms[1].second, right)
     for k in range(left.shape[1]):
         for m in range(right.shape[1]):
-            apart = find_gap(left[0, k], left[1, k], right[0, m], right[1, m], here, there, away)
-            apart -= arms[0].radius[k] + arms[1].radius[m]
+            apart = find_gap(
+                left[0, k],
+                left[1, k],
+                arms[0].radius[k],
+                right[0, m],
+                right[1, m],
+                arms[1].radius[m],
+                here,
+                there,
+                away,
+            )
             between = min(between, apart)
             if apart < p.seen_distance:
                 find_gap_rates(links[0], here, arms[0].owner[k], away, 1.0, rows[count, :n])
@@ -311,8 +321,17 @@ def _keep_apart(arms, links, person, free_links, p, step, rows, least):  # type:
             if arms[i].owner[k] > n - free_links:
                 continue
             for m in range(len(radius)):
-                apart = find_gap(placed[0, k], placed[1, k], first[m], second[m], here, there, away)
-                apart -= arms[i].radius[k] + radius[m]
+                apart = find_gap(
+                    placed[0, k],
+                    placed[1, k],
+                    arms[i].radius[k],
+                    first[m],
+                    second[m],
+                    radius[m],
+                    here,
+                    there,
+                    away,
+                )
                 to_person[i] = min(to_person[i], apart)
                 if apart < p.seen_distance:
                     owner = arms[i].owner[k]

@@ -90,7 +90,7 @@ def laying_target(
         height: of the grippers above the shoulders' skin, m.
         joints: (N,6,3) shoulder, elbow, hand of left, then right arm, m.
     """
-    tops = joints[:, [0, 3], 2].mean(axis=1) + person.radius[0]
+    tops = joints[:, [0, 3], 2].mean(axis=1) + person.shoulder_radius
     places = [collar_target(person, collar, margin, q) for q in joints]
     return LayingTarget(np.stack(places), tops + height)
 
@@ -108,7 +108,7 @@ def collar_target(
         margin: distance kept between cloth and skin, m.
         joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
     """
-    low, high = nape(joints, person.radius[0], person.neck_radius)
+    low, high = nape(joints, person.shoulder_radius, person.neck_radius)
     share = min(1.0, collar.height / NAPE_LENGTH)
     place: FloatArray = low + share * (high - low) - margin * heading(joints).front
     return place

@@ -11,7 +11,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
-from drake_dress.models.human.body import Capsule
+from drake_dress.models.human.body import Capsule, capsule_arrays
 from drake_dress.models.human.heading import heading
 from drake_dress.models.human.neck import find_neck
 
@@ -23,23 +23,27 @@ class PersonModel:
     Attributes:
         capsules: in body frames; those of the torso move with the shoulders.
         shoulders: (2,3) shoulder joints in the torso's frame, left and right, m.
-        radius: radii of upper arm, forearm and hand, m.
+        radius: radii of upper arm, forearm and hand, m: (2,3,2) of left and right, at both ends, or
+            (3,) for both sides and ends.
     """
 
     capsules: tuple[Capsule, ...]
     shoulders: FloatArray
-    radius: tuple[float, float, float]
+    radius: FloatArray | tuple[float, float, float]
 
     @cached_property
     def torso(self) -> FloatArray:
         """Ends (2,T,3), m, of the torso's capsules in its frame."""
-        ends = [(c.a_B, c.b_B) for c in self._of_torso]
-        return np.ascontiguousarray(np.array(ends).reshape(-1, 2, 3).swapaxes(0, 1))
+        a, b, _ = capsule_arrays(self._of_torso)
+        return np.stack([a, b])
 
     @cached_property
     def radii(self) -> FloatArray:
-        """Radii (K,), m, of all capsules, the torso's first."""
-        return np.array([c.radius for c in self._of_torso] + [*self.radius] * 2)
+        """Radii (K,2), m, of all capsules at both ends, the torso's first."""
+        of_arms = np.asarray(self.radius, dtype=np.float64)
+        if of_arms.ndim == 1:
+            of_arms = np.broadcast_to(of_arms[:, None], (2, 3, 2))
+        return np.concatenate([capsule_arrays(self._of_torso)[2], of_arms.reshape(6, 2)])
 
     @cached_property
     def neck(self) -> FloatArray:
@@ -49,9 +53,14 @@ class PersonModel:
 
     @cached_property
     def neck_radius(self) -> float:
-        """Radius of the neck, m; 0 if there is no neck."""
+        """Radius of the neck at the shoulders, m; 0 if there is no neck."""
         k = find_neck(self.torso[0], self.torso[1], self.neck)
-        return 0.0 if k is None else float(self.radii[k])
+        return 0.0 if k is None else float(self.radii[k, 0])
+
+    @cached_property
+    def shoulder_radius(self) -> float:
+        """Mean radius of both upper arms at the shoulder, m."""
+        return 0.5 * float(self.radii[-6, 0] + self.radii[-3, 0])
 
     @property
     def _of_torso(self) -> list[Capsule]:
@@ -93,7 +102,7 @@ def kept_away(obstacles: Sequence[Obstacles], radius: FloatArray, share: float) 
         left, right = r[:3], r[3:]
         torso = np.full(obstacle.count - 6, 0.5 * (left[0] + right[0]))
         arms = [np.array([max(a[0], a[1]), max(a[1], a[2]), a[2]]) for a in (left, right)]
-        wider = obstacle.radius + share * np.concatenate([torso, *arms])
+        wider = obstacle.radius + share * np.concatenate([torso, *arms])[:, None]
         result.append(replace(obstacle, radius=wider))
     return result
 
@@ -101,7 +110,7 @@ def kept_away(obstacles: Sequence[Obstacles], radius: FloatArray, share: float) 
 def person_capsules(
     person: PersonModel, joints: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Returns ends (K,3), (K,3) and radii (K,), m, of the person's capsules, torso first.
+    """Returns ends (K,3), (K,3) and radii (K,2), m, of the person's capsules, torso first.
 
     Args:
         person: shape of the person.

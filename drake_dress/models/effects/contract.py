@@ -67,6 +67,9 @@ KINDS: tuple[type[Effect], ...] = (
 # Kinds whose `apply` returns its argument, changed.
 _CHANGING = (MaterialEffect, ShapeEffect, GravityEffect, BodyEffect, ClockEffect, CameraEffect)
 
+# Tapered arms with given masses, so that an effect on any of them shows.
+_BODY = BodyMeasures(upper_arm_mass=1.6, forearm_mass=1.2, elbow_radius=0.04, wrist_radius=0.03)
+
 # Parameters are checked at this fraction of their typical size.
 _SHARE = 0.8
 # Step of the differences, in typical sizes, and largest error of derivatives, relative to the
@@ -265,9 +268,12 @@ def _shape(effect: Effect, given: tuple[Any, ...]) -> tuple[int, ...]:
 
 
 def _numbers(value: Any) -> FloatArray:
-    """Returns a result of `apply` as an array; the fields of a dataclass in their order."""
+    """Returns a result of `apply` as an array; the fields of a dataclass in their order.
+
+    A field that is not given counts as 0.
+    """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = [float(v) for v in dataclasses.asdict(value).values()]
+        value = [0.0 if v is None else float(v) for v in dataclasses.asdict(value).values()]
     return np.asarray(value, dtype=np.float64)
 
 
@@ -333,7 +339,7 @@ _SAMPLES: Mapping[type[Effect], Callable[[], tuple[Any, ...]]] = {
     StretchEffect: lambda: (np.random.default_rng(3).uniform(-0.05, 0.05, 12),),
     FrictionEffect: _sliding,
     AdhesionEffect: lambda: (_sheet(),),
-    BodyEffect: lambda: (BodyMeasures(),),
+    BodyEffect: lambda: (_BODY,),
     ClockEffect: lambda: (np.linspace(0.0, 1.0, 5),),
     CameraEffect: _vectors,
     MountEffect: _vectors,

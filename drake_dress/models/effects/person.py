@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.effects.effect import BodyEffect, MountEffect, parameter
-from drake_dress.models.human.body import BodyMeasures
-
-_RADII = ("upper_arm_radius", "forearm_radius", "hand_radius")
+from drake_dress.models.human.measures import THINNEST, BodyMeasures, arm_radius_names
 
 
 @dataclass(frozen=True)
@@ -23,13 +21,15 @@ class LimbRadius(BodyEffect):
     added: float = parameter("m", -0.025, 0.05, 0.01)
 
     def apply(self, measures: BodyMeasures) -> BodyMeasures:
-        """Returns the sizes; no radius below 5 mm."""
-        radii = {name: max(getattr(measures, name) + self.added, 0.005) for name in _RADII}
-        return replace(measures, **radii)
+        """Returns the sizes; no radius below 5 mm. Masses stay."""
+        return measures.thickened(self.added)
 
     def derivative(self, name: str, measures: BodyMeasures) -> dict[str, float]:
         """Returns the derivative of the radii."""
-        return {r: 1.0 if getattr(measures, r) + self.added > 0.005 else 0.0 for r in _RADII}
+        return {
+            name: 1.0 if getattr(measures, name) + self.added > THINNEST else 0.0
+            for name in arm_radius_names(measures)
+        }
 
 
 @dataclass(frozen=True)

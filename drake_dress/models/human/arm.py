@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,10 +28,10 @@ _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
 
 @dataclass(frozen=True)
 class Arm:
-    """Kinematics and gravity of one arm: two limbs of uniform mass on a fixed shoulder.
+    """Kinematics and gravity of one arm: two limbs of uniform density on a fixed shoulder.
 
     Attributes:
-        measures: sizes and masses.
+        measures: sizes and masses; those of the side are taken.
         posture: standing or sitting.
         side: left or right.
     """
@@ -38,6 +39,15 @@ class Arm:
     measures: BodyMeasures
     posture: Posture
     side: Side
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "measures", self.measures.of(self.side))
+
+    @cached_property
+    def _weighed(self) -> tuple[float, float]:
+        """Weight of the forearm times the place of its centre, and the same of both limbs, N."""
+        (upper, fore), (of_upper, of_fore) = self.measures.arm_centers, self.measures.arm_masses
+        return fore * GRAVITY * of_fore, GRAVITY * (upper * of_upper + of_fore)
 
     @property
     def shoulder(self) -> FloatArray:
@@ -97,10 +107,10 @@ class Arm:
 
         U changes with the height of the load.
         """
-        m = self.measures
         axes, upper, fore = self._chain(angles)
-        of_fore = 0.5 * GRAVITY * m.forearm_mass * fore
-        of_both = GRAVITY * (0.5 * m.upper_arm_mass + m.forearm_mass) * upper + of_fore
+        weight, both = self._weighed
+        of_fore = weight * fore
+        of_both = both * upper + of_fore
         return axes, np.stack([of_both, of_both, of_both, of_fore])
 
     def _chain(self, angles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -30,7 +30,7 @@ class PoseBounds:
 
     Attributes:
         shoulders: (2,3) described shoulders, left then right, m, world.
-        limbs: lengths of upper arm and forearm, m.
+        limbs: lengths of upper arm and forearm of the left, then of the right, m.
         limits: (2,2,4) least and greatest angles of each arm's hinges, as of `Arms`, rad.
         point_error: greatest error of a point, m.
         length_share: share by which real lengths may differ from those described.
@@ -40,7 +40,7 @@ class PoseBounds:
     """
 
     shoulders: FloatArray
-    limbs: tuple[float, float]
+    limbs: tuple[tuple[float, float], ...]
     limits: FloatArray
     point_error: float = 0.03
     length_share: float = 0.15
@@ -84,7 +84,7 @@ def _broken(points: FloatArray, b: PoseBounds) -> str | None:
     for i, side in enumerate(SIDES):
         for j, name in enumerate(_LIMBS):
             length = float(np.linalg.norm(points[3 * i + j + 1] - points[3 * i + j]))
-            told = _length_told(f"{side} {name}", length, b.limbs[j], b)
+            told = _length_told(f"{side} {name}", length, b.limbs[i][j], b)
             if told is not None:
                 return told
     heading = _heading(left - right)

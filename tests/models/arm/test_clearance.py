@@ -1,4 +1,4 @@
-"""Distances of capsules: against sampling, and their rates against finite differences."""
+"""Distances of capsules and round cones against sampling, their rates against differences."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -12,6 +12,8 @@ from drake_dress.models.arm.clearance import (
     nearest,
 )
 from drake_dress.models.arm.panda import LIMITS, panda
+from drake_dress.models.cloth.contact.detection import find_proximity
+from drake_dress.models.cloth.contact.obstacles import Obstacles
 
 
 def segments(seed: int) -> tuple[np.ndarray, ...]:
@@ -44,6 +46,60 @@ def test_no_pair_of_points_is_nearer(seed: int) -> None:
         np.testing.assert_allclose(ways, np.linalg.norm(f - e, axis=1), atol=1e-9)
 
 
+def cones(seed: int) -> tuple[Capsules, Capsules]:
+    """Returns 12 pairs of round cones, from capsules to single spheres."""
+    a, b, c, d = segments(seed)
+    rng = np.random.default_rng(seed)
+    first, second = rng.uniform(0.02, 0.1, (2, 12, 2))
+    first[6] = 0.05
+    second[7] = 0.05
+    first[8, 1] = first[8, 0] + 2.0 * np.linalg.norm(b[8] - a[8])
+    return Capsules(a, b, first), Capsules(c, d, second)
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=60)
+def test_no_pair_of_spheres_of_round_cones_is_nearer(seed: int) -> None:
+    one, other = cones(seed)
+    near = clearance(one, other, np.repeat(np.arange(12)[:, None], 2, axis=1))
+    t = np.linspace(0.0, 1.0, 61)[:, None, None]
+    x, y = (c.first + t * (c.second - c.first) for c in (one, other))
+    r, s = (c.radius[:, 0] + t[..., 0] * np.diff(c.radius)[:, 0] for c in (one, other))
+    apart = np.linalg.norm(x[:, None] - y[None], axis=3) - r[:, None] - s[None]
+    sampled = apart.min(axis=(0, 1))
+    assert (near.distance <= sampled + 1e-9).all()
+    lengths = np.linalg.norm([one.second - one.first, other.second - other.first], axis=2)
+    growths = np.abs([np.diff(one.radius)[:, 0], np.diff(other.radius)[:, 0]])
+    assert (near.distance >= sampled - (lengths + growths).sum(axis=0) / 60.0 - 1e-9).all()
+    back = clearance(other, one, near.pair)
+    np.testing.assert_allclose(back.distance, near.distance, atol=1e-9)
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=30)
+def test_way_apart_leads_from_surface_to_surface(seed: int) -> None:
+    one, other = cones(seed)
+    near = clearance(one, other, np.repeat(np.arange(12)[:, None], 2, axis=1))
+    for k in np.flatnonzero(near.distance > 0.0):
+        first, second = (
+            Obstacles.resting(c.first[k : k + 1], c.second[k : k + 1], c.radius[k : k + 1])
+            for c in (one, other)
+        )
+        from_first = find_proximity(near.there[k : k + 1], first, 0.0).gap[0]
+        from_second = find_proximity(near.here[k : k + 1], second, 0.0).gap[0]
+        there = near.there[k] + (from_first - near.distance[k]) * near.away[k]
+        here = near.here[k] - (from_second - near.distance[k]) * near.away[k]
+        np.testing.assert_allclose(
+            find_proximity(there[None], first, 0.0).gap, near.distance[k], atol=1e-8
+        )
+        np.testing.assert_allclose(
+            find_proximity(here[None], second, 0.0).gap, near.distance[k], atol=1e-8
+        )
+        np.testing.assert_allclose(
+            find_proximity(np.stack([here, there]), second, 0.0).gap[1], 0.0, atol=1e-8
+        )
+
+
 def test_capsules_are_apart_by_what_their_radii_leave() -> None:
     one = Capsules(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.array([0.1]))
     other = Capsules(np.array([[0.5, 0.0, 0.4]]), np.array([[0.5, 0.3, 0.4]]), np.array([0.15]))
@@ -69,7 +125,9 @@ def test_rates_are_what_finite_differences_say(seed: int) -> None:
     first, second = rng.normal(0.0, 0.1, (2, 8, 3))
     shape = ArmShape(link, Capsules(first, second, rng.uniform(0.02, 0.06, 8)))
     first, second = rng.normal(0.0, 0.5, (2, 3, 3))
-    person = Capsules(first, second, rng.uniform(0.05, 0.1, 3))
+    radii = rng.uniform(0.05, 0.1, (3, 2))
+    radii[0] = radii[0, 0]
+    person = Capsules(first, second, radii)
     pairs = np.stack(np.meshgrid(link, np.arange(3), indexing="ij"), axis=-1).reshape(-1, 2)
     q, e = rng.uniform(LIMITS.lower, LIMITS.upper), 1e-6
     way = rng.normal(size=7)

@@ -9,6 +9,7 @@ import pytest
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import HalfSpaces, Obstacles
+from drake_dress.models.cloth.contact.wrenches import body_wrenches
 from drake_dress.models.cloth.elastic_energy import elastic_energy
 from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
@@ -330,6 +331,39 @@ def test_swung_and_dragged_sheet_stays_bounded(scheme: str, h: float) -> None:
         run.advance((goal - run.x[held]) / h, limbs)
         assert np.abs(run.x).max() < 2.5
         assert np.abs(run.v).max() < 30.0
+
+
+@pytest.mark.parametrize("h", [0.004, 0.02])
+@pytest.mark.parametrize("scheme", ["implicit", "second_order"])
+def test_tapered_limbs_push_as_hard_as_they_are_pushed(scheme: str, h: float) -> None:
+    """Momentum balances in every step, and so do force and moment on the person's bodies."""
+    x, e = sheet_elements(12, 14, 0.03)
+    middle = x.mean(axis=0)
+    a = middle + np.array([[-0.15, 0.0, -0.07], [0.1, -0.2, -0.06]])
+    b = middle + np.array([[0.15, 0.05, -0.06], [0.1, 0.2, -0.07]])
+    turning = np.array([[0.0, 0.0, 0.3], [0.2, 0.0, 0.0]])
+    limbs = Obstacles(a, b, np.array([[0.06, 0.03], [0.035, 0.055]]), np.zeros_like(a), turning)
+    run = Run(scheme, e, Material(friction=0.5), h, NO_NODES, x)
+    mass = Material().surface_density * e.node_area[:, None]
+    touched, origin = set(), limbs.a + 0.1
+    for _ in range(int(0.4 / h)):
+        before = (mass * run.v).sum(axis=0)
+        run.advance(NOTHING, limbs)
+        push = run.reaction.sum(axis=0)
+        change = (mass * run.v).sum(axis=0) - before
+        weight = mass.sum() * np.array([0.0, 0.0, -9.81])
+        np.testing.assert_allclose(change, h * (weight + push), atol=2e-4 * mass.sum())
+        near = find_proximity(run.x, limbs, 0.0)
+        pushed = np.any(run.reaction != 0.0, axis=1)
+        touched |= set(near.owner[pushed].tolist())
+        owner = np.where(pushed, near.owner, -1).astype(np.int32)
+        wrench = body_wrenches(np.arange(2, dtype=np.int32), origin, run.x, owner, run.reaction)
+        np.testing.assert_allclose(wrench[:, 3:].sum(axis=0), -push, atol=1e-9)
+        about_0 = wrench[:, :3] + np.cross(origin, wrench[:, 3:])
+        moment = np.cross(run.x, -run.reaction).sum(axis=0)
+        np.testing.assert_allclose(about_0.sum(axis=0), moment, atol=1e-9)
+    assert touched == {0, 1}
+    assert find_proximity(run.x, limbs, 0.0).gap.min() > -1e-3
 
 
 @pytest.mark.parametrize("stretch", [100.0, 5000.0])

@@ -80,7 +80,9 @@ def test_person_is_kept_away_from_by_a_share_of_the_radii(seed: int, share: floa
     wider = kept_away(seen, radius, share)
     assert len(wider) == HORIZON
     for before, after, r in zip(seen, wider, radius, strict=False):
-        grown = (after.radius - before.radius) / max(share, 1e-9)
+        # both ends of a limb by the same
+        grown, at_end = ((after.radius - before.radius) / max(share, 1e-9)).T
+        np.testing.assert_allclose(at_end, grown, atol=1e-6)
         if share > 1e-6:
             torso, left, right = grown[:-6], grown[-6:-3], grown[-3:]
             np.testing.assert_allclose(torso, 0.5 * (r[0] + r[3]), rtol=1e-6, atol=1e-9)

@@ -7,10 +7,16 @@ import pytest
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.human.arm import GRAVITY, Arm
-from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
+from drake_dress.models.human.body import ArmMeasures, ArmPose, BodyMeasures, arm_points
 from drake_dress.models.sides import SIDES, Side
 
 M = BodyMeasures()
+# tapered limbs, and a left arm that is shorter
+UNLIKE = BodyMeasures(
+    elbow_radius=0.035,
+    wrist_radius=0.025,
+    left=ArmMeasures(upper_arm_length=0.2, wrist_radius=0.02),
+)
 EPS = 1e-6
 
 
@@ -19,10 +25,12 @@ def some_angles(count: int = 6) -> np.ndarray:
 
 
 def potential(arm: Arm, angles: np.ndarray) -> float:
-    """Returns m g z of both limbs' middles, J."""
+    """Returns m g z of both limbs' centres of mass, J."""
     shoulder, elbow, hand = arm.points(angles)
-    upper, fore = 0.5 * (shoulder + elbow), 0.5 * (elbow + hand)
-    return float(GRAVITY * (M.upper_arm_mass * upper[2] + M.forearm_mass * fore[2]))
+    of_upper, of_fore = arm.measures.arm_centers
+    upper, fore = shoulder + of_upper * (elbow - shoulder), elbow + of_fore * (hand - elbow)
+    heights = upper[2], fore[2]
+    return GRAVITY * sum(m * z for m, z in zip(arm.measures.arm_masses, heights, strict=True))
 
 
 def slope(of: Callable[[FloatArray], FloatArray | float], angles: np.ndarray) -> np.ndarray:
@@ -30,10 +38,11 @@ def slope(of: Callable[[FloatArray], FloatArray | float], angles: np.ndarray) ->
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_joints_are_where_the_body_model_has_them(side: Side) -> None:
-    arm = Arm(M, "sitting", side)
+@pytest.mark.parametrize("body", [M, UNLIKE])
+def test_joints_are_where_the_body_model_has_them(side: Side, body: BodyMeasures) -> None:
+    arm = Arm(body, "sitting", side)
     for q in some_angles():
-        expected = arm_points(M, "sitting", side, ArmPose(*q))
+        expected = arm_points(body, "sitting", side, ArmPose(*q))
         np.testing.assert_allclose(arm.points(q), expected, atol=1e-12)
         np.testing.assert_allclose(arm.hand(q), expected[2], atol=1e-12)
 
@@ -54,8 +63,9 @@ def test_jacobian_of_the_elbow_is_its_derivative(side: Side) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_gravity_torque_is_minus_the_slope_of_the_potential(side: Side) -> None:
-    arm = Arm(M, "standing", side)
+@pytest.mark.parametrize("body", [M, UNLIKE])
+def test_gravity_torque_is_minus_the_slope_of_the_potential(side: Side, body: BodyMeasures) -> None:
+    arm = Arm(body, "standing", side)
     for q in some_angles():
         expected = -slope(lambda a: potential(arm, a), q)
         np.testing.assert_allclose(arm.gravity_torque(q), expected, atol=1e-7)

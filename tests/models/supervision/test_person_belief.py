@@ -27,7 +27,7 @@ BODY = BodyMeasures()
 LOW, HIGH = np.array([-0.6, -2.6, -1.2, 0.0]), np.array([2.6, 1.2, 1.2, 2.5])
 POSE = PoseBounds(
     shoulders=np.stack([shoulder_joint(BODY, "standing", side) for side in SIDES]),
-    limbs=(BODY.upper_arm_length, BODY.forearm_length),
+    limbs=((BODY.upper_arm_length, BODY.forearm_length),) * 2,
     limits=np.stack([[LOW, HIGH]] * 2),
 )
 BOUNDS = PersonBounds(POSE)

@@ -315,7 +315,7 @@ def _out_of_reach(x, a, b, radius, point, normal, distance):  # type: ignore[no-
             below = min(a[k, c], b[k, c]) - high[c]
             above = low[c] - max(a[k, c], b[k, c])
             apart2 += max(below, above, 0.0) ** 2
-        if apart2 <= (radius[k] + distance) ** 2:
+        if apart2 <= (max(radius[k, 0], radius[k, 1]) + distance) ** 2:
             return False
     for k in range(point.shape[0]):
         height = 0.0

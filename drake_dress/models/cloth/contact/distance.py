@@ -1,7 +1,7 @@
 """Signed distances, normals and their derivatives, as compiled kernels.
 
 Shapes come packed as a tuple of plain arrays (`Obstacles.packed`), so that kernels take all of them
-as one argument.
+as one argument. Limbs are round cones (`models/round_cone.py`); with equal radii they are capsules.
 """
 
 from __future__ import annotations
@@ -24,16 +24,21 @@ MOST_MARCHES = 64
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _capsule(p0, p1, p2, a, b, radius, m):  # type: ignore[no-untyped-def]
-    """Returns signed distance and segment parameter of a point to capsule m."""
+def _round_cone(p0, p1, p2, a, b, cone, m):  # type: ignore[no-untyped-def]
+    """Returns signed distance and segment parameter of a point to round cone m."""
     d0, d1, d2 = b[m, 0] - a[m, 0], b[m, 1] - a[m, 1], b[m, 2] - a[m, 2]
     q0, q1, q2 = p0 - a[m, 0], p1 - a[m, 1], p2 - a[m, 2]
     length2 = d0 * d0 + d1 * d1 + d2 * d2
     t = 0.0
     if length2 > 0.0:
-        t = min(1.0, max(0.0, (q0 * d0 + q1 * d1 + q2 * d2) / length2))
+        t = (q0 * d0 + q1 * d1 + q2 * d2) / length2
+        # a capsule leans nowhere and is spared the square root
+        if cone[m, 2] != 0.0:
+            r0, r1, r2 = q0 - t * d0, q1 - t * d1, q2 - t * d2
+            t += cone[m, 2] * np.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+        t = min(1.0, max(0.0, t))
     r0, r1, r2 = q0 - t * d0, q1 - t * d1, q2 - t * d2
-    return np.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius[m], t
+    return np.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - (cone[m, 0] + t * cone[m, 1]), t
 
 
 @nb.njit(cache=True, nogil=True)
@@ -133,8 +138,8 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
 
     `owner` is -1 if there is no obstacle.
     """
-    a, b, radius, point, normal, solids = shapes
-    m, k = radius.shape[0], point.shape[0]
+    a, b, cone, point, normal, solids = shapes
+    m, k = cone.shape[0], point.shape[0]
     # Neighbours mostly have the same nearest capsule, so it is tried first; others are tried only
     # if a ball around them comes as near.
     ball = np.empty((m if x.shape[0] > m else 0, 4))
@@ -143,14 +148,14 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
         for c in range(3):
             ball[j, c] = 0.5 * (a[j, c] + b[j, c])
             half2 += 0.25 * (a[j, c] - b[j, c]) ** 2
-        ball[j, 3] = np.sqrt(half2) + radius[j] + _ROUNDING
+        ball[j, 3] = np.sqrt(half2) + (cone[j, 0] + max(cone[j, 1], 0.0)) + _ROUNDING
     last = 0
     for i in range(x.shape[0]):
         p0, p1, p2 = x[i, 0], x[i, 1], x[i, 2]
         best = _FAR
         who = -1
         if ball.shape[0] > 0:
-            d, _ = _capsule(p0, p1, p2, a, b, radius, last)
+            d, _ = _round_cone(p0, p1, p2, a, b, cone, last)
             if d < best:
                 best = d
                 who = last
@@ -160,7 +165,7 @@ def nearest_obstacle(x: FloatArray, shapes: Any, distance: FloatArray, owner: In
                 way2 = (p0 - ball[j, 0]) ** 2 + (p1 - ball[j, 1]) ** 2 + (p2 - ball[j, 2]) ** 2
                 if j == last or (far > 0.0 and way2 > far * far):
                     continue
-            d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+            d, _ = _round_cone(p0, p1, p2, a, b, cone, j)
             if d < best or (d == best and j < who):
                 best = d
                 who = j
@@ -185,8 +190,8 @@ def nearest_other(
     x: FloatArray, shapes: Any, owner: IntArray, distance: FloatArray, other: IntArray
 ) -> None:
     """Writes the nearest body other than `owner` (k,) and its distance, m, for points `x` (k,3)."""
-    a, b, radius, point, normal, solids = shapes
-    m, k = radius.shape[0], point.shape[0]
+    a, b, cone, point, normal, solids = shapes
+    m, k = cone.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
     for i in range(x.shape[0]):
@@ -197,7 +202,7 @@ def nearest_other(
             if j == owner[i]:
                 continue
             if j < m:
-                d, _ = _capsule(p0, p1, p2, a, b, radius, j)
+                d, _ = _round_cone(p0, p1, p2, a, b, cone, j)
             elif j < m + k:
                 d = 0.0
                 for c in range(3):
@@ -224,14 +229,14 @@ def _nearest_solid(x, solids, first, distance, owner):  # type: ignore[no-untype
 @nb.njit(cache=True, nogil=True)
 def distance_to(x: FloatArray, shapes: Any, owner: IntArray, distance: FloatArray) -> None:
     """Writes the signed distance (k,), m, of each point of `x` (k,3) to the body `owner` (k,)."""
-    a, b, radius, point, normal, solids = shapes
-    m, k = radius.shape[0], point.shape[0]
+    a, b, cone, point, normal, solids = shapes
+    m, k = cone.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
     for i in range(x.shape[0]):
         who = owner[i]
         if who < m:
-            distance[i], _ = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
+            distance[i], _ = _round_cone(x[i, 0], x[i, 1], x[i, 2], a, b, cone, who)
         elif who < m + k:
             distance[i] = 0.0
             for c in range(3):
@@ -321,8 +326,8 @@ def surface_frame(
     distances are interpolated. The velocity is that of the rigid body at the point itself. Rows
     without owner have zero normal and velocity.
     """
-    a, b, radius, point, plane, solids = shapes
-    m, k = radius.shape[0], point.shape[0]
+    a, b, cone, point, plane, solids = shapes
+    m, k = cone.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
     for i in range(x.shape[0]):
@@ -339,7 +344,7 @@ def surface_frame(
         surface_velocity[i, 1] = velocity[who, 1] + w2 * q0 - w0 * q2
         surface_velocity[i, 2] = velocity[who, 2] + w0 * q1 - w1 * q0
         if who < m:
-            _, t = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
+            _, t = _round_cone(x[i, 0], x[i, 1], x[i, 2], a, b, cone, who)
             size2 = 0.0
             for c in range(3):
                 r = x[i, c] - a[who, c] - t * (b[who, c] - a[who, c])
@@ -376,8 +381,8 @@ def normal_derivative(
     out: FloatArray,
 ) -> None:
     """Writes (k,3) the derivative of n̄·n with respect to the points `x` (k,3)."""
-    a, b, radius, point, _, solids = shapes
-    m, k = radius.shape[0], point.shape[0]
+    a, b, cone, point, _, solids = shapes
+    m, k = cone.shape[0], point.shape[0]
     gradient = np.empty(3)
     hessian = np.empty((3, 3))
     for i in range(x.shape[0]):
@@ -390,18 +395,21 @@ def normal_derivative(
         for c in range(3):
             along += normal_bar[i, c] * normal[i, c]
         if who < m:
-            d, t = _capsule(x[i, 0], x[i, 1], x[i, 2], a, b, radius, who)
-            inverse = 1.0 / max(d + radius[who], 1e-9)
+            d, t = _round_cone(x[i, 0], x[i, 1], x[i, 2], a, b, cone, who)
+            growth = cone[who, 1]
+            inverse = 1.0 / max(d + (cone[who, 0] + t * growth), 1e-9)
             axial = 0.0
-            length2 = 1e-30
+            length2 = 1e-30 - growth * growth
             for c in range(3):
                 out[i, c] = (normal_bar[i, c] - along * normal[i, c]) * inverse
+                # along the surface, which the axis of a capsule is parallel to
                 e = b[who, c] - a[who, c]
-                axial += out[i, c] * e
+                axial += out[i, c] * (e + growth * normal[i, c])
                 length2 += e * e
             if 0.0 < t < 1.0:
                 for c in range(3):
-                    out[i, c] -= axial / length2 * (b[who, c] - a[who, c])
+                    e = b[who, c] - a[who, c] + growth * normal[i, c]
+                    out[i, c] -= axial / length2 * e
             continue
         _solid(x[i, 0], x[i, 1], x[i, 2], solids, who - m - k, gradient, hessian, 2)
         r = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)

@@ -1,7 +1,8 @@
-"""Obstacles that the garment can touch: moving capsules, spheres, half-spaces and closed meshes.
+"""Obstacles that the garment can touch: moving limbs, half-spaces and closed meshes.
 
-Each has one owner number in the order capsules, half-spaces, solids, and moves as a rigid body with
-a velocity at its origin (end a of a capsule, the point of a half-space, the frame's origin of a
+A limb is a round cone: a capsule if its radii are equal, a sphere if its ends coincide. Each
+obstacle has one owner number in the order limbs, half-spaces, solids, and moves as a rigid body
+with a velocity at its origin (end a of a limb, the point of a half-space, the frame's origin of a
 solid) and an angular velocity.
 """
 
@@ -16,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.signed_distance import SignedDistanceField
+from drake_dress.models.round_cone import both_radii, packed_cones
 
 
 @dataclass(frozen=True)
@@ -70,12 +72,12 @@ class Solid:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """Everything that the garment can touch, at one instant. A sphere is a capsule with a == b.
+    """Everything that the garment can touch, at one instant.
 
     Attributes:
-        a: (m,3) first ends of the capsules' axes, world frame, m.
+        a: (m,3) first ends of the limbs' axes, world frame, m.
         b: (m,3) second ends, m.
-        radius: (m,) radii, m.
+        radius: (m,2) radii at both ends, m; given as (m,), the same at both.
         velocity: (m,3) velocities of the points a, m/s.
         angular_velocity: (m,3) angular velocities, rad/s.
         half_spaces: half-spaces.
@@ -90,6 +92,9 @@ class Obstacles:
     half_spaces: HalfSpaces = field(default_factory=HalfSpaces.none)
     solids: tuple[Solid, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", both_radii(self.radius))
+
     @property
     def count(self) -> int:
         """Number of bodies."""
@@ -99,11 +104,11 @@ class Obstacles:
     def none() -> Obstacles:
         """Returns no obstacles."""
         empty = np.zeros((0, 3))
-        return Obstacles(empty, empty, np.zeros(0), empty, empty)
+        return Obstacles(empty, empty, np.zeros((0, 2)), empty, empty)
 
     @staticmethod
     def resting(a: FloatArray, b: FloatArray, radius: FloatArray) -> Obstacles:
-        """Returns capsules that do not move."""
+        """Returns limbs that do not move; arguments as the attributes."""
         zero = np.zeros_like(np.asarray(a, dtype=np.float64))
         return Obstacles(
             np.ascontiguousarray(a, dtype=np.float64),
@@ -184,7 +189,7 @@ class Obstacles:
 
     @cached_property
     def packed(self) -> tuple[Any, ...]:
-        """The shapes for kernels: capsules, half-spaces, and solids with their grids."""
+        """The shapes for kernels: limbs, half-spaces, and solids with their grids."""
         p, solids = self.half_spaces, self.solids
         count = len(solids)
         pose = np.zeros((count, 12))
@@ -201,7 +206,12 @@ class Obstacles:
             spline = parts[0]
         else:
             spline = np.concatenate(parts) if parts else np.zeros(0)
-        return (self.a, self.b, self.radius, p.point, p.normal, (pose, grid, size, spline))
+        return (
+            *packed_cones(self.a, self.b, self.radius),
+            p.point,
+            p.normal,
+            (pose, grid, size, spline),
+        )
 
     def origins(self) -> FloatArray:
         """Returns (count,3) the points whose velocities are given, in order of owners, m."""

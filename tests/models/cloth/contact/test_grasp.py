@@ -24,11 +24,13 @@ def test_what_is_held_comes_out_of_a_body_and_presses_on_it(seed: int, depth: fl
     # a limb that reaches `depth` over the first gripper's outermost node
     way, along = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
     radius = rng.uniform(0.03, 0.08)
+    # thicker or thinner at one end, the same in the middle
+    taper = rng.choice([0.0, 0.03]) * np.array([[1.0, -1.0]])
     height = (x[SIDE == 0] @ way).max() + radius - depth
     middle = x[SIDE == 0].mean(axis=0)
     middle = middle + (height - middle @ way) * way
     ends = np.array([middle - 0.3 * along, middle + 0.3 * along])
-    limb = Obstacles.resting(ends[:1], ends[1:], np.array([radius]))
+    limb = Obstacles.resting(ends[:1], ends[1:], radius + taper)
     pressing = press(x, SIDE, limb, STIFFNESS)
     np.testing.assert_allclose(
         [pressing.force[SIDE == i].sum(axis=0) for i in (0, 1)],

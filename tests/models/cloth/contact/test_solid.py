@@ -64,7 +64,7 @@ def test_solid_is_seen_alike_from_a_moved_frame(ball: SignedDistanceField) -> No
     np.testing.assert_allclose(there.surface_velocity, expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["solid", "half_space", "capsule"])
+@pytest.mark.parametrize("kind", ["solid", "half_space", "capsule", "round_cone"])
 def test_gap_and_normal_derivatives_match_finite_differences(
     ball: SignedDistanceField, kind: str
 ) -> None:
@@ -75,6 +75,9 @@ def test_gap_and_normal_derivatives_match_finite_differences(
         "half_space": Obstacles.floor(-0.2),
         "capsule": Obstacles.resting(
             np.array([[-0.05, 0.0, 0.0]]), np.array([[0.05, 0.02, 0.0]]), np.array([0.03])
+        ),
+        "round_cone": Obstacles.resting(
+            np.array([[-0.05, 0.0, 0.0]]), np.array([[0.05, 0.02, 0.0]]), np.array([[0.03, 0.05]])
         ),
     }[kind]
     near = find_proximity(x, obstacles, 0.003)

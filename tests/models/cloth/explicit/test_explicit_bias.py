@@ -63,7 +63,7 @@ def _in_contact(
     limb = Obstacles(
         np.array([[0.1, 0.2, -0.06], [0.3, 0.1, -0.07]]),
         np.array([[0.4, 0.3, -0.06], [0.3, 0.1, -0.07]]),
-        np.array([0.05, 0.05]),
+        np.array([[0.05, 0.03], [0.05, 0.05]]),
         np.array([[0.0, 0.0, 0.05], [0.02, 0.0, 0.0]]),
         np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]]),
     )
@@ -149,8 +149,10 @@ def test_frozen_contact_is_exact_without_contact_and_bounded_with_it() -> None:
 SETTLING = 130
 
 
-def _on_all_kinds(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, Obstacles]:
-    """A sheet that lies on a floor that rises, a ball given as a mesh that turns, and a capsule."""
+def _on_all_kinds(
+    h: float, end_radius: float
+) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, Obstacles]:
+    """A sheet that lies on a floor that rises, a ball given as a mesh that turns, and a limb."""
     x, e = sheet_elements(16, 18, 0.03)
     cloth = ExplicitBiasCloth(
         e, Material(friction=0.3), h, NO_NODES, settings=ExplicitSettings(tolerance=1e-10)
@@ -172,7 +174,7 @@ def _on_all_kinds(h: float) -> tuple[ExplicitBiasCloth, FloatArray, FloatArray, 
     limb = Obstacles(
         np.array([[0.3, 0.1, -0.08]]),
         np.array([[0.4, 0.3, -0.06]]),
-        np.array([0.05]),
+        np.array([[0.05, end_radius]]),
         np.array([[0.0, 0.0, 0.05]]),
         np.array([[0.1, 0.2, 0.3]]),
         floor,
@@ -191,10 +193,12 @@ def _moved(o: Obstacles, owner: int, d: FloatArray) -> Obstacles:
     return o.moved(offset)
 
 
-@pytest.mark.parametrize("h", [0.005, 0.05])
-def test_derivative_by_the_motion_of_bodies_matches_finite_differences(h: float) -> None:
+@pytest.mark.parametrize(("h", "end_radius"), [(0.005, 0.05), (0.05, 0.05), (0.005, 0.03)])
+def test_derivative_by_the_motion_of_bodies_matches_finite_differences(
+    h: float, end_radius: float
+) -> None:
     rng = np.random.default_rng(3)
-    cloth, x, v, bodies = _on_all_kinds(h)
+    cloth, x, v, bodies = _on_all_kinds(h, end_radius)
     weight_x, weight_v = rng.normal(size=x.shape), h * rng.normal(size=x.shape)
     _, _, _, tape = cloth.step(x, v, NOTHING, bodies)
     types = tape.types
