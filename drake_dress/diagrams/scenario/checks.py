@@ -7,6 +7,7 @@ import re
 from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Behaviour,
+    Coat,
     Controller,
     Motion,
     Safety,
@@ -16,6 +17,7 @@ from drake_dress.diagrams.scenario.schema import (
 from drake_dress.errors import UserError
 from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
+from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.supervision.injection import sources_of
 
@@ -143,6 +145,15 @@ def check_cameras(source: str, scenario: Scenario) -> None:
                 f"lab.faults[{i}].source",
                 f"is {fault.source!r}, expected {' or '.join(own)} with kind {fault.kind}",
             )
+
+
+def check_coat(source: str, coat: Coat) -> None:
+    """Checks that the coat's size is in its table."""
+    if coat.size is not None:
+        try:
+            body_of_size(coat.size_table, coat.size)
+        except UserError as error:
+            raise UserError(source, f"garment.coat.{error.key}", error.message) from error
 
 
 def check_behaviour(source: str, behaviour: Behaviour) -> None:
