@@ -120,7 +120,8 @@ class Mesh:
     """A user's own garment, which replaces the coat.
 
     Attributes:
-        file: OBJ, PLY, STL or glTF file, relative to the scenario.
+        file: OBJ, PLY, STL or glTF file, or a sewing pattern in GarmentCode's JSON format, relative
+            to the scenario.
         unit: unit of the file's coordinates.
         scale: factor on all coordinates, in addition to the unit.
         up: axis of the file that points up; a minus sign is for files that are upside down.
