@@ -30,8 +30,10 @@ def values(scenario: Scenario) -> dict[str, float]:
         for name in ("abduction_deg", "extension_deg", "elbow_deg"):
             found[f"{side}_{name}"] = getattr(arm, name)
     found |= {f"body_{k}": v for k, v in _numbers(scenario.person.measures).items()}
-    coat = _numbers(coat_parameters(scenario.garment.coat))
-    found |= {f"coat_{k}": v for k, v in coat.items() if not k.startswith("grasp")}
+    coat = coat_parameters(scenario.garment.coat)
+    found |= {f"coat_{k}": v for k, v in coat.lengths.items()}
+    if coat.sleeve_slope_deg is not None:
+        found["coat_sleeve_slope_deg"] = coat.sleeve_slope_deg
     fabric = scenario.plant.material
     found |= {f"fabric_{k}": getattr(fabric, k) for k in ("stretch_stiffness", "friction")}
     found |= {f"start_{k}": v for k, v in _numbers(scenario.station.start).items()}

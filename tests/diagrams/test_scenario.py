@@ -27,6 +27,7 @@ from drake_dress.diagrams.sections.controller import predictor
 from drake_dress.diagrams.sections.person import behaviour
 from drake_dress.diagrams.sections.safety import safety_limits
 from drake_dress.errors import UserError
+from drake_dress.models.garment.coat import COATS, body_of_size, coat_of_size
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.learned.forecast import PersonHistory, PersonPredictor
@@ -47,7 +48,7 @@ ONE_OF_EVERYTHING = """
 seed: 4
 duration: 12.5
 garment:
-  coat: {preset: jacket, scale: 1.1, chest: 1.2}
+  coat: {preset: jacket, size: 48, size_table: men, scale: 1.1, chest: 1.2, collar: none}
   mesh: {file: a.obj, unit: cm, loops: {left_cuff: [1, 2, 3]}, grasp: {left: [4]}}
 person:
   posture: sitting
@@ -231,13 +232,13 @@ def test_variation_acts_on_every_measure_and_within_its_width(
 ) -> None:
     scenario = Scenario(seed=seed)
     if given_measures:
-        scenario.garment.coat = Coat(preset="jacket", chest=1.2, armhole_girth=0.56, cuff_girth=0.3)
+        scenario.garment.coat = Coat(preset="blazer", chest=1.2, armhole_girth=0.56, cuff_girth=0.3)
     scenario.variation = Variation(**widths)
     drawn = apply_variation(scenario)
     for plain, varied, scale, own in (
         (
-            asdict(coat_parameters(scenario.garment.coat)),
-            asdict(coat_parameters(drawn.garment.coat)),
+            coat_parameters(scenario.garment.coat).lengths,
+            coat_parameters(drawn.garment.coat).lengths,
             widths["coat_scale"],
             widths["coat_measures"],
         ),
@@ -251,7 +252,7 @@ def test_variation_acts_on_every_measure_and_within_its_width(
         ratios = {}
         for name, before in plain.items():
             value = MASSES.get(name, before)
-            if name.startswith("grasp") or value is None:
+            if value is None:
                 assert varied[name] == value
                 continue
             power = 3 if name.endswith("mass") else 1
@@ -271,10 +272,63 @@ def load_scenario_text(text: str) -> Scenario:
 
 @pytest.mark.parametrize("measures", [{}, {"chest": 1.1, "sleeve_length": 0.6}])
 def test_scale_of_a_coat_acts_on_given_measures_too(measures: dict[str, Any]) -> None:
-    plain = asdict(coat_parameters(Coat(**measures)))
-    large = asdict(coat_parameters(Coat(scale=1.1, **measures)))
-    for name, value in plain.items():
-        assert large[name] == pytest.approx(value if name.startswith("grasp") else 1.1 * value)
+    plain = coat_parameters(Coat(preset="bathrobe", **measures))
+    large = coat_parameters(Coat(preset="bathrobe", scale=1.1, **measures))
+    assert plain.lengths.keys() == large.lengths.keys()
+    for name, value in plain.lengths.items():
+        assert large.lengths[name] == pytest.approx(1.1 * value)
+    for name in ("grasp_fraction", "grasp_radius", "sleeve_slope_deg", "collar", "opens"):
+        assert getattr(large, name) == getattr(plain, name)
+
+
+def test_an_angle_of_a_coat_is_drawn_and_not_scaled() -> None:
+    scenario = Scenario(seed=3)
+    scenario.garment.coat = Coat(preset="gown")
+    scenario.variation = Variation(coat_scale=0.2, coat_measures=0.02)
+    drawn = apply_variation(scenario)
+    assert drawn.garment.coat.scale != 1.0
+    slope = coat_parameters(drawn.garment.coat).sleeve_slope_deg
+    assert slope is not None
+    assert 0.98 * 42.0 <= slope <= 1.02 * 42.0
+    assert slope != 42.0
+
+
+def test_a_measure_that_a_cut_lacks_is_not_drawn() -> None:
+    scenario = Scenario(seed=3)
+    scenario.garment.coat = Coat(preset="jacket")
+    scenario.variation = Variation(coat_measures=0.02)
+    coat = apply_variation(scenario).garment.coat
+    assert (coat.hem_girth, coat.elbow_girth, coat.sleeve_slope_deg) == (None, None, None)
+
+
+def test_a_size_gives_all_measures_and_given_ones_replace_its_own(tmp_path: Path) -> None:
+    text = "garment: {coat: {preset: blazer, size: 40, size_table: women, chest: 1.3}}"
+    coat = load_scenario(write(tmp_path, text)).garment.coat
+    assert coat.size == "40"
+    own = coat_parameters(coat)
+    body = body_of_size("women", "40")
+    expected = coat_of_size(COATS["blazer"], body).lengths | {"chest": 1.3}
+    assert own.lengths == expected
+    assert all(own.lengths[k] != v for k, v in COATS["blazer"].lengths.items())
+    given = load_scenario(write(tmp_path, "seed: 0"), ["garment.coat.size=XL"]).garment.coat
+    assert coat_parameters(given).chest > coat_parameters(Coat()).chest
+    assert coat_parameters(Coat(size="M", scale=1.1)).chest == pytest.approx(
+        1.1 * coat_parameters(Coat(size="M")).chest
+    )
+
+
+def test_an_unknown_size_is_told_with_those_of_its_table(tmp_path: Path) -> None:
+    text = "garment: {coat: {size: 116, size_table: women}}"
+    with pytest.raises(UserError, match=r"expected one of XS, S, M, .*, 60 for women") as caught:
+        load_scenario(write(tmp_path, text))
+    assert caught.value.key == "garment.coat.size"
+
+
+def test_shape_of_a_coat_is_the_preset_s_unless_given() -> None:
+    assert coat_parameters(Coat(preset="bathrobe")).collar == "shawl"
+    assert coat_parameters(Coat(preset="bathrobe", collar="none")).collar == "none"
+    assert coat_parameters(Coat(preset="gown")).opens == "back"
+    assert coat_parameters(Coat(preset="gown", opens="front")).opens == "front"
 
 
 def test_scale_of_a_mesh_file_is_drawn_with_the_coat_s(tmp_path: Path) -> None:

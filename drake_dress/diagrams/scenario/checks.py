@@ -7,6 +7,7 @@ import re
 from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Behaviour,
+    Coat,
     Controller,
     Joints,
     Motion,
@@ -17,6 +18,7 @@ from drake_dress.diagrams.scenario.schema import (
 from drake_dress.errors import UserError
 from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
+from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.supervision.injection import sources_of
@@ -157,6 +159,15 @@ def check_joints(source: str, joints: Joints) -> None:
                 f"person.joints.{name}_limits_deg",
                 f"is {limits}, expected the smallest and the largest angle in degrees",
             )
+
+
+def check_coat(source: str, coat: Coat) -> None:
+    """Checks that the coat's size is in its table."""
+    if coat.size is not None:
+        try:
+            body_of_size(coat.size_table, coat.size)
+        except UserError as error:
+            raise UserError(source, f"garment.coat.{error.key}", error.message) from error
 
 
 def check_behaviour(source: str, behaviour: Behaviour) -> None:

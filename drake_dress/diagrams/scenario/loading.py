@@ -15,6 +15,7 @@ from pydrake.common.yaml import yaml_load_typed
 from drake_dress.diagrams.scenario.checks import (
     check_behaviour,
     check_cameras,
+    check_coat,
     check_controller,
     check_costs,
     check_hardware,
@@ -89,6 +90,7 @@ def _checked(
     check_controller(source, scenario.controller)
     check_costs(source, scenario.controller.costs)
     check_joints(source, scenario.person.joints)
+    check_coat(source, scenario.garment.coat)
     check_behaviour(source, scenario.person.behaviour)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)

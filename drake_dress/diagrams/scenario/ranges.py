@@ -2,12 +2,12 @@
 
 import math
 import re
-from dataclasses import fields
 
+from drake_dress.diagrams.scenario.coat import COAT_MEASURES
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
-from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
+from drake_dress.models.garment.coat import COATS, COLLARS, OPENINGS, SIZE_TABLES
 from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
@@ -17,9 +17,14 @@ from drake_dress.models.supervision.injection import KINDS
 
 # Sources of the lab's messages, in addition to its cameras.
 SOURCES = ("left_arm", "right_arm", "garment", "person")
+# Text values that may be written as a number.
+NUMBERS_AS_TEXT = ("garment.coat.size",)
 # Allowed words of text values (Drake's loader has no literal types).
 CHOICES = {
-    "garment.coat.preset": ("overcoat", "jacket"),
+    "garment.coat.preset": tuple(COATS),
+    "garment.coat.size_table": SIZE_TABLES,
+    "garment.coat.collar": COLLARS,
+    "garment.coat.opens": OPENINGS,
     "garment.coat.grasp": ("patch", "seam"),
     "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
@@ -110,8 +115,9 @@ _RANGES: dict[str, tuple[float, float]] = {
     "coat.scale": (0.7, 1.4),
     **{
         f"coat.{name}": (0.0, 3.0)  # m; checked together when the coat is made
-        for name in (entry.name for entry in fields(Coat) if entry.default is None)
+        for name in COAT_MEASURES
     },
+    "coat.sleeve_slope_deg": (0.0, 90.0),
     **{f"mesh.loops.{name}": (0, 2**31 - 1) for name in LOOP_NAMES},
     **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
     "mesh.weld": WELD_RANGE,

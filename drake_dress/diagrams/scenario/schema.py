@@ -56,7 +56,11 @@ class Coat:
     """A parametric coat: a preset whose single measures may be replaced.
 
     Attributes:
-        preset: pattern that supplies the measures that are not given.
+        preset: cut that supplies the measures that are not given.
+        size: size that the cut is made in: a letter from XS to 5XL, an EU number from 34 to 60, or
+            a child's stature from 92 to 176, cm (`docs/coats.md`). Given measures replace its own.
+            If empty, the cut as it is drawn, for a man of size 50.
+        size_table: who the size is for, `women`, `men` or `children`.
         scale: factor on all lengths, including given ones.
         body_length: length from the shoulder tips to the hem, m. If empty, the preset's value; the
             same holds for all measures below.
@@ -68,12 +72,32 @@ class Coat:
         collar_height: height of the collar, m.
         neck_width: distance between the inner ends of the shoulder seams, m.
         shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
-        front_opening: gap between the front edges, part of the chest girth, m.
+        front_opening: gap between the front edges, part of the chest girth, m. For a coat that
+            opens at the back, here and below the front means the open side.
+        hem_girth: girth of the hem over the open front, m. If no preset or size gives it, the body
+            is straight.
+        hem_opening: gap between the front edges at the hem, m.
+        elbow_girth: girth of each sleeve halfway along it, m. If no preset or size gives it, the
+            sleeve tapers evenly.
+        neck_depth: depth of the front neckline below the inner ends of the shoulder seams, m. If no
+            preset gives it, the front edges end at the shoulder seams.
+        nape_depth: depth of the neckline in the middle of the closed side, measured likewise, m.
+        lapel_width: largest width of a lapel, or of a shawl collar in front, m.
+        lapel_depth: depth of the lower end of lapels or shawl below the shoulder tips, m.
+        vent_length: length of a slit from the hem up the middle of the closed side, m.
+        hood_height: height of a hood above the nape, m.
+        sleeve_slope_deg: slope of the sleeves below the horizontal at rest, deg. If no preset gives
+            it, 58.
+        collar: what is sewn to the neckline, `stand`, `none`, `lapel`, `shawl` or `hood`. If empty,
+            the preset's.
+        opens: side on which the coat is open, `front` or `back`. If empty, the preset's.
         grasp: part of the coat that each gripper holds. `patch` is a patch 7 cm across with at
             least four nodes; `seam` is the whole shoulder seam, as on a hanger.
     """
 
     preset: str = "overcoat"
+    size: str | None = None
+    size_table: str = "men"
     scale: float = 1.0
     body_length: float | None = None
     chest: float | None = None
@@ -85,6 +109,18 @@ class Coat:
     neck_width: float | None = None
     shoulder_slope: float | None = None
     front_opening: float | None = None
+    hem_girth: float | None = None
+    hem_opening: float | None = None
+    elbow_girth: float | None = None
+    neck_depth: float | None = None
+    nape_depth: float | None = None
+    lapel_width: float | None = None
+    lapel_depth: float | None = None
+    vent_length: float | None = None
+    hood_height: float | None = None
+    sleeve_slope_deg: float | None = None
+    collar: str | None = None
+    opens: str | None = None
     grasp: str = "patch"
 
 
@@ -93,7 +129,8 @@ class Mesh:
     """A user's own garment, which replaces the coat.
 
     Attributes:
-        file: OBJ, PLY, STL or glTF file, relative to the scenario.
+        file: OBJ, PLY, STL or glTF file, or a sewing pattern in GarmentCode's JSON format, relative
+            to the scenario.
         unit: unit of the file's coordinates.
         scale: factor on all coordinates, in addition to the unit.
         up: axis of the file that points up; a minus sign is for files that are upside down.

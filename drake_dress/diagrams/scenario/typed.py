@@ -7,7 +7,7 @@ import types
 import typing
 from typing import Any
 
-from drake_dress.diagrams.scenario.ranges import choices_of, range_of
+from drake_dress.diagrams.scenario.ranges import NUMBERS_AS_TEXT, choices_of, range_of
 from drake_dress.diagrams.scenario.schema import SCHEMAS
 from drake_dress.errors import UserError
 from drake_dress.models.effects.registry import HOW_TO_LOAD
@@ -36,6 +36,8 @@ def typed(source: str, key: str, value: Any, schema: Any) -> Any:
     if value is None and _takes_none(schema):
         return None
     schema = _of_value(_without_none(schema), value)
+    if key in NUMBERS_AS_TEXT and type(value) is int:
+        value = str(value)
     origin = typing.get_origin(schema)
     if dataclasses.is_dataclass(schema):
         if not isinstance(value, dict):

@@ -9,7 +9,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
+from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters, coat_scale
 from drake_dress.diagrams.scenario.schema import (
     Coat,
     Person,
@@ -57,8 +57,11 @@ def apply_variation(scenario: Scenario) -> Scenario:
 def _vary_coat(coat: Coat, width: float, draw: Draw) -> None:
     whole = coat_parameters(coat)
     for name in COAT_MEASURES:
-        # given measures are scaled when the coat is made
-        setattr(coat, name, getattr(whole, name) / coat.scale * (1.0 + draw(width)))
+        # each has its draw, so that no coat changes the draws of another's measures
+        factor, value = 1.0 + draw(width), getattr(whole, name)
+        if value is not None:
+            # given measures are scaled when the coat is made
+            setattr(coat, name, value / coat_scale(coat, name) * factor)
 
 
 def _vary_person(person: Person, v: Variation, draw: Draw) -> None:

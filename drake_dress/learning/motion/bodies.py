@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -40,6 +40,8 @@ _ELBOW = 3
 _EFFORT, _EFFORT_SPREAD = np.array([1.0, 1.0, 0.6, 0.4]), 0.4
 # Size of a coat over that of the preset, and each measure's own largest variation.
 _COAT_SCALE, _COAT_MEASURE = (0.85, 1.35), 0.06
+# The cuts of the data that the shipped weights learned from; their lengths are varied.
+_CUTS = ("jacket", "overcoat")
 _SPACING = 0.06  # m, of the mesh on which a coat's reach is measured
 _ATTEMPTS = 20  # to draw measures that fit each other
 
@@ -86,17 +88,15 @@ def draw_person(rng: np.random.Generator) -> DrawnPerson:
 
 def draw_reach(rng: np.random.Generator) -> Reach:
     """Returns the reach of a coat with drawn measures."""
-    names = sorted(COATS)
     for _ in range(_ATTEMPTS):
-        preset = COATS[names[rng.integers(len(names))]]
+        preset = COATS[_CUTS[rng.integers(len(_CUTS))]]
         scale = rng.uniform(*_COAT_SCALE)
-        lengths = [f.name for f in fields(preset) if not f.name.startswith("grasp")]
         drawn = {
-            name: getattr(preset, name) * scale * (1.0 + rng.uniform(-1, 1) * _COAT_MEASURE)
-            for name in lengths
+            name: value * scale * (1.0 + rng.uniform(-1, 1) * _COAT_MEASURE)
+            for name, value in preset.lengths.items()
         }
         try:
-            return reach(make_coat(replace(preset, **drawn), _SPACING))
+            return reach(make_coat(preset.with_lengths(drawn), _SPACING))
         except UserError:
             # measures that make no coat
             continue

@@ -64,12 +64,20 @@ class Elements:
     bend_lanes: FloatArray
 
 
-def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> Elements:
+def make_elements(
+    rest_position: FloatArray,
+    faces: npt.NDArray[np.integer],
+    corners: FloatArray | None = None,
+) -> Elements:
     """Returns the elements of a triangle mesh.
 
     Args:
         rest_position: (n,3) rest shape, m.
         faces: (F,3) node indices, consistently oriented, manifold.
+        corners: (F,3,2) rest shape of each triangle by itself, counter-clockwise or not, m, such as
+            in the flat panels that a garment is sewn of. Hinges then rest flat, and an edge rests
+            at the mean length that its triangles give it. None for the triangles of
+            `rest_position`.
 
     Raises:
         ValueError: a triangle has no area or refers to a missing node, a node is not finite, a
@@ -79,20 +87,26 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     triangle = np.ascontiguousarray(faces, dtype=np.int32)
     n = len(x)
     _check(x, triangle)
-    gradient, double_area = _shape_gradients(x, triangle)
+    single = _apart(x, triangle, corners)
+    gradient, double_area = _shape_gradients(single)
     area = 0.5 * double_area
     node_area = np.zeros(n)
     for corner in range(3):
         np.add.at(node_area, triangle[:, corner], area / 3.0)
 
     hinge, hinge_faces = _hinges(triangle)
-    coefficient = _hinge_coefficients(x, hinge)
+    at_rest = x[hinge] if corners is None else _unfolded(single, triangle, hinge, hinge_faces)
+    coefficient = _hinge_coefficients(at_rest)
     weight = 1.0 / (area[hinge_faces[:, 0]] + area[hinge_faces[:, 1]])
-    rest = np.linalg.norm(np.einsum("hi,hij->hj", coefficient, x[hinge]), axis=1)
+    rest = np.linalg.norm(np.einsum("hi,hij->hj", coefficient, at_rest), axis=1)
 
     half_edges = np.sort(_half_edges(triangle), axis=1)
-    edge = np.unique(half_edges, axis=0).astype(np.int32)
+    edge, of_half = np.unique(half_edges, axis=0, return_inverse=True)
+    edge = edge.astype(np.int32)
     edge_length = np.linalg.norm(x[edge[:, 1]] - x[edge[:, 0]], axis=1)
+    if corners is not None:
+        sides = np.linalg.norm(np.roll(single, -1, axis=1) - single, axis=2).ravel()
+        edge_length = np.bincount(of_half.ravel(), sides) / np.bincount(of_half.ravel())
     return Elements(
         node_count=n,
         triangle=triangle,
@@ -112,29 +126,65 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     )
 
 
-def _shape_gradients(x: FloatArray, triangle: IntArray) -> tuple[FloatArray, FloatArray]:
+def _apart(x: FloatArray, triangle: IntArray, corners: FloatArray | None) -> FloatArray:
+    """Returns (F,3,3) the corners of each triangle at rest, m."""
+    if corners is None:
+        return x[triangle]
+    if corners.shape != (len(triangle), 3, 2) or not np.isfinite(corners).all():
+        raise ValueError(
+            f"corners have shape {corners.shape}, expected ({len(triangle)}, 3, 2), finite"
+        )
+    return np.concatenate([corners, np.zeros((len(triangle), 3, 1))], axis=2)
+
+
+def _unfolded(
+    single: FloatArray, triangle: IntArray, hinge: IntArray, hinge_faces: IntArray
+) -> FloatArray:
+    """Returns (H,4,3) the nodes of hinges whose two triangles lie in a plane, m."""
+    flat = np.zeros((len(hinge), 4, 3))
+    ends = []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        face = hinge_faces[:, side]
+        own = [
+            single[face, np.argmax(triangle[face] == hinge[:, [k]], axis=1)]
+            for k in (0, 1, 2 + side)
+        ]
+        along = own[1] - own[0]
+        length = np.linalg.norm(along, axis=1)
+        ends.append(length)
+        arm = own[2] - own[0]
+        flat[:, 2 + side, 0] = np.einsum("ij,ij->i", arm, along) / length
+        flat[:, 2 + side, 1] = sign * np.linalg.norm(np.cross(along, arm), axis=1) / length
+    flat[:, 1, 0] = 0.5 * (ends[0] + ends[1])
+    return flat
+
+
+def _shape_gradients(corner: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Returns gradients of the linear shape functions (F,3,2), 1/m, and double areas (F,), m².
 
     Each triangle has axes of its own: the first along its first edge.
 
+    Args:
+        corner: (F,3,3) corners of the triangles, m.
+
     Raises:
         ValueError: a triangle has no area.
     """
-    e1 = x[triangle[:, 1]] - x[triangle[:, 0]]
-    e2 = x[triangle[:, 2]] - x[triangle[:, 0]]
+    e1 = corner[:, 1] - corner[:, 0]
+    e2 = corner[:, 2] - corner[:, 0]
     normal = np.cross(e1, e2)
     double_area = np.linalg.norm(normal, axis=1)
     if np.any(double_area <= 1e-14):
         raise ValueError(f"triangle {int(np.argmin(double_area))} has no area")
     u = e1 / np.linalg.norm(e1, axis=1)[:, None]
     w = np.cross(normal / double_area[:, None], u)
-    edge_matrix = np.empty((len(triangle), 2, 2))
+    edge_matrix = np.empty((len(corner), 2, 2))
     edge_matrix[:, 0, 0] = np.einsum("ij,ij->i", e1, u)
     edge_matrix[:, 1, 0] = 0.0
     edge_matrix[:, 0, 1] = np.einsum("ij,ij->i", e2, u)
     edge_matrix[:, 1, 1] = np.einsum("ij,ij->i", e2, w)
     inverse = np.linalg.inv(edge_matrix)
-    gradient = np.empty((len(triangle), 3, 2))
+    gradient = np.empty((len(corner), 3, 2))
     gradient[:, 1] = inverse[:, 0]
     gradient[:, 2] = inverse[:, 1]
     gradient[:, 0] = -inverse[:, 0] - inverse[:, 1]
@@ -197,9 +247,13 @@ def _hinges(triangle: IntArray) -> tuple[IntArray, IntArray]:
     return np.ascontiguousarray(nodes), np.column_stack([face[pair], face[pair + 1]])
 
 
-def _hinge_coefficients(x: FloatArray, hinge: IntArray) -> FloatArray:
-    """Returns (H,4) the cotangent row of Bergou et al. 2006, "A quadratic bending model"."""
-    x0, x1, x2, x3 = (x[hinge[:, i]] for i in range(4))
+def _hinge_coefficients(hinge: FloatArray) -> FloatArray:
+    """Returns (H,4) the cotangent row of Bergou et al. 2006, "A quadratic bending model".
+
+    Args:
+        hinge: (H,4,3) nodes of each hinge at rest, the shared edge first, m.
+    """
+    x0, x1, x2, x3 = (hinge[:, i] for i in range(4))
 
     def cotangent(apex: FloatArray, p: FloatArray, q: FloatArray) -> FloatArray:
         a, b = p - apex, q - apex

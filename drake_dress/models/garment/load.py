@@ -231,7 +231,8 @@ def read_garment(
     options.check(source)
     progress("reading the garment", 0.0)
     parts = chosen(options.take, "take", source), chosen(options.leave_out, "leave_out", source)
-    raw = by_name(read_mesh(Path(path)), *parts).scaled(options.scale)
+    whole_file = read_mesh(Path(path), lambda share: progress("putting on the pattern", share))
+    raw = by_name(whole_file, *parts).scaled(options.scale)
     progress("checking the garment", 0.3)
     if options.unit == AUTO:
         return _in_likely_unit(raw, parts, options, progress)

@@ -134,7 +134,7 @@ def refusal(path: Path, **kwargs: Any) -> str:
 
 def test_unreadable_file_is_named(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "none.obj")
-    assert "expected .obj, .ply, .stl, .gltf, .glb; export it as glTF" in refusal(
+    assert "expected .obj, .ply, .stl, .gltf, .glb, .json; export it as glTF" in refusal(
         tmp_path / "coat.fbx"
     )
     for extension in ("obj", "ply", "stl"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,12 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.garment.files.gltf import read_gltf
 from drake_dress.models.garment.files.obj import read_obj
+from drake_dress.models.garment.files.pattern import read_pattern
 from drake_dress.models.garment.files.ply import read_ply
 from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.stl import read_stl
 
-EXTENSIONS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+EXTENSIONS = (".obj", ".ply", ".stl", ".gltf", ".glb", ".json")
 # Other formats that garments come in, and how to turn them.
 _OTHERS = {
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "a USD stage"),
@@ -27,8 +29,12 @@ _LARGEST = 1e9  # coordinate in any unit: no garment is larger, and huge numbers
 _MOST_BYTES = 200 * 10**6
 
 
-def read_mesh(path: Path) -> RawMesh:
-    """Returns the triangles of an OBJ, PLY, STL or glTF file.
+def read_mesh(path: Path, progress: Callable[[float], None] = lambda _share: None) -> RawMesh:
+    """Returns the triangles of an OBJ, PLY, STL or glTF file, or of a sewing pattern.
+
+    Args:
+        path: the file.
+        progress: called with the share that is done while a pattern takes its shape.
 
     Raises:
         UserError: the file is absent, unreadable, too large, not of its format, or without
@@ -44,6 +50,8 @@ def read_mesh(path: Path) -> RawMesh:
             mesh = read_ply(data, source, MOST_TRIANGLES)
         elif path.suffix.lower() == ".stl":
             mesh = read_stl(data, source, MOST_TRIANGLES)
+        elif path.suffix.lower() == ".json":
+            mesh = read_pattern(data, source, MOST_TRIANGLES, progress)
         else:
             mesh = read_gltf(data, path, MOST_TRIANGLES)
     if len(mesh.faces) == 0:

@@ -15,7 +15,7 @@ from drake_dress.models.garment.edges import boundary_loops
 from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths, loop_length
 
 SPACINGS = (0.01, 0.02, 0.03, 0.045, 0.06)
-MODELS = {"default": CoatParameters(), **COATS}
+MODELS = {"default": CoatParameters(), **{name: COATS[name] for name in ("overcoat", "jacket")}}
 
 
 def smallest_angle(mesh: GarmentMesh) -> float:

@@ -1,0 +1,67 @@
+"""Draws a coat: cut, size and measures, for studies over many coats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
+from drake_dress.diagrams.scenario.schema import Coat
+from drake_dress.errors import UserError
+from drake_dress.models.garment.coat import COATS, make_coat, size_codes
+
+# Relative width of a measure's own variation: makers differ by this in coats of one size.
+MEASURE_WIDTH = 0.03
+_SPACING = 0.06  # m, of the mesh that shows whether drawn measures make a coat
+_ATTEMPTS = 50  # to draw measures that fit each other
+
+
+def draw_coat(
+    rng: np.random.Generator,
+    cuts: Sequence[str] | None = None,
+    tables: Sequence[str] = ("women", "men"),
+    width: float = MEASURE_WIDTH,
+    opens: str = "front",
+) -> Coat:
+    """Returns the keys `garment.coat` of a drawn coat, which the generator's state decides.
+
+    Cut, table and size are equally likely each. Then every measure that the coat has is multiplied
+    by a factor of its own between 1 − width and 1 + width, and stands in the keys.
+
+    Args:
+        rng: generator; it is advanced.
+        cuts: presets to draw from. None for all that open on the side `opens`.
+        tables: size tables to draw from.
+        width: relative width of each measure's variation.
+        opens: see `cuts`.
+
+    Raises:
+        UserError: a cut or a table is unknown, or no drawn measures make a coat.
+    """
+    if cuts is None:
+        cuts = [name for name, cut in COATS.items() if cut.opens == opens]
+    unknown = [name for name in cuts if name not in COATS]
+    if unknown:
+        known = ", ".join(COATS)
+        raise UserError("coat", "preset", f"is {unknown[0]!r}, expected one of {known}")
+    for _ in range(_ATTEMPTS):
+        coat = Coat(preset=_one_of(rng, cuts), size_table=_one_of(rng, tables))
+        coat.size = _one_of(rng, size_codes(coat.size_table))
+        whole = coat_parameters(coat)
+        for name in COAT_MEASURES:
+            value = getattr(whole, name)
+            factor = 1.0 + width * rng.uniform(-1.0, 1.0)
+            if value is not None:
+                setattr(coat, name, float(value * factor))
+        try:
+            make_coat(coat_parameters(coat), _SPACING)
+        except UserError as error:
+            why = str(error)
+        else:
+            return coat
+    raise UserError("coat", "width", f"is {width}, at which no drawn measures make a coat: {why}")
+
+
+def _one_of(rng: np.random.Generator, words: Sequence[str]) -> str:
+    return words[int(rng.integers(len(words)))]
