@@ -178,7 +178,9 @@ def test_garment_without_findable_loops_is_named(tmp_path: Path, coat: GarmentMe
     path = write(tmp_path / "sphere.obj", sphere.vertices, sphere.faces)
     assert "no cuffs found" in refusal(path)
     turned = coat.rest_position[:, [1, 0, 2]] * [1, -1, 1]  # faces -y
-    assert "face +x" in refusal(write_obj(tmp_path / "coat.obj", turned, coat.faces))
+    assert "are up and facing right" in refusal(
+        write_obj(tmp_path / "coat.obj", turned, coat.faces)
+    )
 
 
 def trousers() -> tuple[FloatArray, IntArray]:
