@@ -10,8 +10,9 @@ from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
 from drake_dress.models.garment.coat import make_coat
-from drake_dress.models.garment.load import MeshOptions, Progress, WholeGarment, read_garment
+from drake_dress.models.garment.load import Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh_options import MeshOptions
 
 _MOST_KEPT = 4  # mesh files kept in memory
 _kept: OrderedDict[tuple[object, ...], WholeGarment] = OrderedDict()
@@ -80,6 +81,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[Whole
             up=mesh.up,
             facing=mesh.facing,
             weld=mesh.weld,
+            front=mesh.front,
             take=tuple(mesh.take),
             leave_out=tuple(mesh.leave_out),
             loops=mesh.loops,

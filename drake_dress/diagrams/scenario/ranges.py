@@ -8,8 +8,8 @@ from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.life_size import AUTO, UNITS
-from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.garment.mesh_options import FRONTS, SCALE_RANGE, WELD_RANGE
 from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
@@ -23,6 +23,7 @@ CHOICES = {
     "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
+    "garment.mesh.front": FRONTS,
     "person.posture": ("standing", "sitting"),
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{

@@ -24,7 +24,7 @@ from drake_dress.models.control.own_costs import COSTS
 from drake_dress.models.dressing import stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
-from drake_dress.models.garment.load import MeshOptions
+from drake_dress.models.garment.mesh_options import MeshOptions
 from drake_dress.models.human import body, following, motions, prediction, tremor
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.supervision.garment_belief import GarmentBounds
@@ -92,6 +92,8 @@ class Mesh:
             x up.
         weld: distance across which edges of seams are joined, m. With 0 only nodes at the same
             position are merged.
+        front: front edges that coincide from neck to hem, such as a closed zip: `auto` and `open`
+            keep them apart, `closed` sews them. With `open` the garment must be open.
         take: parts of the file that are the garment, if not all are: names of objects or groups,
             sizes such as `>0.5 m` of connected parts, or places such as `near (0.1, 0, 1.2) m`.
         leave_out: parts to omit, in the same words; `<0.05 m` omits smaller connected parts.
@@ -108,6 +110,7 @@ class Mesh:
     up: str = MeshOptions.up
     facing: str | None = MeshOptions.facing
     weld: float = MeshOptions.weld
+    front: str = MeshOptions.front
     take: list[str] = field(default_factory=list)
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int] | str] = field(default_factory=dict)
@@ -120,7 +123,7 @@ class Garment:
 
     Attributes:
         coat: parametric coat.
-        mesh: garment from a file; it replaces the coat.
+        mesh: garment from a file; it replaces the coat. A scenario file gives one of both.
     """
 
     coat: Coat = field(default_factory=Coat)
