@@ -18,6 +18,7 @@ from drake_dress.models.garment.files.raw import place
 from drake_dress.models.garment.front import Opening, front_of
 from drake_dress.models.garment.front_edges import front_parted, sewn_edges
 from drake_dress.models.garment.label import labelled, with_openings
+from drake_dress.models.garment.layers import check_one_layer
 from drake_dress.models.garment.life_size import (
     ADULT,
     AUTO,
@@ -232,6 +233,7 @@ def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progre
         check_plausible(raw)  # a face with a wrong corner shows once it is cut off
     node, face = raw.node, raw.face
     check_manifold(raw.faces, len(raw.position), source, node, face)
+    check_one_layer(raw)
     faces = _outward(raw.position, raw.faces).astype(np.int32)
     given = options.loops or {}
     loops = {

@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
-from drake_dress.models.garment.edges import border_edges
+from drake_dress.models.garment.edges import border_edges, boundary_loops
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 from drake_dress.models.rotation import rotation_about
 
@@ -90,6 +90,48 @@ def sewn(surface: Surface) -> Surface:
     """Returns a surface whose nodes at the same place are one."""
     x, which = np.unique(surface[0].round(9) + 0.0, axis=0, return_inverse=True)
     return x, which.reshape(-1)[surface[1]].astype(np.int32)
+
+
+def thick(mesh: GarmentMesh, thickness: float, joined: int = 3) -> Surface:
+    """Returns a coat with an inner layer that is joined to it at some of its borders.
+
+    Args:
+        mesh: the coat.
+        thickness: between the layers, m.
+        joined: number of borders at which they are joined, the longest first.
+    """
+    x, faces, n = mesh.rest_position, mesh.faces, len(mesh.rest_position)
+    normal = np.zeros_like(x)
+    corner = x[faces]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    for k in range(3):
+        np.add.at(normal, faces[:, k], across)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    rims = []
+    for loop in boundary_loops(faces)[:joined]:
+        for a, b in zip(loop, np.roll(loop, -1), strict=True):
+            rims += [[b, a, a + n], [b, a + n, b + n]]
+    both = [faces, faces[:, ::-1] + n, np.array(rims, dtype=np.int32).reshape(-1, 3)]
+    return np.vstack([x, x - thickness * normal]), np.concatenate(both).astype(np.int32)
+
+
+def panels(surface: Surface, label: np.ndarray, gap: float = 0.0) -> Surface:
+    """Returns the surface with own nodes for the faces of each label (F,), moved apart.
+
+    Args:
+        surface: the garment.
+        label: (F,) panel of each face.
+        gap: distance by which each panel is moved away from the middle of the garment, m.
+    """
+    x, faces = surface
+    nodes, kept, count = [], [], 0
+    for part in np.unique(label):
+        used, new = np.unique(faces[label == part], return_inverse=True)
+        away = x[used].mean(axis=0) - x.mean(axis=0)
+        nodes.append(x[used] + gap * away / np.linalg.norm(away))
+        kept.append(new.reshape(-1, 3) + count)
+        count += len(used)
+    return np.concatenate(nodes), np.concatenate(kept).astype(np.int32)
 
 
 def flat_gown(spacing: float = 0.02) -> Surface:

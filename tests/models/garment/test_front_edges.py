@@ -20,6 +20,7 @@ from tests.models.garment.changed import (
     JACKET,
     Surface,
     of,
+    panels,
     pullover,
     written,
     zipped,
@@ -30,18 +31,6 @@ APART = "the edges of the front coincide"
 
 def read(path: Path, surface: Surface, **options: object) -> WholeGarment:
     return read_garment(written(path, surface), MeshOptions(**options))  # type: ignore[arg-type]
-
-
-def panels(surface: Surface, label: np.ndarray) -> Surface:
-    """Returns the surface with own nodes for the faces of each label (F,)."""
-    x, faces = surface
-    nodes, kept, count = [], [], 0
-    for part in np.unique(label):
-        used, new = np.unique(faces[label == part], return_inverse=True)
-        nodes.append(x[used])
-        kept.append(new.reshape(-1, 3) + count)
-        count += len(used)
-    return np.concatenate(nodes), np.concatenate(kept).astype(np.int32)
 
 
 def parts_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
