@@ -7,9 +7,10 @@ from collections import OrderedDict
 from pathlib import Path
 
 from drake_dress.diagrams.scenario import schema
-from drake_dress.diagrams.scenario.coat import coat_parameters
+from drake_dress.diagrams.scenario.coat import coat_mesh
 from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
-from drake_dress.models.garment.coat import make_coat
+from drake_dress.errors import UserError
+from drake_dress.models.garment.front import Opening, front_of
 from drake_dress.models.garment.load import Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.mesh_options import MeshOptions
@@ -39,7 +40,7 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         for note in whole.notes if is_new else ():
             print(f"{garment.mesh.file}: {note}", file=sys.stderr)
         return mesh
-    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
+    return coat_mesh(garment.coat, spacing)
 
 
 def build_garment_like(
@@ -63,8 +64,30 @@ def build_garment_like(
     if garment.mesh is not None and nominal.mesh is not None:
         mesh = build_garment(nominal, spacing, base)
         return mesh.scaled(garment.mesh.scale / nominal.mesh.scale)
-    like = coat_parameters(nominal.coat)
-    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
+    return coat_mesh(garment.coat, spacing, nominal.coat)
+
+
+def check_opening(mesh: GarmentMesh, side: str, source: str) -> None:
+    """Checks that an open garment opens toward the person.
+
+    Args:
+        mesh: the garment.
+        side: where it is: `behind` the person or in `front`.
+        source: the scenario, for the message.
+
+    Raises:
+        UserError: it does not.
+    """
+    toward: dict[Opening, str] = {"front": "behind", "back": "front"}
+    opening = front_of(mesh)
+    if opening == "closed" or toward[opening] == side:
+        return
+    raise UserError(
+        source,
+        "station.side",
+        f"is {side}, but the garment opens at the {opening}, expected {toward[opening]} (or change "
+        "garment.mesh.facing or garment.coat.opening)",
+    )
 
 
 def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[WholeGarment, bool]:

@@ -8,7 +8,7 @@ import pytest
 
 from drake_dress.diagrams import garment
 from drake_dress.diagrams.scenario import load_scenario
-from drake_dress.diagrams.scenario.schema import Garment, Mesh
+from drake_dress.diagrams.scenario.schema import Coat, Garment, Mesh
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
@@ -98,6 +98,27 @@ def test_a_scenario_with_all_keys_loads() -> None:
     mesh = present(scenario.garment.mesh)
     assert mesh.up == "-y"
     assert mesh.leave_out == ["Button", "<0.05 m"]
+
+
+@pytest.mark.parametrize("opening", ["front", "back"])
+@pytest.mark.parametrize("side", ["behind", "front"])
+def test_a_garment_must_open_toward_the_person(opening: str, side: str) -> None:
+    mesh = garment.build_garment(Garment(coat=Coat(opening=opening)), 0.05, Path())
+    if (opening == "front") == (side == "behind"):
+        garment.check_opening(mesh, side, "s.yaml")
+        return
+    with pytest.raises(UserError, match=f"s.yaml: station.side: is {side}.*opens at the {opening}"):
+        garment.check_opening(mesh, side, "s.yaml")
+
+
+def test_a_gown_like_the_nominal_one_has_its_nodes() -> None:
+    nominal = Garment(coat=Coat(opening="back"))
+    drawn = Garment(coat=Coat(opening="back", chest=1.3))
+    first = garment.build_garment(nominal, 0.05, Path())
+    like = garment.build_garment_like(drawn, nominal, 0.05, Path())
+    assert np.array_equal(like.loops["left_cuff"], first.loops["left_cuff"])
+    assert np.array_equal(np.sort(like.faces[:, 0]), np.sort(first.faces[:, 0]))
+    assert np.abs(like.rest_position - first.rest_position).max() < 0.05
 
 
 def test_a_coat_and_a_file_in_one_scenario_contradict_each_other(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ SOURCES = ("left_arm", "right_arm", "garment", "person")
 CHOICES = {
     "garment.coat.preset": ("overcoat", "jacket"),
     "garment.coat.grasp": ("patch", "seam"),
+    "garment.coat.opening": ("front", "back"),
     "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
@@ -35,6 +36,7 @@ CHOICES = {
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated", "hardware"),
+    "station.side": ("behind", "front"),
     "lab.faults.kind": KINDS,
     "station.arms.model": ("floating", "panda"),
     "station.arms.mode": ("position_velocity", "position", "velocity"),

@@ -60,6 +60,8 @@ class Coat:
         neck_width: distance between the inner ends of the shoulder seams, m.
         shoulder_slope: height of a shoulder seam's inner end above its outer end, m.
         front_opening: gap between the front edges, part of the chest girth, m.
+        opening: where it opens: at the `front`, or at the `back` as a hospital gown does. All
+            measures then hold with front and back exchanged.
         grasp: part of the coat that each gripper holds. `patch` is a patch 7 cm across with at
             least four nodes; `seam` is the whole shoulder seam, as on a hanger.
     """
@@ -76,6 +78,7 @@ class Coat:
     neck_width: float | None = None
     shoulder_slope: float | None = None
     front_opening: float | None = None
+    opening: str = "front"
     grasp: str = "patch"
 
 
@@ -599,10 +602,10 @@ class Gripper:
 
 @dataclass
 class Start:
-    """Initial position of the coat, relative to the midpoint of the shoulders.
+    """Initial position of the garment, relative to the midpoint of the shoulders.
 
     Attributes:
-        distance_behind: distance behind the person, m.
+        distance_behind: distance behind the person, or in front with `station.side: front`, m.
         height_offset: height above the shoulders, m.
         lateral_offset: offset to the person's left, m.
     """
@@ -622,8 +625,9 @@ class Arms:
     """The arms that carry the grippers.
 
     Attributes:
-        model: `floating` grippers, or two `panda` arms behind the person.
-        distance_behind: distance of the arms' bases behind the person, m.
+        model: `floating` grippers, or two `panda` arms.
+        distance_behind: distance of the arms' bases behind the person, or in front with
+            `station.side: front`, m.
         spread: distance between the two bases, m.
         height_offset: height of both bases above the person's shoulders, m.
         tilt_deg: downward tilt of the hands, which point forward, degrees.
@@ -764,6 +768,8 @@ class Station:
 
     Attributes:
         kind: `simulated`, or `hardware`, which has the same ports behind LCM messages.
+        side: where garment and robots are: `behind` the person, who holds the arms back, or in
+            `front`, where the person reaches forward into a garment that opens at the back.
         arms: the arms that carry the grippers.
         hardware: message bus.
         gripper: limits of floating grippers.
@@ -772,6 +778,7 @@ class Station:
     """
 
     kind: str = "simulated"
+    side: str = "behind"
     arms: Arms = field(default_factory=Arms)
     hardware: Hardware = field(default_factory=Hardware)
     gripper: Gripper = field(default_factory=Gripper)

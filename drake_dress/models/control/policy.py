@@ -84,6 +84,7 @@ class DressingPolicy:
         person: the controller's model of the person's shape.
         parameters: settings.
         costs: user-defined costs, added to the dressing costs.
+        from_front: whether the garment comes from in front of the person.
     """
 
     def __init__(
@@ -93,6 +94,7 @@ class DressingPolicy:
         person: PersonModel,
         parameters: PolicyParameters,
         costs: Sequence[GarmentCost] = (),
+        from_front: bool = False,
     ) -> None:
         self.mesh = mesh
         self.parameters = parameters
@@ -105,7 +107,7 @@ class DressingPolicy:
             mesh.held,
             settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
-        self.planner = TaskPlanner(mesh, parameters.tasks)
+        self.planner = TaskPlanner(mesh, parameters.tasks, from_front)
         held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
         left, right = (x.mean(axis=0) for x in held)
         # (k,3) positions of the held nodes relative to left and right gripper, m

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drake_dress.models.dressing.sleeve import loop_orientation
 from drake_dress.models.garment.axes import orientation
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
 from drake_dress.models.garment.front import Opening, front_of
@@ -41,6 +42,25 @@ def test_the_opening_is_told_and_turns_with_the_garment(
     path = tmp_path / "garment.obj"
     assert opened(path, surface, AHEAD) == {expected}
     assert opened(path, surface, ABOUT) == {TURNED[expected]}
+
+
+@pytest.mark.parametrize("measures", COATS.values())
+def test_a_coat_that_is_opened_at_the_back_is_a_sound_gown(measures: CoatParameters) -> None:
+    coat = make_coat(measures, 0.04)
+    gown = coat.opened_at_back()
+    gown.validate()
+    assert front_of(gown) == "back"
+    assert np.array_equal(gown.rest_position, coat.rest_position * [-1.0, 1.0, 1.0])
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        for end in ("armhole", "cuff"):
+            loop = gown.rest_position[gown.loops[f"{side}_{end}"]]
+            assert sign * loop[:, 1].mean() > 0.0
+            assert loop[len(loop) // 4, 0] > loop[-len(loop) // 4, 0], "the front comes first"
+        assert loop_orientation(gown, side) == loop_orientation(coat, side)
+    again = gown.opened_at_back()
+    assert np.array_equal(again.rest_position, coat.rest_position)
+    assert np.array_equal(again.faces, coat.faces)
+    assert all(np.array_equal(again.loops[name], coat.loops[name]) for name in coat.loops)
 
 
 def test_edges_that_overlap_are_still_at_the_front() -> None:
