@@ -59,12 +59,14 @@ class ArmReachError(ValueError):
 
 @dataclass(frozen=True)
 class ArmPlacement:
-    """Placement of two arms behind a person, and orientation of their hands.
+    """Placement of two arms behind a person or in front, and orientation of their hands.
 
     Attributes:
         distance_behind: of the bases, m. spread: between them, m. height: of both, m.
         tilt: angle of the hands below the horizontal, rad.
         control: settings of the control of the joints.
+        in_front: whether they stand in front of the person, at the same distance, and face it. The
+            left arm holds the person's left sleeve on either side.
     """
 
     distance_behind: float
@@ -72,19 +74,26 @@ class ArmPlacement:
     height: float
     tilt: float
     control: RateParameters = RateParameters()
+    in_front: bool = False
 
     def base(self, side: Side) -> np.ndarray:
         """Returns X_WB (4,4) of an arm."""
         pose = np.eye(4)
+        pose[:3, :3] = self._turn
         half = 0.5 * self.spread
-        pose[:3, 3] = -self.distance_behind, half if side == "left" else -half, self.height
+        ahead = self.distance_behind if self.in_front else -self.distance_behind
+        pose[:3, 3] = ahead, half if side == "left" else -half, self.height
         return pose
 
     @property
     def hand(self) -> np.ndarray:
-        """R_WT (3,3): z forward and down; x to the left, along the seam that the fingers grip."""
+        """R_WT (3,3): z to the person and down; x to the arms' left, along the gripped seam."""
         c, s = np.cos(self.tilt), np.sin(self.tilt)
-        return np.array([[0.0, s, c], [1.0, 0.0, 0.0], [0.0, c, -s]])
+        return self._turn @ np.array([[0.0, s, c], [1.0, 0.0, 0.0], [0.0, c, -s]])
+
+    @property
+    def _turn(self) -> np.ndarray:
+        return np.diag([-1.0, -1.0, 1.0]) if self.in_front else np.eye(3)
 
 
 @dataclass(frozen=True)

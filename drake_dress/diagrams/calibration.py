@@ -63,7 +63,7 @@ def calibrate_camera(
     Raises:
         UserError: a file cannot be used, or no pose can be found.
     """
-    where = placement(scenario.station.arms, scenario.person)
+    where = placement(scenario.station.arms, scenario.person, scenario.station.side)
     if where is None:
         raise UserError(str(source), "station.arms.model", "is floating, expected panda")
     arm = panda(where.base(side))

@@ -9,9 +9,12 @@ from pathlib import Path
 from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.scenario.coat import coat_parameters
 from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
+from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import make_coat
-from drake_dress.models.garment.load import MeshOptions, Progress, WholeGarment, read_garment
+from drake_dress.models.garment.front import Opening, front_of
+from drake_dress.models.garment.load import Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh_options import MeshOptions
 
 _MOST_KEPT = 4  # mesh files kept in memory
 _kept: OrderedDict[tuple[object, ...], WholeGarment] = OrderedDict()
@@ -66,6 +69,29 @@ def build_garment_like(
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
 
 
+def check_opening(mesh: GarmentMesh, side: str, source: str) -> None:
+    """Checks that an open garment opens toward the person.
+
+    Args:
+        mesh: the garment.
+        side: where it is: `behind` the person or in `front`.
+        source: the scenario, for the message.
+
+    Raises:
+        UserError: it does not.
+    """
+    toward: dict[Opening, str] = {"front": "behind", "back": "front"}
+    opening = front_of(mesh)
+    if opening == "closed" or toward[opening] == side:
+        return
+    raise UserError(
+        source,
+        "station.side",
+        f"is {side}, but the garment opens at the {opening}, expected {toward[opening]} (or change "
+        "garment.mesh.facing or garment.coat.opens)",
+    )
+
+
 def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[WholeGarment, bool]:
     """Returns the garment of a file, and whether the file was read now."""
     key = _identity(path, mesh)
@@ -80,6 +106,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[Whole
             up=mesh.up,
             facing=mesh.facing,
             weld=mesh.weld,
+            front=mesh.front,
             take=tuple(mesh.take),
             leave_out=tuple(mesh.leave_out),
             loops=mesh.loops,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.garment import build_garment, check_opening
 from drake_dress.diagrams.person import Person, person_model
 from drake_dress.diagrams.planning import Rates
 from drake_dress.diagrams.prediction import Predictor
@@ -76,6 +76,7 @@ class Setup:
             person_model(self.station.measures, self.station.posture, person),
             solve_budget(controller.global_mpc, in_real_time),
             costs,
+            self.station.in_front,
         )
 
 
@@ -93,6 +94,7 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
     foreseen = predictor(scenario.controller, source.parent)
     plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
+    check_opening(plant, scenario.station.side, str(source))
     station = station_parameters(scenario, plant)
     limits = safety_limits(scenario.safety)
     broken = limits.broken_at(start_grippers(station))
@@ -125,10 +127,11 @@ def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParamete
         behaviour=behaviour(person.behaviour, scenario.seed),
         gripper_max_speed=station.gripper.max_speed,
         gripper_max_acceleration=station.gripper.max_acceleration,
+        in_front=station.side == "front",
         distance_behind=station.start.distance_behind,
         height_offset=station.start.height_offset,
         lateral_offset=station.start.lateral_offset,
-        placement=placement(station.arms, person),
+        placement=placement(station.arms, person, station.side),
         mode=station.arms.mode,
         cameras=cameras(station.cameras),
     )

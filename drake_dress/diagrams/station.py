@@ -136,6 +136,7 @@ class StationParameters:
     """Parameters of the simulated station; SI units.
 
     `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
+    With `in_front` the garment hangs in front of the person, at `distance_behind`.
     `in_worker` steps the garment in a worker process.
     """
 
@@ -150,6 +151,7 @@ class StationParameters:
     behaviour: Behaviour = field(default_factory=Behaviour)
     gripper_max_speed: float
     gripper_max_acceleration: float
+    in_front: bool = False
     distance_behind: float
     height_offset: float = 0.0
     lateral_offset: float = 0.0
@@ -238,7 +240,7 @@ class SimulatedStation(Station):
 def make_simulated_station(
     p: StationParameters, meshcat: Meshcat | None = None, sight: Sight | None = None
 ) -> SimulatedStation:
-    """Returns a station whose grippers, on arms or floating, hold a coat behind a person.
+    """Returns a station whose grippers, on arms or floating, hold a garment beside a person.
 
     Args:
         p: its parameters.
@@ -468,7 +470,8 @@ def person_at_rest(p: StationParameters, body: BodyMeasures, person: Person) -> 
 def hung_garment(p: StationParameters) -> FloatArray:
     """Returns the garment's rest shape (n,3) at its place at the start, p_WN, m."""
     top = shoulder_height(p.measures, p.posture) + p.height_offset
-    return p.mesh.rest_position + np.array([-p.distance_behind, p.lateral_offset, top])
+    ahead = p.distance_behind if p.in_front else -p.distance_behind
+    return p.mesh.rest_position + np.array([ahead, p.lateral_offset, top])
 
 
 def start_grippers(p: StationParameters) -> FloatArray:

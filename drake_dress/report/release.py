@@ -9,6 +9,7 @@ import numpy as np
 from drake_dress.models.arrays import BoolArray
 from drake_dress.models.dressing.finish import LAY, RELEASED
 from drake_dress.models.garment.nape import find_nape
+from drake_dress.models.human.heading import heading
 from drake_dress.models.human.neck import distance_to_nape, find_neck, nape
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
@@ -98,5 +99,8 @@ def _collar_to_neck(log: RunLog) -> float | None:
     neck = find_neck(a, b, 0.5 * (joints[0] + joints[3]))
     if collar is None or neck is None or not (np.isfinite(x).all() and np.isfinite(joints).all()):
         return None
-    ends = nape(joints, float(log.joint_radius[0]), float(radius[neck, 0]))
+    to = heading(joints)
+    if collar.in_front:
+        to = to.reversed
+    ends = nape(joints, float(log.joint_radius[0]), float(radius[neck, 0]), to)
     return distance_to_nape(collar.at(x), ends)

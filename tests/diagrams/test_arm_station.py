@@ -1,5 +1,6 @@
 """A scenario with arms: their start, their log, and the message when they cannot reach."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -35,6 +36,18 @@ def test_arms_start_where_grippers_are(ahead: float) -> None:
             np.testing.assert_allclose(tool[:3, :3], BEHIND.hand, atol=0.1)
         assert (setup.start[i] > LIMITS.lower).all()
         assert (setup.start[i] < LIMITS.upper).all()
+
+
+def test_arms_in_front_are_those_behind_turned_about() -> None:
+    """Turned by half a turn, the right arm behind stands where the left one stands in front."""
+    grippers = GRIPPERS + [0.4, 0.0, 0.0]
+    front = replace(BEHIND, in_front=True)
+    setup = set_up_arms(BEHIND, grippers, NOBODY)
+    turned = set_up_arms(front, grippers[::-1] * [-1.0, -1.0, 1.0], NOBODY)
+    np.testing.assert_allclose(turned.start, setup.start[::-1], atol=1e-6)
+    assert front.base("left")[:2, 3] == pytest.approx([0.85, 0.5])
+    assert np.linalg.det(front.hand) == pytest.approx(1.0)
+    assert front.hand[0, 2] < 0.0 < BEHIND.hand[0, 2], "the hands point toward the person"
 
 
 def test_a_place_out_of_reach_is_told() -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from drake_dress.diagrams import garment
 from drake_dress.diagrams.scenario import load_scenario
-from drake_dress.diagrams.scenario.schema import Garment, Mesh
+from drake_dress.diagrams.scenario.schema import Coat, Garment, Mesh
+from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.load import WholeGarment, read_garment
@@ -97,6 +98,41 @@ def test_a_scenario_with_all_keys_loads() -> None:
     mesh = present(scenario.garment.mesh)
     assert mesh.up == "-y"
     assert mesh.leave_out == ["Button", "<0.05 m"]
+
+
+@pytest.mark.parametrize("opening", ["front", "back"])
+@pytest.mark.parametrize("side", ["behind", "front"])
+def test_a_garment_must_open_toward_the_person(opening: str, side: str) -> None:
+    mesh = garment.build_garment(Garment(coat=Coat(opens=opening)), 0.05, Path())
+    if (opening == "front") == (side == "behind"):
+        garment.check_opening(mesh, side, "s.yaml")
+        return
+    with pytest.raises(UserError, match=f"s.yaml: station.side: is {side}.*opens at the {opening}"):
+        garment.check_opening(mesh, side, "s.yaml")
+
+
+def test_a_gown_like_the_nominal_one_has_its_nodes() -> None:
+    nominal = Garment(coat=Coat(opens="back"))
+    drawn = Garment(coat=Coat(opens="back", chest=1.3))
+    first = garment.build_garment(nominal, 0.05, Path())
+    like = garment.build_garment_like(drawn, nominal, 0.05, Path())
+    assert np.array_equal(like.loops["left_cuff"], first.loops["left_cuff"])
+    assert np.array_equal(np.sort(like.faces[:, 0]), np.sort(first.faces[:, 0]))
+    assert np.abs(like.rest_position - first.rest_position).max() < 0.05
+
+
+def test_a_coat_and_a_file_in_one_scenario_contradict_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "s.yaml"
+    for coat in ("{preset: jacket}", "{}", "{chest: 1.2, scale: 0.9}"):
+        path.write_text(f"garment: {{coat: {coat}, mesh: {{file: coat.obj}}}}\n")
+        with pytest.raises(UserError, match=r"garment\.mesh: is given beside garment\.coat"):
+            load_scenario(path)
+    path.write_text("garment: {coat: {preset: jacket}, mesh: null}\n")
+    replaced = load_scenario(path, ["garment.mesh.file=coat.obj"])
+    assert present(replaced.garment.mesh).file == "coat.obj"
+    # a scenario that was written with all its keys loads again, as from a log
+    path.write_text(resolved_yaml(replaced))
+    assert load_scenario(path) == replaced
 
 
 @pytest.mark.parametrize("scale", [0.93, 1.08])

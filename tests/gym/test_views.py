@@ -11,7 +11,9 @@ from drake_dress.models.human.body import arm_points
 from drake_dress.shipped import shipped_scenario
 
 
-@pytest.mark.parametrize("name", ["dummy_standing", "dummy_sitting", "dummy_overcoat"])
+@pytest.mark.parametrize(
+    "name", ["dummy_standing", "dummy_sitting", "dummy_overcoat", "gown_front"]
+)
 def test_both_hands_and_the_whole_coat_are_in_the_image(name: str) -> None:
     source = shipped_scenario(name)
     scenario = load_scenario(source)

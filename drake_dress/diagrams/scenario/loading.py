@@ -33,6 +33,8 @@ from drake_dress.plugins import load_installed_plugins
 from drake_dress.text_file import read_text
 from drake_dress.yaml_text import read_yaml, write_yaml
 
+# Sections that a scenario of any version has if the program wrote it.
+_WRITTEN = {"seed", "duration", "garment", "person", "plant", "controller", "station", "log"}
 _DELAY, _MEASURED = "controller.global_mpc.delay", "measured"
 
 
@@ -47,6 +49,7 @@ def load_scenario(
     load_installed_plugins()
     source = str(path)
     content = _read(Path(path))
+    _check_one_garment(source, content)
     for item in overrides:
         key, separator, text = item.partition("=")
         if not separator or not key:
@@ -105,6 +108,25 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise UserError(source, "", f"holds {kind_of(content)}, expected keys with values")
     return content
+
+
+def _check_one_garment(source: str, content: dict[str, Any]) -> None:
+    """Checks that a file gives a coat or a mesh, but not both.
+
+    A scenario with all sections was written by the program, with the coat that the mesh replaced.
+    """
+    garment = content.get("garment")
+    both = isinstance(garment, dict) and all(
+        garment.get(name) is not None for name in ("coat", "mesh")
+    )
+    if not both or content.keys() >= _WRITTEN:
+        return
+    raise UserError(
+        source,
+        "garment.mesh",
+        "is given beside garment.coat, expected one of them: the file would replace the coat "
+        "(--set garment.mesh.file=FILE does so on purpose)",
+    )
 
 
 def _override(content: dict[str, Any], key: str, text: str) -> None:

@@ -9,8 +9,8 @@ from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.coat import COATS, COLLARS, OPENINGS, SIZE_TABLES
 from drake_dress.models.garment.life_size import AUTO, UNITS
-from drake_dress.models.garment.load import SCALE_RANGE, WELD_RANGE
 from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.garment.mesh_options import FRONTS, SCALE_RANGE, WELD_RANGE
 from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
@@ -29,6 +29,7 @@ CHOICES = {
     "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
+    "garment.mesh.front": FRONTS,
     "person.posture": ("standing", "sitting"),
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{
@@ -41,6 +42,7 @@ CHOICES = {
     "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated", "hardware"),
     "station.hardware.release": ("confirm", "automatic"),
+    "station.side": ("behind", "front"),
     "lab.faults.kind": KINDS,
     "station.arms.model": ("floating", "panda"),
     "station.arms.mode": ("position_velocity", "position", "velocity"),

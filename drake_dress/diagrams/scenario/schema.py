@@ -24,7 +24,7 @@ from drake_dress.models.control.own_costs import COSTS
 from drake_dress.models.dressing import finish, stages
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
-from drake_dress.models.garment.load import MeshOptions
+from drake_dress.models.garment.mesh_options import MeshOptions
 from drake_dress.models.human import (
     following,
     lowering,
@@ -138,6 +138,8 @@ class Mesh:
             x up.
         weld: distance across which edges of seams are joined, m. With 0 only nodes at the same
             position are merged.
+        front: front edges that coincide from neck to hem, such as a closed zip: `auto` and `open`
+            keep them apart, `closed` sews them. With `open` the garment must be open.
         take: parts of the file that are the garment, if not all are: names of objects or groups,
             sizes such as `>0.5 m` of connected parts, or places such as `near (0.1, 0, 1.2) m`.
         leave_out: parts to omit, in the same words; `<0.05 m` omits smaller connected parts.
@@ -154,6 +156,7 @@ class Mesh:
     up: str = MeshOptions.up
     facing: str | None = MeshOptions.facing
     weld: float = MeshOptions.weld
+    front: str = MeshOptions.front
     take: list[str] = field(default_factory=list)
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int] | str] = field(default_factory=dict)
@@ -166,7 +169,7 @@ class Garment:
 
     Attributes:
         coat: parametric coat.
-        mesh: garment from a file; it replaces the coat.
+        mesh: garment from a file; it replaces the coat. A scenario file gives one of both.
     """
 
     coat: Coat = field(default_factory=Coat)
@@ -724,10 +727,10 @@ class Gripper:
 
 @dataclass
 class Start:
-    """Initial position of the coat, relative to the midpoint of the shoulders.
+    """Initial position of the garment, relative to the midpoint of the shoulders.
 
     Attributes:
-        distance_behind: distance behind the person, m.
+        distance_behind: distance behind the person, or in front with `station.side: front`, m.
         height_offset: height above the shoulders, m.
         lateral_offset: offset to the person's left, m.
     """
@@ -747,8 +750,9 @@ class Arms:
     """The arms that carry the grippers.
 
     Attributes:
-        model: `floating` grippers, or two `panda` arms behind the person.
-        distance_behind: distance of the arms' bases behind the person, m.
+        model: `floating` grippers, or two `panda` arms.
+        distance_behind: distance of the arms' bases behind the person, or in front with
+            `station.side: front`, m.
         spread: distance between the two bases, m.
         height_offset: height of both bases above the person's shoulders, m.
         tilt_deg: downward tilt of the hands, which point forward, degrees.
@@ -899,6 +903,8 @@ class Station:
 
     Attributes:
         kind: `simulated`, or `hardware`, which has the same ports behind LCM messages.
+        side: where garment and robots are: `behind` the person, who holds the arms back, or in
+            `front`, where the person reaches forward into a garment that opens at the back.
         arms: the arms that carry the grippers.
         hardware: message bus.
         gripper: limits of floating grippers.
@@ -907,6 +913,7 @@ class Station:
     """
 
     kind: str = "simulated"
+    side: str = "behind"
     arms: Arms = field(default_factory=Arms)
     hardware: Hardware = field(default_factory=Hardware)
     gripper: Gripper = field(default_factory=Gripper)

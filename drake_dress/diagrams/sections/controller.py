@@ -36,6 +36,7 @@ def controller_policy(
     person: PersonModel,
     budget: Budget,
     costs: Sequence[GarmentCost] = (),
+    from_front: bool = False,
 ) -> DressingPolicy:
     """Returns the policy of the global controller.
 
@@ -45,6 +46,7 @@ def controller_policy(
         person: as the controller models it.
         budget: of a plan.
         costs: the user's own, in addition to the registered ones that the section lists.
+        from_front: whether the garment comes from in front of the person.
     """
     g = c.global_mpc
     parameters = PolicyParameters(
@@ -67,7 +69,8 @@ def controller_policy(
         ),
     )
     all_costs = (*registered_costs(c.costs), *costs)
-    return DressingPolicy(mesh, Material(**vars(c.material)), person, parameters, all_costs)
+    material = Material(**vars(c.material))
+    return DressingPolicy(mesh, material, person, parameters, all_costs, from_front)
 
 
 def solve_budget(g: schema.GlobalMpc, in_real_time: bool) -> Budget:

@@ -31,8 +31,10 @@ def cameras(section: Sequence[schema.Camera]) -> tuple[Camera, ...]:
     )
 
 
-def placement(arms: schema.Arms, person: schema.Person) -> ArmPlacement | None:
-    """Returns the placement of both arms behind the person; None where grippers float."""
+def placement(
+    arms: schema.Arms, person: schema.Person, side: str = schema.Station.side
+) -> ArmPlacement | None:
+    """Returns the placement of both arms at a side of the person; None where grippers float."""
     if arms.model == "floating":
         return None
     shoulders = shoulder_height(measures(person), posture(person))
@@ -42,4 +44,5 @@ def placement(arms: schema.Arms, person: schema.Person) -> ArmPlacement | None:
         shoulders + arms.height_offset,
         math.radians(arms.tilt_deg),
         model_of(arms.resolved_rate),
+        in_front=side == "front",
     )

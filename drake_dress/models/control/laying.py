@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +13,11 @@ from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.situation import LayingTarget
 from drake_dress.models.dressing.finish import FinishParameters
 from drake_dress.models.garment.nape import Nape
-from drake_dress.models.human.heading import heading
+from drake_dress.models.human.heading import Heading, heading
 from drake_dress.models.human.neck import NAPE_LENGTH, nape
+
+# Returns the heading that targets refer to, from joints (6,3), m.
+Toward = Callable[[FloatArray], Heading]
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,12 @@ class GrippersOverShoulders:
 
 
 def laying_target(
-    person: PersonModel, collar: Nape, margin: float, height: float, joints: FloatArray
+    person: PersonModel,
+    collar: Nape,
+    margin: float,
+    height: float,
+    joints: FloatArray,
+    toward: Toward = heading,
 ) -> LayingTarget:
     """Returns where a coat is laid on a person at N times.
 
@@ -89,14 +98,19 @@ def laying_target(
         margin: distance kept between cloth and skin, m.
         height: of the grippers above the shoulders' skin, m.
         joints: (N,6,3) shoulder, elbow, hand of left, then right arm, m.
+        toward: returns the heading that targets refer to.
     """
     tops = joints[:, [0, 3], 2].mean(axis=1) + person.shoulder_radius
-    places = [collar_target(person, collar, margin, q) for q in joints]
+    places = [collar_target(person, collar, margin, q, toward) for q in joints]
     return LayingTarget(np.stack(places), tops + height)
 
 
 def collar_target(
-    person: PersonModel, collar: Nape, margin: float, joints: FloatArray
+    person: PersonModel,
+    collar: Nape,
+    margin: float,
+    joints: FloatArray,
+    toward: Toward = heading,
 ) -> FloatArray:
     """Returns the place (3,), m, of the middle of the collar's back on a person.
 
@@ -107,15 +121,17 @@ def collar_target(
         collar: of the garment.
         margin: distance kept between cloth and skin, m.
         joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
+        toward: returns the heading that targets refer to.
     """
-    low, high = nape(joints, person.shoulder_radius, person.neck_radius)
+    to = toward(joints)
+    low, high = nape(joints, person.shoulder_radius, person.neck_radius, to)
     share = min(1.0, collar.height / NAPE_LENGTH)
-    place: FloatArray = low + share * (high - low) - margin * heading(joints).front
+    place: FloatArray = low + share * (high - low) - margin * to.front
     return place
 
 
 def way_back(
-    parameters: FinishParameters, joints: FloatArray, elapsed: float, time_step: float
+    parameters: FinishParameters, to: Heading, count: int, elapsed: float, time_step: float
 ) -> FloatArray:
     """Returns the velocities (N,2,3), m/s, at which open grippers move away from the person.
 
@@ -123,13 +139,14 @@ def way_back(
 
     Args:
         parameters: settings.
-        joints: (N+1,6,3) predicted joints, m; row 0 is now.
+        to: heading that targets refer to.
+        count: N.
         elapsed: time since the grippers opened, s.
         time_step: of the plan, s.
     """
-    p, count = parameters, len(joints) - 1
+    p = parameters
     lasting = p.away_distance / p.away_speed
     moving = elapsed + time_step * np.arange(count) < lasting
-    way = (np.array([0.0, 0.0, 1.0]) - heading(joints[0]).front) / np.sqrt(2.0)
+    way = (np.array([0.0, 0.0, 1.0]) - to.front) / np.sqrt(2.0)
     velocity: FloatArray = np.where(moving, p.away_speed, 0.0)[:, None, None] * np.stack([way, way])
     return velocity

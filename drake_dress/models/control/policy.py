@@ -110,6 +110,7 @@ class DressingPolicy:
         person: the controller's model of the person's shape.
         parameters: settings.
         costs: user-defined costs, added to the dressing costs.
+        from_front: whether the garment comes from in front of the person.
     """
 
     def __init__(
@@ -119,6 +120,7 @@ class DressingPolicy:
         person: PersonModel,
         parameters: PolicyParameters,
         costs: Sequence[GarmentCost] = (),
+        from_front: bool = False,
     ) -> None:
         self.mesh = mesh
         self.parameters = parameters
@@ -131,7 +133,7 @@ class DressingPolicy:
             mesh.held,
             settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
-        self.planner = TaskPlanner(mesh, parameters.tasks)
+        self.planner = TaskPlanner(mesh, parameters.tasks, from_front)
         self._collar = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
         # a garment without a neck's edge, or a plan to rest, cannot be laid
         lays = parameters.finish.release and parameters.plans and self._collar is not None
@@ -203,7 +205,13 @@ class DressingPolicy:
         targets = self.planner.targets(assignment, self.planner.sleeves(x), joints, p.time_step)
         target = np.stack([t.position for t in targets], axis=1)
         if finish.phase == Phase.RELEASED:
-            back = way_back(self.finish, joints, time - finish.since, p.time_step)
+            back = way_back(
+                self.finish,
+                self.planner.toward(joints[0]),
+                len(joints) - 1,
+                time - finish.since,
+                p.time_step,
+            )
             return state, Decision(self._moving(x, back, "released"), assignment, target)
         if not p.plans:
             return state, Decision(
@@ -226,7 +234,7 @@ class DressingPolicy:
         """Returns how far the coat is laid and let go."""
         if self._collar is None:
             return state.finish
-        place = collar_target(self.person, self._collar, self._margin, joints)
+        place = collar_target(self.person, self._collar, self._margin, joints, self.planner.toward)
         off = float(np.linalg.norm(self._collar.at(x) - place))
         return advance_finish(
             state.finish, stages.stage, assignment.facts, off, are_open, self.finish, time
@@ -250,7 +258,9 @@ class DressingPolicy:
         laying, max_speed = None, p.max_speed
         if lays and self._collar is not None:
             height, max_speed = self.finish.gripper_height, self.finish.max_speed
-            laying = laying_target(self.person, self._collar, self._margin, height, joints[1:])
+            laying = laying_target(
+                self.person, self._collar, self._margin, height, joints[1:], self.planner.toward
+            )
         elif all(
             fact.linked and fact.s >= p.tasks.stages.creeping_progress for fact in assignment.facts
         ):

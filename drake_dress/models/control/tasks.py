@@ -111,10 +111,15 @@ class TaskPlanner:
     Args:
         mesh: the controller's garment.
         parameters: settings.
+        from_front: whether the garment comes from in front of the person. All targets are then the
+            mirror images of those from behind: where they say behind, it is in front.
     """
 
-    def __init__(self, mesh: GarmentMesh, parameters: TaskParameters) -> None:
+    def __init__(
+        self, mesh: GarmentMesh, parameters: TaskParameters, from_front: bool = False
+    ) -> None:
         self.mesh = mesh
+        self._from_front = from_front
         self.parameters = parameters
         self.armholes = (
             np.asarray(mesh.loops["left_armhole"]),
@@ -143,7 +148,7 @@ class TaskPlanner:
             time: current time, s.
         """
         p = self.parameters
-        axes, to, sleeves = arm_axes(joints), heading(joints), self.sleeves(x)
+        axes, to, sleeves = arm_axes(joints), self._heading(heading(joints)), self.sleeves(x)
         missed = stages.attempts
         linked = [self.is_linked(x, joints, side) for side in (0, 1)]
         ways = [choose_approach(p, axes[i].D(0.0), to, i, missed[i], linked[1 - i]) for i in (0, 1)]
@@ -229,11 +234,19 @@ class TaskPlanner:
             time_step: time between rows, s.
         """
         arms = (_Arm(joints, 0), _Arm(joints, 1))
-        to = headings(joints)
+        to = self._heading(headings(joints))
         return (
             self._target(assignment, 0, arms, to, sleeves, time_step),
             self._target(assignment, 1, arms, to, sleeves, time_step),
         )
+
+    def toward(self, joints: FloatArray) -> Heading:
+        """Returns the directions of the targets for joints (6,3), m."""
+        return self._heading(heading(joints))
+
+    def _heading(self, of_person: Heading) -> Heading:
+        """Returns the directions of the targets for a person's heading."""
+        return of_person.reversed if self._from_front else of_person
 
     def _outlook(
         self,

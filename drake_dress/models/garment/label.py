@@ -9,8 +9,10 @@ import numpy as np
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.axes import AXES, facings, turned
+from drake_dress.models.garment.doubtful import check_openings
 from drake_dress.models.garment.mesh import LOOP_NAMES, REGION_NAMES, GarmentMesh
 from drake_dress.models.garment.openings import (
+    Hanging,
     beyond,
     check_neck_and_hem,
     find_armhole,
@@ -49,7 +51,8 @@ def with_openings(
     """
 
     def hanging(up: str, facing: str | None) -> dict[str, IntArray]:
-        return _hanging(turned(position, up, facing), faces, named, source)
+        upright = turned(position, up, facing)
+        return _found(Hanging(source, upright, faces, position), named)
 
     try:
         return hanging(up, facing)
@@ -118,25 +121,23 @@ def labelled(
     return GarmentMesh(position - tips.mean(axis=0), faces, named, held, region)
 
 
-def _hanging(
-    position: FloatArray, faces: IntArray, named: Mapping[str, IntArray], source: str
-) -> dict[str, IntArray]:
+def _found(hanging: Hanging, named: Mapping[str, IntArray]) -> dict[str, IntArray]:
     loops = dict(named)
     if not all(f"{side}_cuff" in loops for side in SIDES):
-        loops = {**find_cuffs(position, faces, source), **loops}
-    check_neck_and_hem(position, faces, loops, source)
+        loops = {**find_cuffs(hanging, named), **loops}
+    check_neck_and_hem(hanging, loops)
     for side in SIDES:
         name = f"{side}_armhole"
         if name not in loops:
-            loops[name] = find_armhole(position, faces, loops[f"{side}_cuff"], source, name)
-    _check_hangs(position, faces, loops, source)
+            loops[name] = find_armhole(hanging, loops[f"{side}_cuff"], name)
+    check_openings(hanging, loops, named)
+    _check_hangs(hanging, loops)
     return loops
 
 
-def _check_hangs(
-    position: FloatArray, faces: IntArray, loops: Mapping[str, IntArray], source: str
-) -> None:
+def _check_hangs(hanging: Hanging, loops: Mapping[str, IntArray]) -> None:
     """Checks that the body hangs below the armholes."""
+    position, faces = hanging.position, hanging.faces
     body = np.ones(len(position), dtype=bool)
     for side in SIDES:
         body &= ~beyond(faces, len(position), loops[f"{side}_armhole"], loops[f"{side}_cuff"])
@@ -161,7 +162,7 @@ def _check_hangs(
             )
         )
         raise UserError(
-            source,
+            hanging.source,
             "up",
             f"the body of the garment hangs {toward[k]} of the armholes, expected below them",
         )

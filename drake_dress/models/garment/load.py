@@ -10,11 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.garment.axes import AXES, facings, turned
+from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
+from drake_dress.models.garment.axes import turned
 from drake_dress.models.garment.chosen import Chosen, by_measure, by_name, chosen
 from drake_dress.models.garment.files import EXTENSIONS, RawMesh, read_mesh
+from drake_dress.models.garment.files.raw import place
+from drake_dress.models.garment.front import Opening, front_of
+from drake_dress.models.garment.front_edges import front_parted, sewn_edges
 from drake_dress.models.garment.label import labelled, with_openings
+from drake_dress.models.garment.layers import check_one_layer
 from drake_dress.models.garment.life_size import (
     ADULT,
     AUTO,
@@ -30,18 +34,16 @@ from drake_dress.models.garment.life_size import (
 from drake_dress.models.garment.manifold import check_manifold
 from drake_dress.models.garment.mend import mended
 from drake_dress.models.garment.merge import duplicates_merged, seams_sewn
-from drake_dress.models.garment.mesh import LOOP_NAMES, GarmentMesh, check_loop
+from drake_dress.models.garment.mesh import GarmentMesh, check_loop
+from drake_dress.models.garment.mesh_options import FRONTS, MeshOptions
 from drake_dress.models.garment.parts import check_one_part
 from drake_dress.models.garment.placed_loops import placed_loops
 from drake_dress.models.garment.plausible import check_plausible
 from drake_dress.models.garment.simplify import to_spacing
-from drake_dress.models.sides import SIDES
 
 __all__ = ["EXTENSIONS", "UNITS", "MeshOptions", "WholeGarment", "load_garment", "read_garment"]
 
 SPACING_RANGE = (0.005, 0.1)  # m
-WELD_RANGE = (0.0, 0.02)  # m
-SCALE_RANGE = (1e-4, 1e4)  # files from a ten-thousandth of life size to 10,000 times life size
 
 # What is taken of a file, and what is left out.
 _Parts = tuple[Sequence[Chosen], Sequence[Chosen]]
@@ -51,68 +53,6 @@ Progress = Callable[[str, float], None]
 
 def _silent(_stage: str, _share: float) -> None:
     pass
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """Options for reading a garment file.
-
-    Attributes:
-        unit: unit of its coordinates, one of `UNITS`; or `auto`, which means the one in which the
-            shoulders are most like an adult's.
-        up: axis of the file that points up.
-        facing: axis of the file that the garment faces; None for the usual one, which is +x with
-            z up, +z with y up, and +y with x up.
-        weld: distance across which edges of seams are joined, m; 0 joins only coincident nodes.
-        leave_out: names of objects or groups, sizes such as `<0.05 m` of connected parts, or places
-            such as `near (0.1, 0, 1.2) m`; see `chosen`.
-        take: the same; what is not taken is left out. Empty for all.
-        loops: nodes of the file, counted from 0, in order around each opening of `LOOP_NAMES`;
-            those not named are searched for (see `openings`). In an STL, which lists a node once
-            per triangle, any of the copies may be named. Or a place, such as
-            `near (0.5, 0, 1.2) m`, or a plane; see `placed_loops`.
-        grasp: nodes of the file that the `left` and `right` gripper hold; by default the ten
-            nodes nearest to a point 3.5 cm inward of the armhole's highest node.
-        scale: factor on all coordinates, in addition to the unit.
-    """
-
-    unit: str = "m"
-    up: str = "z"
-    weld: float = 0.0
-    leave_out: Sequence[str] = ()
-    loops: Mapping[str, Sequence[int] | str] | None = None
-    grasp: Mapping[str, Sequence[int]] | None = None
-    scale: float = 1.0
-    facing: str | None = None
-    take: Sequence[str] = ()
-
-    def check(self, source: str) -> None:
-        """Raises UserError if an option is unknown or out of range."""
-        for key, word, known in (("unit", self.unit, (*UNITS, AUTO)), ("up", self.up, AXES)):
-            if word not in known:
-                raise UserError(source, key, f"is {word!r}, expected one of {', '.join(known)}")
-        if self.facing is not None and self.facing not in facings(self.up):
-            expected = ", ".join(facings(self.up))
-            raise UserError(
-                source,
-                "facing",
-                f"is {self.facing!r}, expected one of {expected} with {self.up} up",
-            )
-        low, high = WELD_RANGE
-        if not low <= self.weld <= high:
-            raise UserError(source, "weld", f"is {self.weld} m, expected {low:g} to {high} m")
-        low, high = SCALE_RANGE
-        if not low <= self.scale <= high:
-            raise UserError(source, "scale", f"is {self.scale}, expected {low:g} to {high:g}")
-        for key, given, allowed in (
-            ("loops", self.loops, LOOP_NAMES),
-            ("grasp", self.grasp, SIDES),
-        ):
-            for name in given or {}:
-                if name not in allowed:
-                    raise UserError(
-                        source, f"{key}.{name}", f"unknown, expected {', '.join(allowed)}"
-                    )
 
 
 @dataclass(frozen=True)
@@ -134,6 +74,11 @@ class WholeGarment:
     loops: dict[str, IntArray]
     grasp: dict[str, IntArray]
     notes: tuple[str, ...] = ()
+
+    @property
+    def front(self) -> Opening:
+        """Where it opens: at the front, at the back, or not (see `front_of`)."""
+        return front_of(self.mesh())
 
     def mesh(self) -> GarmentMesh:
         """Returns the labelled mesh at the resolution of the file."""
@@ -182,6 +127,7 @@ def load_garment(
     scale: float = 1.0,
     facing: str | None = None,
     take: Sequence[str] = (),
+    front: str = FRONTS[0],
     progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY, STL or glTF file, in the pose of `GarmentMesh`.
@@ -201,13 +147,14 @@ def load_garment(
         facing: axis of the file that the garment faces; None for the usual one: +x with z up, +z
             with y up, +y with x up.
         take: the only objects, groups, sizes or places to take, as in `leave_out`.
+        front: `auto`, `open` or `closed`; see `MeshOptions`.
         progress: function that is called with the current task and the fraction of it that is done.
 
     Raises:
         UserError: the file, an option or the mesh is unusable; see `read_garment` and
             `WholeGarment.at_spacing`.
     """
-    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing, take)
+    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing, take, front)
     whole = read_garment(path, options, progress)
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
@@ -273,6 +220,7 @@ def _in_likely_unit(
 def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progress) -> WholeGarment:
     """Returns the garment of a mesh, to which the scale was applied, in the options' unit."""
     source, factor = raw.source, UNITS[options.unit]
+    unmerged = raw
     raw = duplicates_merged(raw.scaled(factor))
     # first check what holds in any unit, so that a stray node is not reported as a wrong unit
     check_plausible(raw)
@@ -286,6 +234,7 @@ def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progre
         check_plausible(raw)  # a face with a wrong corner shows once it is cut off
     node, face = raw.node, raw.face
     check_manifold(raw.faces, len(raw.position), source, node, face)
+    check_one_layer(raw)
     faces = _outward(raw.position, raw.faces).astype(np.int32)
     given = options.loops or {}
     loops = {
@@ -304,7 +253,41 @@ def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progre
     loops = with_openings(position, faces, loops | placed, options.up, options.facing, source)
     position = turned(position, options.up, options.facing)
     whole = WholeGarment(source, position, faces, loops, grasp, notes)
+    whole = _front_as_asked(whole, sewn_edges(unmerged, raw), options.front, raw)
     whole.mesh().validate(source)
+    return whole
+
+
+def _front_as_asked(
+    whole: WholeGarment, sewn: IndexArray, front: str, raw: RawMesh
+) -> WholeGarment:
+    """Returns the garment with front edges that coincide apart, unless they are to be sewn.
+
+    Args:
+        whole: the garment, in which they are sewn.
+        sewn: (k,2) edges at which sheets were joined.
+        front: as in `MeshOptions`.
+        raw: the same nodes in the axes of the file.
+
+    Raises:
+        UserError: the front is to be open, and it is closed.
+    """
+    parted = None if front == "closed" else front_parted(whole.mesh(), sewn)
+    if parted is not None:
+        ends = [place(raw.position[node]).removeprefix(" at ") for node in parted.line[[0, -1]]]
+        note = (
+            f"the edges of the {parted.opening} coincide from {ends[0]} to {ends[1]}: they are "
+            "kept apart, as of an open garment; garment.mesh.front: closed sews them"
+        )
+        position = np.concatenate([whole.position, whole.position[parted.copied]])
+        whole = replace(whole, position=position, faces=parted.faces, notes=(*whole.notes, note))
+    if front == "open" and whole.front == "closed":
+        raise UserError(
+            whole.source,
+            "front",
+            "is open, but neck and hem are different openings, and no line of coincident edges "
+            "joins them; expected auto or closed",
+        )
     return whole
 
 

@@ -9,7 +9,7 @@ and the others are cut off. What then hangs on nothing is left out if it is smal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +17,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from drake_dress.errors import UserError
-from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray
-from drake_dress.models.garment.edges import components, half_edges
+from drake_dress.models.arrays import FloatArray, IndexArray
+from drake_dress.models.garment.edges import components
+from drake_dress.models.garment.fans import HalfEdges, split_fans
 from drake_dress.models.garment.files.raw import MaskArray, RawMesh, place
 from drake_dress.models.garment.mesh import face_areas
 
@@ -79,7 +80,7 @@ def _each_once(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
 
 def _cut_apart(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     """Returns the mesh with at most two faces an edge and one fan a node; scrap is left out."""
-    edges = _Edges.of(mesh.faces, len(mesh.position))
+    edges = HalfEdges.of(mesh.faces, len(mesh.position))
     many = edges.count > 2
     if many.sum() > max(_MOST_EDGES * len(many), 3.0):
         raise UserError(
@@ -88,13 +89,13 @@ def _cut_apart(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
             f"not manifold: {many.sum()} of {len(many)} edges belong to more than two faces, the "
             f"first joins {_ends(mesh, edges, int(np.argmax(many)))}; expected one layer of cloth",
         )
-    result = _split(mesh, edges, edges.pairs())
+    result = split_fans(mesh, edges, edges.pairs())
     if many.any():
         area = face_areas(mesh.position, mesh.faces)
         sheet = components(result.faces, len(result.position))[result.faces[:, 0]]
         size = np.bincount(sheet, area)[sheet] / area.sum()
-        smoothest = edges.smoothest(mesh.position, mesh.faces, size)
-        result = _split(mesh, edges, np.concatenate([edges.pairs(), smoothest]))
+        smoothest = _smoothest(edges, mesh.position, mesh.faces, size)
+        result = split_fans(mesh, edges, np.concatenate([edges.pairs(), smoothest]))
     added = len(result.position) - len(mesh.position)
     if not added:
         return mesh, []
@@ -116,7 +117,7 @@ def _cut_apart(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
 
 def _turned_alike(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     """Returns the mesh with all faces of each part oriented as most of its area is."""
-    edges = _Edges.of(mesh.faces, len(mesh.position))
+    edges = HalfEdges.of(mesh.faces, len(mesh.position))
     one, other = edges.pairs().T
     against = edges.forward[one] == edges.forward[other]
     if not against.any():
@@ -156,104 +157,31 @@ def _turned_alike(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     ]
 
 
-@dataclass(frozen=True)
-class _Edges:
-    """Half-edges, ordered so that those of one edge are neighbours.
+def _smoothest(edges: HalfEdges, x: FloatArray, faces: IndexArray, size: FloatArray) -> IndexArray:
+    """Returns (q,2) the two half-edges that stay joined at each edge of more faces.
 
-    Attributes:
-        ends: (E,2) nodes of each edge, the smaller first.
-        count: (E,) number of faces.
-        edge: (3F,) edge of each half-edge.
-        face: (3F,) face of each half-edge.
-        forward: (3F,) whether it runs from the smaller to the larger node.
-        start: (E,) first half-edge of each edge.
+    Args:
+        edges: of the faces.
+        x: (n,3), m.
+        faces: (F,3).
+        size: (F,) share of the area that the sheet of each face has.
     """
-
-    ends: IndexArray
-    count: IndexArray
-    edge: IndexArray
-    face: IndexArray
-    forward: BoolArray
-    start: IndexArray
-
-    @staticmethod
-    def of(faces: IndexArray, n: int) -> _Edges:
-        half = half_edges(faces).astype(np.int64)
-        low, high = half.min(axis=1), half.max(axis=1)
-        order = np.argsort(low * n + high, kind="stable")
-        key, start, edge, count = np.unique(
-            (low * n + high)[order], return_index=True, return_inverse=True, return_counts=True
-        )
-        return _Edges(
-            np.stack([key // n, key % n], axis=1),
-            count,
-            edge.reshape(-1),
-            np.tile(np.arange(len(faces)), 3)[order],
-            (half[:, 0] < half[:, 1])[order],
-            start,
-        )
-
-    def pairs(self) -> IndexArray:
-        """Returns (p,2) the half-edges of each edge of two faces."""
-        first = self.start[self.count == 2]
-        return np.stack([first, first + 1], axis=1)
-
-    def smoothest(self, x: FloatArray, faces: IndexArray, size: FloatArray) -> IndexArray:
-        """Returns (q,2) the two half-edges that stay joined at each edge of more faces.
-
-        Args:
-            x: (n,3), m.
-            faces: (F,3).
-            size: (F,) share of the area that the sheet of each face has.
-        """
-        kept = []
-        for k in np.flatnonzero(self.count > 2):
-            here = np.arange(self.start[k], self.start[k] + self.count[k])
-            a, b = x[self.ends[k]]
-            along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-300)
-            corners = faces[self.face[here]]
-            third = x[corners[~np.isin(corners, self.ends[k])]] - a
-            away = third - np.outer(third @ along, along)
-            away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
-            first, second = np.triu_indices(len(here), 1)
-            share = size[self.face[here]]
-            large = np.minimum(share[first], share[second]) > _SCRAP
-            straight = -(away[first] * away[second]).sum(axis=1)
-            best = int(np.argmax(straight + 2.0 * large))
-            kept.append([here[first[best]], here[second[best]]])
-        return np.array(kept, dtype=np.int64).reshape(-1, 2)
-
-
-def _split(mesh: RawMesh, edges: _Edges, joined: IndexArray) -> RawMesh:
-    """Returns the mesh with a node for each fan of faces that pairs (p,2) of half-edges join."""
-    count, n = len(mesh.faces), len(mesh.position)
-    rows: list[IndexArray] = []
-    columns: list[IndexArray] = []
-    for end in (0, 1):
-        node = edges.ends[edges.edge[joined[:, 0]], end]
-        for side, target in ((0, rows), (1, columns)):
-            face = edges.face[joined[:, side]]
-            corner = np.argmax(mesh.faces[face] == node[:, None], axis=1)
-            target.append(3 * face + corner)
-    at, to = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_array((np.ones(len(at)), (at, to)), shape=(3 * count, 3 * count))
-    _, fan = connected_components(graph, directed=False)
-    # the fan with most faces keeps its node, the others get new ones
-    fans, faces_of = np.unique(fan, return_counts=True)
-    node_of = np.empty(len(fans), dtype=np.int64)
-    node_of[fan] = mesh.faces.reshape(-1)
-    order = np.lexsort((-faces_of, node_of))
-    first = np.ones(len(fans), dtype=bool)
-    first[1:] = node_of[order][1:] != node_of[order][:-1]
-    extra = order[~first]
-    name = node_of.copy()
-    name[extra] = n + np.arange(len(extra))
-    return replace(
-        mesh,
-        position=np.concatenate([mesh.position, mesh.position[node_of[extra]]]),
-        faces=name[fan].reshape(-1, 3),
-        file_node=np.concatenate([mesh.file_node, mesh.file_node[node_of[extra]]]),
-    )
+    kept = []
+    for k in np.flatnonzero(edges.count > 2):
+        here = np.arange(edges.start[k], edges.start[k] + edges.count[k])
+        a, b = x[edges.ends[k]]
+        along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-300)
+        corners = faces[edges.face[here]]
+        third = x[corners[~np.isin(corners, edges.ends[k])]] - a
+        away = third - np.outer(third @ along, along)
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
+        first, second = np.triu_indices(len(here), 1)
+        share = size[edges.face[here]]
+        large = np.minimum(share[first], share[second]) > _SCRAP
+        straight = -(away[first] * away[second]).sum(axis=1)
+        best = int(np.argmax(straight + 2.0 * large))
+        kept.append([here[first[best]], here[second[best]]])
+    return np.array(kept, dtype=np.int64).reshape(-1, 2)
 
 
 def _without_scrap(before: RawMesh, cut: RawMesh) -> tuple[MaskArray, Sequence[str]]:
@@ -292,6 +220,6 @@ def _without_scrap(before: RawMesh, cut: RawMesh) -> tuple[MaskArray, Sequence[s
     ]
 
 
-def _ends(mesh: RawMesh, edges: _Edges, k: int) -> str:
+def _ends(mesh: RawMesh, edges: HalfEdges, k: int) -> str:
     a, b = edges.ends[k]
     return f"{mesh.node(a)} and {mesh.node(b)}"

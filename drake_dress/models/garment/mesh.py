@@ -54,6 +54,19 @@ class GarmentMesh:
             raise UserError("garment", "scale", f"is {factor}, expected a positive number")
         return replace(self, rest_position=self.rest_position * factor)
 
+    def opened_at_back(self) -> GarmentMesh:
+        """Returns the mirror image with front and back exchanged: a coat becomes a gown.
+
+        Left stays left. Loops still begin at their first nodes and run along the front first.
+        """
+        loops = {name: np.roll(loop[::-1], 1) for name, loop in self.loops.items()}
+        return replace(
+            self,
+            rest_position=self.rest_position * np.array([-1.0, 1.0, 1.0]),
+            faces=np.ascontiguousarray(self.faces[:, ::-1]),
+            loops=loops,
+        )
+
     def validate(self, source: str = "garment") -> None:
         """Checks everything that the rest of the package relies on.
 

@@ -24,11 +24,13 @@ class Nape:
         nodes: (2,) ends of the edge; weights: (2,) of both, sum 1.
         height: of the point above the inner ends of the shoulder seams at rest, m: that of the
             collar; 0 if there is none.
+        in_front: whether it is in front of the armholes, as in a garment that opens at the back.
     """
 
     nodes: IndexArray
     weights: FloatArray
     height: float
+    in_front: bool = False
 
     def at(self, x: FloatArray) -> FloatArray:
         """Returns the point (3,) of nodes `x` (n,3), m."""
@@ -66,4 +68,5 @@ def find_nape(
     k = above[np.argmin(points[above, 0])]
     weights = np.array([1.0 - share[k], share[k]])
     height = max(0.0, float(points[k, 2] - tip) - _SHOULDER_SLOPE)
-    return Nape(border[rows[k]], weights, height)
+    in_front = bool(points[k, 0] > centers.mean(axis=0)[0])
+    return Nape(border[rows[k]], weights, height, in_front)

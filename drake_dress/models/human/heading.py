@@ -29,6 +29,15 @@ class Heading:
         return self.rotation[..., 0]
 
     @property
+    def reversed(self) -> Heading:
+        """The same with the front behind and the sides in place, for dressing from the front.
+
+        A garment that is put on from the front moves as the mirror image of one from behind, so
+        directions are then relative to this mirrored person. Its `rotation` is a reflection.
+        """
+        return Heading(self.rotation * np.array([-1.0, 1.0, 1.0]))
+
+    @property
     def leftward(self) -> FloatArray:
         """Returns the unit vector (3,) from right to left."""
         return self.rotation[..., 1]

@@ -31,15 +31,19 @@ def find_neck(a: FloatArray, b: FloatArray, middle: FloatArray) -> int | None:
     return int(rows[np.argmin(np.linalg.norm(a[rows] - middle, axis=1))])
 
 
-def nape(joints: FloatArray, shoulder_radius: float, neck_radius: float) -> FloatArray:
+def nape(
+    joints: FloatArray, shoulder_radius: float, neck_radius: float, to: Heading | None = None
+) -> FloatArray:
     """Returns the ends (2,3), m, of the nape: at the top of the shoulders, and above.
 
     Args:
         joints: (6,3) shoulder, elbow, hand of left, then right arm, m.
         shoulder_radius: of the limbs at the shoulder, m.
         neck_radius: m.
+        to: heading whose back is the nape's side, if not the person's: reversed, it is the throat,
+            on which a garment from the front is laid.
     """
-    to: Heading = heading(joints)
+    to = heading(joints) if to is None else to
     base = 0.5 * (joints[0] + joints[3]) - neck_radius * to.front
     up = np.array([0.0, 0.0, 1.0])
     return np.stack([base + shoulder_radius * up, base + (shoulder_radius + NAPE_LENGTH) * up])

@@ -76,6 +76,53 @@ def test_targets_turn_with_the_person(
     np.testing.assert_allclose(turned.direction, straight.direction @ rotation.T, atol=1e-9)
 
 
+MIRROR = np.array([-1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("task", [Task.PREPARE, Task.DRESS])
+@pytest.mark.parametrize(
+    ("retreat", "withdraw", "swing"),
+    [(False, False, False), (True, False, False), (False, True, False), (False, False, True)],
+)
+def test_dressing_from_the_front_is_the_mirror_image_of_that_from_behind(
+    planner: TaskPlanner,
+    yaw: float,
+    side: int,
+    task: Task,
+    retreat: bool,
+    withdraw: bool,
+    swing: bool,
+) -> None:
+    """A gown in front of a person who reaches forward is asked for what a coat behind is."""
+    mirrored = TaskPlanner(planner.mesh.opened_at_back(), planner.parameters, from_front=True)
+    rng = np.random.default_rng(1)
+    spots = [joints(yaw)[3 * i + 2] + rng.normal(0.0, 0.1, 3) for i in (0, 1)]
+    normals = [rng.normal(size=3) for _ in (0, 1)]
+    behind = [SleeveState(p, n / np.linalg.norm(n)) for p, n in zip(spots, normals, strict=True)]
+    front = [SleeveState(MIRROR * s.p_c, MIRROR * s.v_c) for s in behind]
+
+    def target(of: TaskPlanner, q: np.ndarray, sleeves: list[SleeveState]) -> SleeveTarget:
+        at = [-0.4, 0.0, 0.9] if of is planner else [0.4, 0.0, 0.9]
+        stages, seen = of.assign(StageState(), of.mesh.rest_position + at, q, 0.0)
+        del stages
+        given = Assignment(
+            (task, task),
+            seen.facts,
+            (retreat, retreat),
+            attempts=(1, 1),
+            withdraw=withdraw,
+            swing=(swing, swing),
+        )
+        return of.targets(given, sleeves, np.stack([q] * (HORIZON + 1)), STEP)[side]
+
+    one = target(planner, joints(yaw), behind)
+    other = target(mirrored, MIRROR * joints(yaw), front)
+    np.testing.assert_allclose(other.position, MIRROR * one.position, atol=1e-9)
+    np.testing.assert_allclose(other.direction, MIRROR * one.direction, atol=1e-9)
+
+
 def test_a_sleeve_on_its_arm_is_asked_to_go_on_at_its_rate(planner: TaskPlanner) -> None:
     axes = arm_axes(joints())
     on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
-from drake_dress.models.human.heading import heading
+from drake_dress.models.human.heading import heading, headings
 from drake_dress.models.sides import SIDES
 
 
@@ -22,6 +22,16 @@ def test_shoulders_tell_the_yaw(yaw: float) -> None:
     np.testing.assert_allclose(found.rotation @ found.rotation.T, np.eye(3), atol=1e-12)
     np.testing.assert_array_equal(found.inward(0), -found.leftward)
     np.testing.assert_array_equal(found.inward(1), found.leftward)
+
+
+def test_reversed_exchanges_front_and_back_alone() -> None:
+    found = heading(joints(0.7))
+    np.testing.assert_array_equal(found.reversed.front, -found.front)
+    np.testing.assert_array_equal(found.reversed.leftward, found.leftward)
+    np.testing.assert_array_equal(found.reversed.inward(0), found.inward(0))
+    np.testing.assert_array_equal(found.reversed.reversed.rotation, found.rotation)
+    both = headings(np.stack([joints(0.7), joints(-1.0)]))
+    np.testing.assert_array_equal(both.reversed.front, -both.front)
 
 
 def test_rounding_is_no_turn() -> None:

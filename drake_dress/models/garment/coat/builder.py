@@ -12,7 +12,6 @@ from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.garment.mesh import GarmentMesh
 
 _MIRROR = np.array([1.0, -1.0, 1.0])
-_HALF_TURN = np.array([-1.0, -1.0, 1.0])
 
 
 @dataclass
@@ -103,26 +102,4 @@ def mirrored(
         },
         grasp={"left": grasp, "right": image[grasp]},
         region=np.concatenate([region, right_region]),
-    )
-
-
-def turned_around(mesh: GarmentMesh) -> GarmentMesh:
-    """Returns a coat that opens at the back in place of the front.
-
-    Left and right are the wearer's again, and the loops still run along the wearer's front first.
-    """
-    other = {"left": "right", "right": "left"}
-    region = mesh.region.copy()
-    region[mesh.region == 1], region[mesh.region == 2] = 2, 1
-    loops = {}
-    for side, source in other.items():
-        for part in ("armhole", "cuff"):
-            loop = mesh.loops[f"{source}_{part}"]
-            loops[f"{side}_{part}"] = np.concatenate([loop[:1], loop[:0:-1]])
-    return GarmentMesh(
-        rest_position=mesh.rest_position * _HALF_TURN,
-        faces=mesh.faces,
-        loops=loops,
-        grasp={side: mesh.grasp[source] for side, source in other.items()},
-        region=region,
     )

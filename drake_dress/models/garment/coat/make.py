@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drake_dress.models.garment.coat.builder import Builder, mirrored, turned_around
+from drake_dress.models.garment.coat.builder import Builder, mirrored
 from drake_dress.models.garment.coat.collars import add_collar
 from drake_dress.models.garment.coat.panels import add_body, add_sleeve
 from drake_dress.models.garment.coat.parameters import CoatParameters, check
@@ -95,4 +95,4 @@ def _build(p: CoatParameters, shape: Shape, c: Counts, source: str) -> GarmentMe
     if p.grasp_radius == 0.0:
         grasp = body.front[-1, c.front_neck :]
     mesh = mirrored(half, armhole, cuff, grasp, region, source)
-    return turned_around(mesh) if p.opens == "back" else mesh
+    return mesh.opened_at_back() if p.opens == "back" else mesh
