@@ -24,8 +24,9 @@ def garment_page(look: GarmentLook) -> str:
         _drawings(look),
         "<h2>Measures</h2>",
         _comparisons(look.fit.comparisons),
-        "<p class=\"note\">A limit is a ratio of the garment's measure to the person's. Below the "
-        "limit, dressings in simulation failed. Measures without a limit are not judged.</p>",
+        "<p class=\"note\">A limit is a ratio of the garment's measure to the person's. Below it, "
+        "dressings in simulation took much longer or failed. Measures without a limit are not "
+        "judged.</p>",
         "<h2>Size</h2>",
         f"<p>{html.escape(look.advice.sentence)}</p>",
         _list("Notes", look.fit.notes),

@@ -82,7 +82,7 @@ def test_what_is_tight_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.count("\n") == 1
-    assert told.err.startswith(f"{DUMMY}: garment.coat.armhole_girth: the left armhole is tight")
+    assert told.err.startswith(f"{DUMMY}: garment.coat.armhole_girth: the armholes are tight")
 
 
 def test_a_file_with_a_closed_front_is_refused_by_its_key(tmp_path: Path) -> None:

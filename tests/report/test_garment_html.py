@@ -41,7 +41,7 @@ def test_what_cannot_go_on_is_told_with_its_reason() -> None:
     assert "It cannot go on" in page
     assert "Closed front" in page
     small = shown(garment_page(look(COAT.scaled(0.5))))
-    assert "The left cuff is narrower than the hand: 18.0 cm and 25.1 cm." in small
+    assert "The cuffs are narrower than the hand: 18.0 cm and 25.1 cm." in small
     assert "too narrow" in small
 
 

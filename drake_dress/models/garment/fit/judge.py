@@ -234,11 +234,17 @@ def _narrow(comparisons: Sequence[Comparison]) -> list[Finding]:
             worst[row.measure] = row
     found = []
     for row in worst.values():
+        alike = [other for other in comparisons if (other.measure, other.state) == _kind(row)]
+        name = f"{row.name} is" if len(alike) == 1 else f"{row.name.split()[-1]}s are"
         what = "narrower than" if row.state == "too narrow" else f"{row.state} for"
         length = 0.0 if row.garment is None else row.garment
-        text = f"the {row.name} is {what} the {row.part}: {_cm(length)} and {_cm(row.person)}"
+        text = f"the {name} {what} the {row.part}: {_cm(length)} and {_cm(row.person)}"
         found.append(Finding(levels[row.state], row.measure, text))
     return found
+
+
+def _kind(row: Comparison) -> tuple[str, str]:
+    return row.measure, row.state
 
 
 def _ratio(row: Comparison) -> float:
