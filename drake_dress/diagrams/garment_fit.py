@@ -59,11 +59,12 @@ def judged(
         UserError: the garment cannot be used.
     """
     fine, coarse = spacings
+    simple = build_garment(garment, coarse, base)
     if garment.mesh is not None:
         mesh = read_whole(garment.mesh, base).mesh()
     else:
         mesh = build_garment(garment, fine, base)
-    sizes = garment_sizes(mesh, build_garment(garment, coarse, base))
+    sizes = garment_sizes(mesh, simple)
     girths = person_girths(measures(person))
     return Judged(mesh, sizes, girths, judge(sizes, girths))
 
@@ -109,18 +110,17 @@ def advice_on(garment: schema.Garment, fit: Fit) -> Advice:
         return Advice(key, now, now * size.least, {}, told)
     if size.scale is None:
         return Advice(key, None, None, {}, "No size of this garment suits.")
-    value: float | None = _rounded_up(now * size.scale)
+    value = _rounded_up(now * size.scale)
     problem = _problem_of_scale(garment, fit, key, value, size.scale)
+    told = f"With {key}: {value:g} all judged measures would suit."
     if problem is not None:
         told = f"{key}: {value:g} would suit, but {problem}."
-        value = None
-    else:
-        told = f"With {key}: {value:g} all judged measures would suit."
     measures = _measures(garment, size.measures)
     if measures:
         each = ", ".join(f"{name}: {length:g}" for name, length in measures.items())
         told += f" Or change the measures alone: {each}."
-    return Advice(key, value, now * size.least, measures, told)
+    usable = value if problem is None else None
+    return Advice(key, usable, now * size.least, measures, told)
 
 
 def _problem_of_scale(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from drake_dress.__main__ import main
 from drake_dress.diagrams.garment_fit import advice_on, check_fit, judged, key_of
 from drake_dress.diagrams.scenario import Scenario, apply_variation, load_scenario
 from drake_dress.diagrams.scenario.schema import Garment, Mesh
@@ -74,6 +75,19 @@ def test_a_cuff_narrower_than_the_hand_is_refused_by_its_key(
     assert caught.value.key == "garment.coat.cuff_girth"
     assert caught.value.source == str(DUMMY)
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_refused_run_ends_with_one_line_and_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = [word for each in (*COARSE, NARROW) for word in ("--set", each)]
+    words = ["run", str(DUMMY), "--no-meshcat", "--out", str(tmp_path / "out"), *settings]
+    assert main(words) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith(f"drake-dress: {DUMMY}: garment.coat.cuff_girth: ")
+    assert told.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_tight_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
