@@ -16,6 +16,7 @@ from drake_dress.errors import FailedError, UserError
 from drake_dress.file_output import (
     DATASET_FILES,
     EXPLAIN_FILES,
+    GARMENT_FILES,
     RUN_FILES,
     prove_directory,
     prove_file,
@@ -62,6 +63,7 @@ _EXAMPLES = """examples:
   drake-dress run dummy_standing
   drake-dress run dummy_varied --seed 3 --out out/try
   drake-dress run my_scenario.yaml --set plant.material.friction=0.5 --no-meshcat
+  drake-dress garment jacket.obj --set garment.mesh.up=y --out out/jacket
   drake-dress dataset measured --hide random --seed 1 --out out/lab
   drake-dress dataset motion --out out/motion --dressings 8
   drake-dress dataset motion --out out/motion
@@ -154,6 +156,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(title="commands", dest="verb", required=True, metavar="COMMAND")
 
     _add_run(verbs)
+    _add_garment(verbs)
     _add_sim_station(verbs)
     _add_calibrate(verbs)
     _add_replay(verbs)
@@ -204,6 +207,29 @@ def _add_run(verbs: _Verbs) -> None:
     _add_plugin(run)
     _add_report(run)
     run.set_defaults(command=_run)
+
+
+def _add_garment(verbs: _Verbs) -> None:
+    garment = verbs.add_parser(
+        "garment",
+        help="look at a garment before a run: openings, girths, fit, size",
+        description="Writes garment.html with drawings and measures of a garment beside the "
+        "person's, garment.json with the same for programs, and garment.yaml, a scenario that runs "
+        "it. A garment's file is put into the scenario dummy_standing; --set sets its keys, such "
+        "as garment.mesh.up=y.",
+    )
+    garment.add_argument(
+        "garment",
+        metavar="FILE|SCENARIO",
+        help="a garment (OBJ, PLY, STL, glTF), a scenario's YAML file or its name",
+    )
+    garment.add_argument(
+        "--person", metavar="SCENARIO", help="whose person wears it; default: the scenario's own"
+    )
+    garment.add_argument("--out", metavar="DIR", help="default: out/garment-<name>")
+    garment.add_argument("--set", metavar="KEY=VALUE", action="append", default=[])
+    garment.add_argument("--seed", type=_seed, metavar="N", help="in place of the scenario's seed")
+    garment.set_defaults(command=_garment)
 
 
 def _add_sim_station(verbs: _Verbs) -> None:
@@ -478,6 +504,19 @@ def _run(options: argparse.Namespace) -> int:
     in_workers = not options.one_process and worker_count() > 1
     how = RunOptions(options.meshcat, options.realtime_rate, in_workers, options.report)
     return run_scenario(scenario, source, out, how)
+
+
+def _garment(options: argparse.Namespace) -> int:
+    from drake_dress.diagrams.garment_look import garment_source, subject_of, verdict, write_look
+
+    source, _ = garment_source(options.garment)
+    person = None if options.person is None else scenario_file(options.person)
+    inputs = [source] if person is None else [source, person]
+    out = _directory(options.out, Path("out") / f"garment-{source.stem}", GARMENT_FILES, inputs)
+    look = write_look(subject_of(options.garment, person, options.set, options.seed), out)
+    print(verdict(look))
+    print(f"page, figures and scenario: {out}")
+    return 0
 
 
 def _scenarios(_: argparse.Namespace) -> int:

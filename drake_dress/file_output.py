@@ -20,6 +20,7 @@ from drake_dress.errors import UserError
 # Files that each command writes into its folder. Only these are ever removed there.
 RUN_FILES = ("run.h5", "summary.json", "report.html", "replay.html")
 EXPLAIN_FILES = ("extended.yaml", "report.html", "explanation.json")
+GARMENT_FILES = ("garment.html", "garment.json", "garment.yaml")
 DATASET_FILES = ("measured.h5", "answer.json")
 # The file system has no locks; two commands there cannot be detected.
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)

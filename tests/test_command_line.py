@@ -35,6 +35,7 @@ def test_a_full_disk_is_told_in_one_line(
 
 OUTPUTS = [
     ["run", "scenarios/dummy_standing.yaml", "--out"],
+    ["garment", "dummy_standing", "--out"],
     ["sim-station", "scenarios/lab.yaml", "--out"],
     ["explain", "none.h5", "--scenario", "scenarios/measured.yaml", "--out"],
     ["dataset", "measured", "--hide", "wind", "--out"],

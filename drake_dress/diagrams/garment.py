@@ -38,10 +38,31 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
         with ShownWhenSlow(garment.mesh.file) as progress:
             whole, is_new = _read_once(base / garment.mesh.file, garment.mesh, progress)
             mesh = whole.at_spacing(spacing, progress)
-        for note in whole.notes if is_new else ():
-            print(f"{garment.mesh.file}: {note}", file=sys.stderr)
+        _tell_notes(garment.mesh.file, whole, is_new)
         return mesh
     return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
+
+
+def read_whole(mesh: schema.Mesh, base: Path) -> WholeGarment:
+    """Returns a garment at the resolution of its file; cached as by `build_garment`.
+
+    Args:
+        mesh: the file and its keys.
+        base: directory that the file's name is relative to.
+
+    Raises:
+        UserError: the file cannot be used.
+    """
+    with ShownWhenSlow(mesh.file) as progress:
+        whole, is_new = _read_once(base / mesh.file, mesh, progress)
+    _tell_notes(mesh.file, whole, is_new)
+    return whole
+
+
+def _tell_notes(file: str, whole: WholeGarment, is_new: bool) -> None:
+    """Tells on stderr what was mended in a file, when it is read for the first time."""
+    for note in whole.notes if is_new else ():
+        print(f"{file}: {note}", file=sys.stderr)
 
 
 def build_garment_like(

@@ -24,6 +24,7 @@ from drake_dress.diagrams.assemble import (
     wired,
 )
 from drake_dress.diagrams.dressing import Dressing
+from drake_dress.diagrams.garment_fit import check_fit
 from drake_dress.diagrams.hardware_station import (
     NoBusError,
     NotAtStartError,
@@ -91,10 +92,12 @@ def run_scenario(
         own: the user's own parts.
 
     Raises:
-        UserError: the garment cannot be used, or hangs where grippers may not or cannot be; or
-            hardware is silent, or not at the start of the run; or another run writes to `out`.
+        UserError: the garment cannot be used, cannot go on, or hangs where grippers may not or
+            cannot be; or hardware is silent, or not at the start of the run; or another run writes
+            to `out`.
     """
     setup = read_setup(apply_variation(scenario), source)
+    check_fit(setup)
     page = _open_meshcat(options.told) if options.meshcat else None
     p = _parts(setup, page, options.in_workers, own)
     rate = options.realtime_rate
