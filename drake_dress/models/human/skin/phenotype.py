@@ -23,11 +23,11 @@ from drake_dress.models.human.skin.skin import Skin, enclosed_volume, skin_of_po
 DENSITY = 1000.0
 AGE_RANGE = (4.0, 100.0)  # years
 HEIGHT_RANGE = (0.8, 2.3)  # m
+WEIGHT_RANGE = (1.0, 400.0)  # kg; `macro_of` tells the range of a body
 # Corpulence. MakeHuman draws 0 to 1, which is a body mass index of about 20 to 26 kg/m² for adults;
 # beyond it is extrapolated. Below and above these limits limbs become misshapen: men's trunks
 # sooner than women's.
 _LEAST_CORPULENCE, _MOST_CORPULENCE = -0.75, (2.5, 3.5)
-_MOST_KILOGRAMS = 400.0
 _SEXES = {"male": 0.0, "female": 1.0}
 
 
@@ -64,7 +64,7 @@ class Phenotype:
             _check("sex", self.sex, 0.0, 1.0, "")
         _check("age", self.age, *AGE_RANGE, " years")
         _check("height", self.height, *HEIGHT_RANGE, " m")
-        _check("weight", self.weight, 1.0, _MOST_KILOGRAMS, " kg")
+        _check("weight", self.weight, *WEIGHT_RANGE, " kg")
         _check("muscle", self.muscle, 0.0, 1.0, "")
         _check("proportions", self.proportions, 0.0, 1.0, "")
 

@@ -31,6 +31,7 @@ OPTIONAL = (
     "head",
     *(f"{side}_{name}" for side in SIDES for name in ("wrist", "hip", "knee", "ankle")),
 )
+JOINT_NAMES = NEEDED + OPTIONAL
 _STATURE = (0.8, 2.3)  # m
 # Distances between neighbouring joints of an arm, m: from a child of four to a very tall man.
 _LIMB = (0.08, 0.5)
@@ -112,8 +113,8 @@ def _places(source: str, joints: Mapping[str, Sequence[float]]) -> dict[str, Seq
     if missing:
         raise UserError(source, "joints", f"has no {missing[0]}, expected {', '.join(NEEDED)}")
     for name, place in joints.items():
-        if name not in NEEDED + OPTIONAL:
-            known = ", ".join(NEEDED + OPTIONAL)
+        if name not in JOINT_NAMES:
+            known = ", ".join(JOINT_NAMES)
             raise UserError(source, f"joints.{name}", f"is unknown, expected {known}")
         numbers = all(isinstance(x, int | float) and np.isfinite(x) for x in place)
         if len(place) != 3 or not numbers:
