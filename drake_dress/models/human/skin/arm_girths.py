@@ -22,7 +22,7 @@ _CUTS = 12
 
 @dataclass(frozen=True)
 class ArmGirths:
-    """Radii of circles with the girths of an arm, m, and masses, kg over the density.
+    """Radii of circles with the girths of an arm, m, and volumes, m³.
 
     Attributes:
         shoulder: mean distance of the skin of the arm from the shoulder joint.

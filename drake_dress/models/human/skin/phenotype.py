@@ -28,6 +28,10 @@ WEIGHT_RANGE = (1.0, 400.0)  # kg; `macro_of` tells the range of a body
 # beyond it is extrapolated. Below and above these limits limbs become misshapen: men's trunks
 # sooner than women's.
 _LEAST_CORPULENCE, _MOST_CORPULENCE = -0.75, (2.5, 3.5)
+# Range in which the height parameter is looked for: a little outside of MakeHuman's 0 to 1, as
+# stature depends on corpulence, too. Where an extrapolated corpulence would need another one, a
+# corpulence nearer to the mean is the limit.
+_HEIGHT_PARAMETERS, _SHARES = (-0.3, 1.3), 14
 _SEXES = {"male": 0.0, "female": 1.0}
 
 
@@ -114,7 +118,8 @@ def macro_of(person: Phenotype) -> Macro:
     def excess(corpulence: float) -> float:
         return _mass(body, of_height(corpulence)) - person.weight
 
-    limits = _LEAST_CORPULENCE, float(np.interp(person.femaleness, (0.0, 1.0), _MOST_CORPULENCE))
+    farthest = _LEAST_CORPULENCE, float(np.interp(person.femaleness, (0.0, 1.0), _MOST_CORPULENCE))
+    limits = [_with_height(body, first, limit, person.height) for limit in farthest]
     least, most = map(excess, limits)
     if least > 0.0 or most < 0.0:
         raise UserError(
@@ -126,16 +131,25 @@ def macro_of(person: Phenotype) -> Macro:
     return of_height(brentq(excess, *limits, xtol=1e-6))
 
 
-def _height_parameter(body: BodyFile, macro: Macro, height: float) -> float:
-    """Returns the height parameter of a stature, m.
+def _with_height(body: BodyFile, macro: Macro, limit: float, height: float) -> float:
+    """Returns the corpulence nearest to a limit, from the mean, at which a stature is reached."""
+    for share in np.linspace(1.0, 0.0, _SHARES):
+        corpulence = macro.weight + share * (limit - macro.weight)
+        ends = [
+            _stature(body, replace(macro, weight=corpulence, height=h)) for h in _HEIGHT_PARAMETERS
+        ]
+        if ends[0] < height < ends[1]:
+            return float(corpulence)
+    return macro.weight
 
-    It is a little outside of 0 to 1 near the limits, as stature depends on corpulence, too.
-    """
+
+def _height_parameter(body: BodyFile, macro: Macro, height: float) -> float:
+    """Returns the height parameter of a stature, m."""
 
     def excess(parameter: float) -> float:
         return _stature(body, replace(macro, height=parameter)) - height
 
-    return float(brentq(excess, -0.3, 1.3, xtol=1e-7))
+    return float(brentq(excess, *_HEIGHT_PARAMETERS, xtol=1e-7))
 
 
 def _stature(body: BodyFile, macro: Macro) -> float:

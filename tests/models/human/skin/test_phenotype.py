@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from drake_dress.errors import UserError
+from drake_dress.models.human.skin.measures import body_measures, skin_measures
 from drake_dress.models.human.skin.phenotype import DENSITY, Phenotype, phenotype_skin
 from drake_dress.models.sides import SIDES
 from tests.models.human.skin.bodies import BOY, MAN, OLD_WOMAN, PERSONS, WOMAN, skin_of
@@ -93,6 +94,30 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_what_no_body_has_is_told(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         phenotype_skin(replace(WOMAN, **changes))
+
+
+def test_any_person_has_a_body_or_is_told_why_not() -> None:
+    rng = np.random.default_rng(1)
+    found = 0
+    for _ in range(60):
+        height, index = rng.uniform(0.85, 2.25), rng.uniform(12.0, 50.0)
+        person = Phenotype(
+            rng.choice([0.0, 0.3, 1.0]),
+            rng.uniform(4.0, 100.0),
+            height,
+            index * height**2,
+            muscle=rng.choice([0.0, 0.4, 1.0]),
+        )
+        try:
+            skin = phenotype_skin(person)
+        except UserError as error:
+            assert error.key in ("height", "weight")
+            continue
+        found += 1
+        assert skin.stature == pytest.approx(height, abs=1e-3)
+        assert DENSITY * skin.volume == pytest.approx(person.weight, abs=0.1)
+        assert body_measures(skin_measures(skin)).shoulder_height < height
+    assert found > 10
 
 
 def test_told_limits_of_the_weight_are_reached() -> None:
