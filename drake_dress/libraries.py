@@ -26,6 +26,7 @@ EXTRAS = {
     "moviepy": "gym",
     "ray": "ray",
     "pyarrow": "ray",
+    "anny": "bodies",
 }
 _SHARED_OBJECT = re.compile(r"(lib[\w.+-]+\.so[\d.]*)")
 _INSTALL = "expected all packages of drake_dress: pip install them again"

@@ -19,13 +19,23 @@ from drake_dress.diagrams.scenario.key_table import (
 )
 from drake_dress.errors import UserError
 from drake_dress.models.effects.registry import EFFECTS
+from drake_dress.models.human.body import BodyMeasures
+from drake_dress.models.human.skin.measures import MEASURED
 
 KEYS = {key.name: key for key in scenario_keys()}
+_SOME = {"upper_arm_mass": 1.6, "forearm_mass": 1.2, "waist_width": 0.3}
+SIZES = {
+    e.name: e.default or _SOME.get(e.name, 0.05 if e.name.endswith("radius") else 0.2)
+    for e in dataclasses.fields(BodyMeasures)
+}
 # A scenario with each optional group, and one entry in each list.
+# With all measures given, no scan is read.
 EVERYTHING = f"""
 garment:
   mesh: {{file: a.obj, loops: {{left_cuff: [1, 2, 3]}}, grasp: {{left: [4]}}, leave_out: [Button]}}
 person:
+  body: {{scan: {{file: a.ply, joints: {{left_hand: [0, 0.3, 0.8]}}}}}}
+  measures: {{{", ".join(f"{name}: {SIZES[name]}" for name in MEASURED)}}}
   behaviour:
     kind: active
     motions: [{{reach: {{}}}}, {{turn: {{}}}}, {{withdraw: {{}}}}, {{wave: {{amplitude: 0.01}}}}]
@@ -46,7 +56,9 @@ def everything(tmp_path: Path) -> Path:
 
 def leaves(value: Any, name: str = "") -> Iterator[str]:
     """Yields the dotted keys of all values of a loaded scenario."""
-    named = name.endswith((".loops", ".grasp", "controller.costs"))  # the user chooses their keys
+    named = name.endswith(
+        (".loops", ".grasp", ".scan.joints", "controller.costs")
+    )  # the user chooses their keys
     if isinstance(value, dict) and not named:
         for key, item in value.items():
             yield from leaves(item, f"{name}.{key}" if name else key)

@@ -39,6 +39,7 @@ from drake_dress.models.human.prediction import (
     ConstantVelocityPredictor,
     StillPredictor,
 )
+from drake_dress.models.human.skin.scan import JOINT_NAMES
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES
 
@@ -52,6 +53,7 @@ garment:
   mesh: {file: a.obj, unit: cm, loops: {left_cuff: [1, 2, 3]}, grasp: {left: [4]}}
 person:
   posture: sitting
+  body: {sex: male, age: 50, height: 1.80, weight: 85.0, muscle: 0.5}
   measures: {shoulder_width: 0.4, waist_girth: 0.8, elbow_radius: 0.04}
   left_measures: {forearm_length: 0.3, wrist_girth: 0.16}
   right_measures: {hand_radius: 0.035}
@@ -131,7 +133,8 @@ def numbers_below(schema: Any, key: str = "") -> Iterator[str]:
             dotted = f"{key}.{name}" if key else name
             yield from numbers_below(SCHEMAS[dotted]() if dotted in SCHEMAS else hint, dotted)
     elif typing.get_origin(schema) is dict:
-        for name in LOOP_NAMES if key.endswith("loops") else SIDES:
+        names = {"loops": LOOP_NAMES, "joints": JOINT_NAMES}.get(key.rsplit(".")[-1], SIDES)
+        for name in names:
             yield from numbers_below(inner[1], f"{key}.{name}")
     elif inner:
         yield from numbers_below(inner[0], key)

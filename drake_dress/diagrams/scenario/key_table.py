@@ -22,11 +22,12 @@ from drake_dress.diagrams.scenario.typed import is_union
 from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.human.skin.scan import JOINT_NAMES
 from drake_dress.models.sides import SIDES
 
 _UNITS = (
     "m m/s m/s² m/s/N m/N m/(N·s) 1/m² s s/m s²/m² 1/s Hz N 1/N² N/m N·m N·m/rad N·m·s/rad Pa "
-    "kg kg/m² rad rad/s degrees pixels"
+    "kg kg/m² rad rad/s degrees pixels years"
 ).split()
 _UNIT = re.compile(
     ", ("
@@ -35,7 +36,7 @@ _UNIT = re.compile(
 )
 _TYPES = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 # Allowed keys of a group of lists, by the group's name.
-_NAMES = {"loops": LOOP_NAMES, "grasp": SIDES}
+_NAMES = {"loops": LOOP_NAMES, "grasp": SIDES, "joints": JOINT_NAMES}
 
 
 @dataclass(frozen=True)

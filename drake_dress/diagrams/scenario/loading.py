@@ -12,6 +12,7 @@ from typing import Any, get_args, get_type_hints
 
 from pydrake.common.yaml import yaml_load_typed
 
+from drake_dress.diagrams.scenario.body import fill_in_body
 from drake_dress.diagrams.scenario.checks import (
     check_behaviour,
     check_cameras,
@@ -88,6 +89,8 @@ def _checked(
     except (RuntimeError, ValueError, TypeError) as error:
         raise UserError(source, "", f"cannot be read: {error}") from error
     check_ranges(source, "", scenario)
+    fill_in_body(source, scenario.person, _given_measures(content))
+    check_ranges(source, "person.measures", scenario.person.measures)
     _move_force_limit(source, content, scenario)
     check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
     check_controller(source, scenario.controller)
@@ -175,6 +178,11 @@ def _resolve_delay(source: str, content: dict[str, Any]) -> None:
     if not isinstance(step, int | float) or isinstance(step, bool) or not 0.0 < step < math.inf:
         return  # checks of types and ranges report it
     place["delay"] = round(step * max(1, math.ceil(seconds / step - 1e-9)), 9)
+
+
+def _given_measures(content: dict[str, Any]) -> list[str]:
+    """Returns the names of the person's measures that a scenario's content gives."""
+    return list((content.get("person") or {}).get("measures") or {})
 
 
 def _fill_in_by_name(content: dict[str, Any]) -> None:

@@ -12,6 +12,8 @@ from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.garment.mesh_options import FRONTS, SCALE_RANGE, WELD_RANGE
 from drake_dress.models.human.prediction import PREDICTORS
+from drake_dress.models.human.skin.phenotype import AGE_RANGE, HEIGHT_RANGE, WEIGHT_RANGE
+from drake_dress.models.human.skin.scan import JOINT_NAMES
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
 
@@ -31,6 +33,9 @@ CHOICES = {
     "garment.mesh.facing": AXES,
     "garment.mesh.front": FRONTS,
     "person.posture": ("standing", "sitting"),
+    "person.body.sex": ("female", "male"),
+    "person.body.scan.unit": tuple(UNITS),
+    "person.body.scan.up": AXES,
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{
         f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
@@ -124,6 +129,11 @@ _RANGES: dict[str, tuple[float, float]] = {
     **{f"mesh.grasp.{side}": (0, 2**31 - 1) for side in SIDES},
     "mesh.weld": WELD_RANGE,
     "mesh.scale": SCALE_RANGE,
+    "body.age": AGE_RANGE,
+    "body.height": HEIGHT_RANGE,
+    "body.weight": WEIGHT_RANGE,
+    "body.muscle": (0.0, 1.0),
+    **{f"scan.joints.{name}": (-1e6, 1e6) for name in JOINT_NAMES},  # in any unit
     "material.surface_density": (0.01, 5.0),
     "material.stretch_stiffness": (1.0, 1e5),
     "material.bending_stiffness": (0.0, 1.0),

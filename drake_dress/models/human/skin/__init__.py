@@ -1,0 +1,1 @@
+"""A person's skin from sex, age, height and weight, or from a scan; its pose and its measures."""
