@@ -9,6 +9,7 @@ from typing import Any
 from benchmarks.dressing.cases import Case, scenario_of
 from drake_dress.diagrams.scenario import Scenario, apply_variation
 from drake_dress.diagrams.scenario.coat import coat_parameters
+from drake_dress.diagrams.sections.person import measures
 
 
 def drawn(case: Case) -> dict[str, float]:
@@ -29,7 +30,10 @@ def values(scenario: Scenario) -> dict[str, float]:
         arm = getattr(scenario.person, f"{side}_arm")
         for name in ("abduction_deg", "extension_deg", "elbow_deg"):
             found[f"{side}_{name}"] = getattr(arm, name)
-    found |= {f"body_{k}": v for k, v in _numbers(scenario.person.measures).items()}
+    sizes = _numbers(scenario.person.measures)
+    masses = measures(scenario.person).arm_masses
+    sizes |= zip(("upper_arm_mass", "forearm_mass"), masses, strict=True)
+    found |= {f"body_{k}": v for k, v in sizes.items()}
     coat = coat_parameters(scenario.garment.coat)
     found |= {f"coat_{k}": v for k, v in coat.lengths.items()}
     if coat.sleeve_slope_deg is not None:
@@ -41,4 +45,6 @@ def values(scenario: Scenario) -> dict[str, float]:
 
 
 def _numbers(entry: Any) -> dict[str, float]:
-    return {f.name: float(getattr(entry, f.name)) for f in fields(entry)}
+    """Returns the values that are given."""
+    found = {f.name: getattr(entry, f.name) for f in fields(entry)}
+    return {name: float(value) for name, value in found.items() if value is not None}

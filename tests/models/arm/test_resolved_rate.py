@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drake_dress.models.arm.clearance import Capsules
+from drake_dress.models.arm.clearance import Capsules, clearance
 from drake_dress.models.arm.panda import LIMITS, SHAPE, panda
 from drake_dress.models.arm.resolved_rate import ArmPair, GripperGoal, RateParameters
 
@@ -157,3 +157,22 @@ def test_a_hand_turns_as_it_is_asked() -> None:
     now = arms.arms[0].links(q[0])[-1, :3, :3]
     assert np.arccos(np.clip(0.5 * (np.trace(now.T @ turned) - 1.0), -1.0, 1.0)) < 0.1
     assert np.trace(now.T @ turned) == pytest.approx(3.0, abs=0.02)
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=10)
+def test_distance_to_a_tapered_person_is_that_of_its_round_cones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arms = pair()
+    q = HOME + rng.uniform(-0.2, 0.2, (2, 7))
+    still = goals(arms, q, np.zeros((2, 3)))
+    first, second = rng.uniform([0.4, -0.6, 0.6], [1.2, 0.6, 1.6], (2, 5, 3))
+    radii = rng.uniform(0.03, 0.12, (5, 2))
+    pairs = np.array([[i, j] for i in np.flatnonzero(SHAPE.link <= 5) for j in range(5)])
+    for given_radii in (radii, radii[:, 0], np.stack([radii[:, 0]] * 2, axis=1)):
+        person = Capsules(first, second, given_radii)
+        found = arms.rates(q, np.zeros((2, 7)), still, STEP, person)
+        for i, arm in enumerate(arms.arms):
+            placed = SHAPE.placed(arm.links(q[i]))
+            least = clearance(placed, person, pairs).distance.min()
+            assert found.to_person[i] == pytest.approx(least, abs=1e-12)
