@@ -19,6 +19,8 @@ _FOLD = np.deg2rad(50.0)  # of a lapel above the front that it is folded back on
 # Width of a lapel at its lower end, over the largest, and the share of its length over which it
 # widens.
 _NARROW, _WIDENS = 0.6, 0.7
+# Slope of a lapel's upper end, and the share of its length over which it turns down to that.
+_NOTCH, _NOTCH_LENGTH = 0.6, 0.35
 _SMOOTH = 0.04  # m along a fold, over which the directions of a strip are averaged
 _SHAWL_TURN = 0.5  # share of a shawl's front, below the neck, over which it begins to stand up
 _HOOD_LEAN = np.deg2rad(28.0)  # of a hood backward: it is off the head, ready to be put on
@@ -32,7 +34,8 @@ def add_collar(half: Builder, p: CoatParameters, body: Body, c: Counts) -> None:
         _add_strip(half, neckline, _standing(half, neckline), p.collar_height, c.collar)
     if p.collar == "lapel":
         width = _lapel_widths(half.position[edge], lapel_width(p))
-        _add_strip(half, edge, _folded(half, body, c), width, c.across)
+        rise = _notched(_folded(half, body, c), half.position[edge])
+        _add_strip(half, edge, rise, width, c.across)
     elif p.collar == "shawl":
         _add_shawl(half, p, body, c, edge, neckline)
     elif p.collar == "hood":
@@ -71,6 +74,13 @@ def _folded(half: Builder, body: Body, c: Counts) -> FloatArray:
     inward = _unit(inward - np.sum(inward * along, axis=1)[:, None] * along)
     outward = np.cross(inward, along)
     return _smooth(np.cos(_FOLD) * inward + np.sin(_FOLD) * outward, edge)
+
+
+def _notched(rise: FloatArray, edge: FloatArray) -> FloatArray:
+    """Returns a lapel's directions, which lean down toward its upper end, away from the collar."""
+    along = arc(edge)
+    near = np.clip(1.0 - (along[-1] - along) / (_NOTCH_LENGTH * along[-1]), 0.0, 1.0)
+    return _unit(rise - _NOTCH * near[:, None] * _unit(np.gradient(edge, axis=0)))
 
 
 def _lapel_widths(edge: FloatArray, width: float) -> FloatArray:

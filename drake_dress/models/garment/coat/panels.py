@@ -14,8 +14,8 @@ from drake_dress.models.garment.coat.shape import Counts, Shape
 from drake_dress.models.garment.mesh import loop_length
 
 _SLEEVE_SLOPE = 58.0  # deg below the horizontal
-# Half width of a slit at the hem, m: its edges are parted, so that they are not in contact.
-_VENT_GAP = 0.006
+# Half width of a slit at the hem and at its upper end, m: its edges are not in contact.
+_VENT_GAP, _VENT_NARROW = 0.006, 0.0025
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def _add_lower(half: Builder, p: CoatParameters, shape: Shape, c: Counts) -> Int
         grid = (1 - v[..., None]) * shape.hem + v[..., None] * shape.ring
     grid[:, :, 2] = (1 - v) * -p.body_length + v * shape.ring[:, 2]
     # all columns of the back make room for the slit, so that none is squeezed
-    parted = _VENT_GAP * (1.0 - np.arange(c.vent) / max(c.vent, 1))
+    parted = np.linspace(_VENT_GAP, _VENT_NARROW, c.vent + 1)[: c.vent]
     grid[: c.vent, -c.back - 1 :, 1] += parted[:, None] * np.linspace(0.0, 1.0, c.back + 1)
     nodes = half.add(grid)
     half.grid(nodes)

@@ -140,6 +140,7 @@ _UNITS = {"grasp_fraction": "", "sleeve_slope_deg": " deg"}
 # Bounds of a measure, as factors of another one.
 _FLARE = (0.8, 1.5)  # hem over chest
 _ELBOW = (0.82, 1.12)  # elbow over the mean of armhole and cuff
+_HOOD_NECK = 0.34  # neck_depth below a hood, over its height
 _LARGEST_GAP = 0.4  # gap of the hem over its girth
 
 
@@ -217,6 +218,14 @@ def _check_shape(p: CoatParameters, source: str) -> None:
         value = getattr(p, key)
         if value is not None and not low <= value <= high:
             raise UserError(source, key, f"is {value} m, expected {low:.2f} to {high:.2f} m {told}")
+    hood = 0.3 if p.hood_height is None else p.hood_height
+    if p.collar == "hood" and p.neck_depth is not None and p.neck_depth > _HOOD_NECK * hood:
+        raise UserError(
+            source,
+            "neck_depth",
+            f"is {p.neck_depth} m, expected at most {_HOOD_NECK * hood:.3f} m below a hood of "
+            f"{hood} m, which would fold through itself",
+        )
     if p.has_lapels and p.neck_depth is not None:
         raise UserError(
             source,
