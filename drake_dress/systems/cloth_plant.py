@@ -18,7 +18,7 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.grasp import Pressing, press
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.contact.wrenches import body_wrenches
-from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.sides import SIDES
@@ -117,6 +117,7 @@ class ClothPlant(LeafSystem):
         self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
         self._solver = self.DeclareDiscreteState(np.full(2 * (n + 1), -1.0))
         self._tangled = self.DeclareDiscreteState(np.zeros(n))
+        self._acceleration = self.DeclareDiscreteState(np.zeros(3 * n))
         # Moment about the body's origin, then force, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._person.index)))
         # force of the person on the held nodes, N
@@ -161,7 +162,10 @@ class ClothPlant(LeafSystem):
         return self._person.obstacles(self._poses.Eval(context), self._velocities.Eval(context))
 
     def rehearse(self, context: Context) -> None:
-        """Steps the garment in contact with the person, then flattened, to compile all kernels."""
+        """Steps the garment in contact with the person, then flattened, to compile all kernels.
+
+        Only a `LayeredCloth` has kernels for the latter.
+        """
         bodies = self.obstacles(context)
         if not bodies.count:
             return
@@ -173,6 +177,8 @@ class ClothPlant(LeafSystem):
         for _ in range(2):
             self._steps.begin(state, self._surroundings.flat(bodies, still))
             state = self._steps.end()
+        if not isinstance(self.cloth, LayeredCloth):
+            return
         # layers in contact, and some marked as possibly crossed
         x = self.start_position.copy()
         thin = int(np.argmin(np.ptp(x, axis=0)))
@@ -209,6 +215,7 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._reaction, after.reaction.ravel())
         discrete.set_value(self._solver, after.solver.ravel().astype(np.float64))
         discrete.set_value(self._tangled, after.tangled.astype(np.float64))
+        discrete.set_value(self._acceleration, after.acceleration.ravel())
         discrete.set_value(self._pressing, pressing.force.ravel())
         discrete.set_value(self._wrench, self._wrenches(context, after, pressing).ravel())
 
@@ -236,6 +243,7 @@ class ClothPlant(LeafSystem):
             context.get_discrete_state(self._owner).value().astype(np.int32),
             context.get_discrete_state(self._solver).value().reshape(2, n + 1).astype(np.int32),
             context.get_discrete_state(self._tangled).value().astype(np.int32),
+            context.get_discrete_state(self._acceleration).value().reshape(n, 3).copy(),
         )
         around = context.get_discrete_state(self._around).value()
         if not np.isfinite(around).all():

@@ -27,6 +27,7 @@ class Elements:
 
     Attributes:
         node_count: n.
+        rest_position: (n,3) rest shape, m.
         triangle: (F,3) node indices.
         triangle_gradient: (F,3,2) g_i of each corner, 1/m, in an orthonormal frame of the triangle.
         triangle_area: (F,) rest area, m².
@@ -48,6 +49,7 @@ class Elements:
     """
 
     node_count: int
+    rest_position: FloatArray
     triangle: IntArray
     triangle_gradient: FloatArray
     triangle_area: FloatArray
@@ -95,6 +97,7 @@ def make_elements(rest_position: FloatArray, faces: npt.NDArray[np.integer]) -> 
     edge_length = np.linalg.norm(x[edge[:, 1]] - x[edge[:, 0]], axis=1)
     return Elements(
         node_count=n,
+        rest_position=x,
         triangle=triangle,
         triangle_gradient=np.ascontiguousarray(gradient),
         triangle_area=area,
