@@ -25,9 +25,7 @@ from drake_dress.models.cloth.mujoco.text import numbers
 _THIN = 1e-5
 # Time constant and damping ratio of contact. The integrator replaces rows that the time step cannot
 # resolve by the stiffest without rebound; with MuJoCo's default garments sink in by centimetres.
-# Impedance d: contact yields by (1 − d) / d · h² f / m, m the mass of a few nodes, 0.25 mm at 1 N;
-# with MuJoCo's default of 0.9 to 0.95 it is centimetres.
-_STIFF = 'solref="0.001 1" solimp="0.999 0.9999 0.001 0.5 2"'
+_STIFF = 'solref="0.001 1"'
 # Upper limit of the memory for contacts, which is used as needed.
 _MEMORY = "1G"
 

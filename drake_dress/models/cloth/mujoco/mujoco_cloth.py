@@ -15,6 +15,7 @@ from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.matrices import bending_bound, stretch_matrix
 from drake_dress.models.cloth.mujoco.bodies import HEAVY, Bodies, check_shapes
 from drake_dress.models.cloth.mujoco.garment import model_xml
 from drake_dress.models.cloth.mujoco.settings import (
@@ -30,6 +31,12 @@ from drake_dress.models.cloth.state import (
     ClothState,
     SteppedCloth,
 )
+
+# Share of the inertia that the implicit integration of the fabric adds on which contact counts.
+# With none, a sleeve of 1500 N/m that is pulled over a forearm with 15 N sinks in by 10 mm, with
+# this share by 3 mm, in equally many iterations. With five times as much the solver takes three
+# times as many.
+_SHARE = 0.012
 
 
 @dataclass(frozen=True)
@@ -132,6 +139,18 @@ def _check_influences(given: Influences) -> None:
             raise ValueError(f"MuJoCo's garment has no {name} that differs from node to node")
 
 
+def _contact_inertia(cloth: MujocoCloth, mass: FloatArray) -> FloatArray:
+    """Returns (n,) the inertia of the nodes to which the compliance of contact is related, kg.
+
+    MuJoCo takes the mass. The fabric is integrated implicitly, which adds h (h + damping) K to the
+    inertia with which a node resists, thousands of times its mass.
+    """
+    e, m, h = cloth.elements, cloth.material, cloth.time_step
+    stiffness = stretch_matrix(e, m).diagonal() + bending_bound(e, m).diagonal()
+    inertia: FloatArray = mass + _SHARE * h * (h + m.damping) * stiffness
+    return inertia
+
+
 class _Simulator:
     """MuJoCo's model and data of a garment among `body_count` bodies."""
 
@@ -161,6 +180,7 @@ class _Simulator:
         mass[self._held] = HEAVY
         self._model.body_mass[nodes] = mass
         self._mujoco.mj_setConst(self._model, self._data)
+        self._model.body_invweight0[nodes, 0] = 1.0 / _contact_inertia(cloth, mass)
         # Tolerances are relative to the mean inertia, which the heavy bodies would distort.
         self._model.stat.meaninertia = float(np.median(cloth.mass))
         self._support = np.zeros(self._model.nv)

@@ -203,6 +203,27 @@ def test_a_sleeve_is_drawn_over_a_limb_that_moves_and_does_not_enter_it() -> Non
     assert np.linalg.norm(state.x[:, 1:], axis=1).max() < 0.09, "the limb is inside"
 
 
+def test_a_taut_band_does_not_sink_into_a_limb() -> None:
+    """The tension of both ends, T, presses 2 T on the limb, tens of times the band's weight."""
+    x, e = sheet_elements(14, 4, 0.03)
+    x = x - x.mean(axis=0) + [0.0, 0.0, 0.043]
+    held = np.flatnonzero(np.abs(x[:, 0]) > 0.19).astype(np.int32)
+    cloth = MujocoCloth(e, Material(stretch_stiffness=1500.0, damping=0.01), H, held)
+    limb = replace(capsule(), radius=np.array([0.04]))
+    motion = np.tile([0.0, 0.0, -0.1], (len(held), 1))
+    motion[:, 0] = -0.05 * np.sign(x[held, 0])
+    state, pulls, presses = ClothState.at_rest(x), [], []
+    for k in range(220):
+        state, _ = cloth.step(state, limb, motion if k < 170 else 0.0 * motion)
+        if k >= 180:
+            pulls.append(-state.reaction[held, 2].sum())
+            presses.append(np.delete(state.reaction, held, axis=0)[:, 2].sum())
+    assert np.mean(pulls) > 10.0
+    assert np.mean(presses) == pytest.approx(np.mean(pulls), rel=0.05)
+    points = np.concatenate([state.x, state.x[e.triangle].mean(axis=1)])
+    assert find_proximity(points, limb, 0.0).gap.min() > -1.5e-3
+
+
 def test_layers_do_not_pass_through_each_other() -> None:
     """A sheet falls on a larger one that is held at its rim, at 0.4 m/s."""
     x, faces = sheet(11, 11, 0.03)
