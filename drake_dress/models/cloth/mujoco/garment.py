@@ -27,7 +27,7 @@ _THIN = 1e-5
 # resolve by the stiffest without rebound; with MuJoCo's default garments sink in by centimetres.
 _STIFF = 'solref="0.001 1"'
 # Upper limit of the memory for contacts, which is used as needed.
-_MEMORY = "1G"
+_MEMORY = "256M"
 
 
 def model_xml(
@@ -44,11 +44,11 @@ def model_xml(
     Nodes have equal masses here; the caller sets the true ones.
     """
     area = float(elements.triangle_area.sum())
-    free = elements.triangle[~np.isin(elements.triangle, held).any(axis=1)]
+    free = touching_triangles(elements, held)
     return f"""<mujoco>
 <option timestep="{time_step:.12g}" integrator="discrete" solver="CG" cone="elliptic"
   iterations="{settings.iterations}" tolerance="{settings.tolerance:.12g}"
-  gravity="{numbers(gravity)}"><flag island="disable"/></option>
+  gravity="{numbers(gravity)}"><flag island="disable" autoreset="disable"/></option>
 <size memory="{_MEMORY}"/>
 <worldbody>
 {bodies_xml(body_count, material.friction)}
@@ -58,6 +58,12 @@ def model_xml(
 {_surfaces(elements.node_count, free, material, settings.self_collision)}
 </deformable>
 </mujoco>"""
+
+
+def touching_triangles(elements: Elements, held: IntArray) -> IntArray:
+    """Returns (F,3) the triangles that touch bodies: those without held nodes."""
+    free: IntArray = elements.triangle[~np.isin(elements.triangle, held).any(axis=1)]
+    return free
 
 
 def _fabric(elements: Elements, material: Material, area: float) -> str:

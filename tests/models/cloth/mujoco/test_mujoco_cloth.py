@@ -290,3 +290,11 @@ def test_what_mujoco_does_not_have_is_refused() -> None:
     fibres = Fibres.along(e, x, np.tile([1.0, 0.0, 0.0], (len(e.triangle), 1)), 10.0)
     with pytest.raises(ValueError, match="isotropic"):
         MujocoCloth(e, SOFT, H, NO_NODES, additions=Additions(fibres))
+
+
+def test_a_diverged_garment_is_not_put_back_to_its_rest_shape() -> None:
+    """MuJoCo resets simulations with velocities above 1e10, unless that is switched off."""
+    x, e = sheet_elements(4, 4, 0.03)
+    fast = replace(ClothState.at_rest(x), v=np.full_like(x, 1e12))
+    state, _ = MujocoCloth(e, SOFT, H, NO_NODES).step(fast, Obstacles.none(), NOTHING)
+    assert np.abs(state.x).min() > 1e9
