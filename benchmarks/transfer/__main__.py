@@ -1,6 +1,6 @@
 """Dresses with MuJoCo as the world, and compares with the package's own simulation.
 
-    drake-dress bench transfer --draw develop:20 --root 7 --json out/transfer.json
+    drake-dress bench transfer --seeds 0-19 --json out/transfer.json
 
 Every run is a separate `drake-dress run` of a varied `dummy_standing`; its seed draws pose, body,
 coat, fabric and start, as in `bench dressing`. Controllers do not know which world they act on.
