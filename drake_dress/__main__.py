@@ -53,6 +53,7 @@ BENCHMARKS = {
     "delay": "solve time of the global controller on this machine",
     "prediction": "prediction of a person's arms and intent, beside simple predictors",
     "predictors": "active persons dressed with each predictor of their motion",
+    "transfer": "dressings with MuJoCo as the world, beside the package's own simulation",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
     "repeat": "whether the same seed gives the same log bit for bit under any load",
     "mutation": "share of mutants of central modules that the tests detect",

@@ -24,6 +24,7 @@ EXTRAS = {
     "cv2": "vision",
     "gymnasium": "gym",
     "moviepy": "gym",
+    "mujoco": "mujoco",
     "ray": "ray",
     "pyarrow": "ray",
     "anny": "bodies",

@@ -15,7 +15,7 @@ from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 
-_SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 METHODS = ("full", "global", "local")
 # Person to the scenario with that person.
 PERSONS = {
@@ -84,7 +84,7 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
 
 def scenario_of(case: Case, overrides: Sequence[str] = ()) -> Scenario:
     """Returns the scenario of a case, before its variation is drawn."""
-    return load_scenario(_SCENARIOS / PERSONS[case.person], settings_of(case, overrides), case.seed)
+    return load_scenario(SCENARIOS / PERSONS[case.person], settings_of(case, overrides), case.seed)
 
 
 def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
@@ -97,7 +97,7 @@ def run(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[st
     """
     return run_case(
         case,
-        _SCENARIOS / PERSONS[case.person],
+        SCENARIOS / PERSONS[case.person],
         keep,
         settings_of(case, overrides),
         case.seed,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drake_dress.diagrams.garment import build_garment, check_opening
+from drake_dress.diagrams.integrator import check_integrator
 from drake_dress.diagrams.person import Person, person_model
 from drake_dress.diagrams.planning import Rates
 from drake_dress.diagrams.prediction import Predictor
@@ -23,6 +24,7 @@ from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.body import body_capsules
 
 
 @dataclass(frozen=True)
@@ -89,13 +91,16 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
 
     Raises:
         UserError: the garment cannot be used, or hangs outside the grippers' limits at the start;
-            or the predictor's weights cannot be used.
+            the plant's integrator is missing or has no such effects; or the predictor's weights
+            cannot be used.
     """
     foreseen = predictor(scenario.controller, source.parent)
     plant = build_garment(scenario.garment, scenario.plant.spacing, source.parent)
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
     check_opening(plant, scenario.station.side, str(source))
     station = station_parameters(scenario, plant)
+    capsules = body_capsules(station.measures, station.posture)
+    check_integrator(str(source), station.integrator, station.effects, capsules)
     limits = safety_limits(scenario.safety)
     broken = limits.broken_at(start_grippers(station))
     if broken is not None:

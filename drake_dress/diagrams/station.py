@@ -78,6 +78,7 @@ from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.mujoco.settings import MujocoSettings
 from drake_dress.models.cloth.projective.projective_dynamics import ProjectiveSettings
 from drake_dress.models.cloth.releasable import ReleasableCloth
 from drake_dress.models.cloth.scheme import MakeIntegrator, Scheme
@@ -519,6 +520,11 @@ def plant_integrator(p: StationParameters) -> ReleasableCloth:
 def _integrator(p: StationParameters, held: IntArray) -> Integrator:
     """Returns the integrator of the plant's garment with the nodes `held` prescribed."""
     settings: ImplicitSettings | ProjectiveSettings
+    if p.integrator == "mujoco":
+        # layers collide within its own step
+        return _with_effects(
+            p, Scheme(p.mesh.held, p.time_step, MujocoSettings(self_collision=p.self_collision))
+        )
     if p.integrator == "projective_dynamics":
         settings = ProjectiveSettings(quasi_newton=True)
     else:

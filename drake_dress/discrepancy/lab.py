@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from drake_dress.diagrams.garment import build_garment
+from drake_dress.diagrams.integrator import check_explained
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.sections.effects import effects
 from drake_dress.diagrams.sections.person import arms, measures, posture
@@ -84,11 +85,15 @@ class SimulatedLab:
             scenario: its plant is the simulation that is compared with data.
             base: directory that a mesh file's name is relative to.
             numerics: settings in place of the scenario's.
+
+        Raises:
+            UserError: the integrator is MuJoCo.
         """
         p = scenario.plant
         numerics = numerics or Numerics(
             p.spacing, p.time_step, p.integrator, p.iterations, p.tolerance
         )
+        check_explained("scenario", numerics.integrator)
         return SimulatedLab(
             build_garment(scenario.garment, numerics.spacing, base),
             Material(**vars(p.material)),

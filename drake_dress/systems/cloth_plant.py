@@ -20,7 +20,8 @@ from drake_dress.models.cloth.contact.grasp import Pressing, not_pressing, press
 from drake_dress.models.cloth.contact.modes import FREE, HELD
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.contact.wrenches import body_wrenches
-from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.layered import Integrator, LayeredCloth
+from drake_dress.models.cloth.releasable import ReleasableCloth
 from drake_dress.models.cloth.state import ClothState
 from drake_dress.models.effects.mounts import Mounts, MountState, displaced, limb_forces
 from drake_dress.models.sides import SIDES
@@ -122,6 +123,7 @@ class ClothPlant(LeafSystem):
         self._reaction = self.DeclareDiscreteState(np.zeros(3 * n))
         self._solver = self.DeclareDiscreteState(np.full(2 * (n + 1), -1.0))
         self._tangled = self.DeclareDiscreteState(np.zeros(n))
+        self._acceleration = self.DeclareDiscreteState(np.zeros(3 * n))
         # Moment about the body's origin, then force, of the garment on each body.
         self._wrench = self.DeclareDiscreteState(np.zeros(6 * len(self._person.index)))
         # force of the person on the held nodes, N
@@ -184,13 +186,15 @@ class ClothPlant(LeafSystem):
         for _ in range(2):
             self._steps.begin(state, self._surroundings.flat(bodies, still))
             state = self._steps.end()
-        # layers in contact, and some marked as possibly crossed
-        x = self.start_position.copy()
-        thin = int(np.argmin(np.ptp(x, axis=0)))
-        x[:, thin] = x[:, thin].mean() + _REHEARSED_FLATNESS * (x[:, thin] - x[:, thin].mean())
-        flat = ClothState.at_rest(x)
-        flat.tangled[: len(flat.x) // 2] = 1
-        for held in (still, still[:0]):
+        flat = ClothState.at_rest(self.start_position)
+        if getattr(self.cloth, "has_layers", isinstance(self.cloth, LayeredCloth)):
+            # layers in contact, and some marked as possibly crossed
+            x = self.start_position.copy()
+            thin = int(np.argmin(np.ptp(x, axis=0)))
+            x[:, thin] = x[:, thin].mean() + _REHEARSED_FLATNESS * (x[:, thin] - x[:, thin].mean())
+            flat = ClothState.at_rest(x)
+            flat.tangled[: len(flat.x) // 2] = 1
+        for held in (still, still[:0]) if isinstance(self.cloth, ReleasableCloth) else (still,):
             self._steps.begin(flat, self._surroundings.flat(bodies, held))
             self._steps.end()
 
@@ -249,6 +253,7 @@ class ClothPlant(LeafSystem):
         discrete.set_value(self._reaction, after.reaction.ravel())
         discrete.set_value(self._solver, after.solver.ravel().astype(np.float64))
         discrete.set_value(self._tangled, after.tangled.astype(np.float64))
+        discrete.set_value(self._acceleration, after.acceleration.ravel())
         discrete.set_value(self._pressing, pressing.force.ravel())
         discrete.set_value(self._wrench, self._wrenches(context, after, pressing).ravel())
 
@@ -276,6 +281,7 @@ class ClothPlant(LeafSystem):
             context.get_discrete_state(self._owner).value().astype(np.int32),
             context.get_discrete_state(self._solver).value().reshape(2, n + 1).astype(np.int32),
             context.get_discrete_state(self._tangled).value().astype(np.int32),
+            context.get_discrete_state(self._acceleration).value().reshape(n, 3).copy(),
         )
         around = context.get_discrete_state(self._around).value()
         if not np.isfinite(around).all():

@@ -26,7 +26,8 @@ from drake_dress.systems.shared_memory import SharedMemory
 from drake_dress.worker_pool import end_with, kill_at_exit, start_process
 
 # Fields of a state: vectors per node, integers per node, and the warm start of the solvers.
-_VECTORS, _NUMBERS, _SOLVER = ("x", "v", "reaction"), ("mode", "owner", "tangled"), "solver"
+_VECTORS, _NUMBERS = ("x", "v", "reaction", "acceleration"), ("mode", "owner", "tangled")
+_SOLVER = "solver"
 # Message that starts a step: it continues from the last state, or from a given one.
 _GO_ON, _FROM_GIVEN = b"\0", b"\1"
 

@@ -10,10 +10,10 @@ import pytest
 
 from benchmarks.dressing import __main__ as bench
 from benchmarks.dressing.cases import (
-    _SCENARIOS,
     COATS,
     METHODS,
     PERSONS,
+    SCENARIOS,
     VARIATIONS,
     Case,
     cases,
@@ -84,7 +84,7 @@ def test_every_run_is_a_scenario_that_its_seed_varies(person: str, coat: str) ->
         "controller.method=full",
     ]
     drawn = [
-        apply_variation(load_scenario(_SCENARIOS / PERSONS[person], settings, seed))
+        apply_variation(load_scenario(SCENARIOS / PERSONS[person], settings, seed))
         for seed in (0, 1)
     ]
     assert {s.garment.coat.preset for s in drawn} == {coat}

@@ -6,13 +6,19 @@ from pydrake.systems.analysis import Simulator
 
 from drake_dress.diagrams.station import SimulatedStation
 from drake_dress.models.cloth.contact.detection import find_proximity
+from tests.needs_mujoco import needs_mujoco
 from tests.systems.draped import H, draped_station
 
 
 @pytest.fixture(
     scope="module",
-    params=[("implicit", False), ("implicit", True), ("projective_dynamics", False)],
-    ids=["implicit", "layered", "projective"],
+    params=[
+        ("implicit", False),
+        ("implicit", True),
+        ("projective_dynamics", False),
+        pytest.param(("mujoco", True), marks=needs_mujoco),
+    ],
+    ids=["implicit", "layered", "projective", "mujoco"],
 )
 def station(request: pytest.FixtureRequest) -> SimulatedStation:
     integrator, layered = request.param
@@ -20,7 +26,7 @@ def station(request: pytest.FixtureRequest) -> SimulatedStation:
 
 
 def test_forces_on_grippers_and_person_are_what_moves_the_garment(
-    station: SimulatedStation,
+    station: SimulatedStation, request: pytest.FixtureRequest
 ) -> None:
     simulator = Simulator(station.diagram)
     context = simulator.get_mutable_context()
@@ -48,7 +54,8 @@ def test_forces_on_grippers_and_person_are_what_moves_the_garment(
         np.testing.assert_allclose(contact, -on_person, atol=1e-9)
     assert touched > 0.5
     # Conjugate gradients stop at a relative residual: what they leave must not pile up.
-    assert np.linalg.norm(missing) < 0.01 * np.linalg.norm(weight) * 240 * H
+    share = 0.03 if "mujoco" in request.node.name else 0.01
+    assert np.linalg.norm(missing) < share * np.linalg.norm(weight) * 240 * H
 
 
 def test_garment_moves_the_arms(station: SimulatedStation, request: pytest.FixtureRequest) -> None:

@@ -19,6 +19,7 @@ from drake_dress.models.human.learned.predictor import LearnedPredictor
 from drake_dress.systems.global_mpc import GlobalMpc
 from drake_dress.systems.human_forecast import HumanForecast
 from tests.models.human.learned.drawn import drawn_networks, drawn_scene
+from tests.needs_mujoco import needs_mujoco
 from tests.systems.draped import H, draped_station
 
 Begin = Callable[[Context, int], None]
@@ -68,6 +69,8 @@ def _check(system: System, begin: Begin, see: See, times: np.ndarray) -> None:
         ("implicit", True, False),
         ("projective_dynamics", False, False),
         ("implicit", False, True),
+        pytest.param("mujoco", True, False, marks=needs_mujoco),
+        pytest.param("mujoco", True, True, marks=needs_mujoco),
     ],
 )
 def test_garments_in_two_contexts_do_not_know_of_each_other(

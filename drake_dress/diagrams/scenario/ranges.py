@@ -42,7 +42,7 @@ CHOICES = {
         for motion in ("reach", "withdraw", "wave")
     },
     "plant.fidelity": tuple(FIDELITIES),
-    "plant.integrator": ("implicit", "projective_dynamics"),
+    "plant.integrator": ("implicit", "projective_dynamics", "mujoco"),
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated", "hardware"),

@@ -505,7 +505,8 @@ class Plant:
         time_step: time step of the garment, s.
         body_time_step: time step of robot arms, grippers and the person's joints, s.
         integrator: `implicit` is linearly implicit; `projective_dynamics` is solved to convergence
-            and takes about thirty times as long.
+            and takes about thirty times as long; `mujoco` is the cloth and contact of MuJoCo, an
+            extra, which takes its own solver settings (docs/transfer.md).
         implicitness: blend of the implicit integrator. 1 is implicit Euler, whose damping grows
             with the time step; values near 0.5 are second order and may jitter.
         buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings. Compression

@@ -27,6 +27,7 @@ class Elements:
 
     Attributes:
         node_count: n.
+        rest_position: (n,3) rest shape, m.
         triangle: (F,3) node indices.
         triangle_gradient: (F,3,2) g_i of each corner, 1/m, in an orthonormal frame of the triangle.
         triangle_area: (F,) rest area, m².
@@ -48,6 +49,7 @@ class Elements:
     """
 
     node_count: int
+    rest_position: FloatArray
     triangle: IntArray
     triangle_gradient: FloatArray
     triangle_area: FloatArray
@@ -109,6 +111,7 @@ def make_elements(
         edge_length = np.bincount(of_half.ravel(), sides) / np.bincount(of_half.ravel())
     return Elements(
         node_count=n,
+        rest_position=x,
         triangle=triangle,
         triangle_gradient=np.ascontiguousarray(gradient),
         triangle_area=area,

@@ -10,7 +10,7 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
-from drake_dress.models.cloth.layered import Integrator
+from drake_dress.models.cloth.layered import Integrator, LayeredCloth
 from drake_dress.models.cloth.state import ClothState
 
 
@@ -30,6 +30,8 @@ class ReleasableCloth:
         self._holding = make(held)
         self._free: Integrator | None = None
         inner = self._holding
+        # whether layers of the garment collide
+        self.has_layers = isinstance(inner, LayeredCloth)
         self.elements, self.material = inner.elements, inner.material
         self.time_step, self.held = inner.time_step, inner.held
         self.mass, self.gravity = inner.mass, inner.gravity

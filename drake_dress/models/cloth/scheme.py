@@ -10,6 +10,8 @@ from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitCloth, ImplicitSettings
 from drake_dress.models.cloth.layered import Integrator
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.mujoco.mujoco_cloth import MujocoCloth
+from drake_dress.models.cloth.mujoco.settings import MujocoSettings
 from drake_dress.models.cloth.projective.projective_dynamics import (
     ProjectiveDynamicsCloth,
     ProjectiveSettings,
@@ -27,14 +29,14 @@ class Scheme:
     Attributes:
         held: (k,) nodes whose motion is prescribed.
         time_step: duration of a step, s.
-        settings: settings of the linearly implicit scheme or of Projective Dynamics; their type
-            selects the scheme.
+        settings: settings of the linearly implicit scheme, of Projective Dynamics or of MuJoCo;
+            their type selects the scheme.
         damping: replaces the fabric's damping time, s; None keeps the fabric's.
     """
 
     held: IntArray
     time_step: float
-    settings: ImplicitSettings | ProjectiveSettings = ImplicitSettings()
+    settings: ImplicitSettings | ProjectiveSettings | MujocoSettings = ImplicitSettings()
     damping: float | None = None
 
     def __call__(
@@ -46,4 +48,6 @@ class Scheme:
         given = (elements, material, self.time_step, self.held, gravity, additions)
         if isinstance(self.settings, ProjectiveSettings):
             return ProjectiveDynamicsCloth(*given, self.settings)
+        if isinstance(self.settings, MujocoSettings):
+            return MujocoCloth(*given, self.settings)
         return ImplicitCloth(*given, self.settings)

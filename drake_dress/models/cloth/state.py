@@ -32,6 +32,8 @@ class ClothState:
             followed by 1 for each node that the factor leaves out.
         tangled: (n,) 1 for nodes of edges and triangles that pierce each other despite layer
             separation; 0 for the others.
+        acceleration: (n,3) mean acceleration over the last step, m/s²: the warm start of MuJoCo's
+            solver. Other schemes leave it at zero.
     """
 
     x: FloatArray
@@ -41,8 +43,11 @@ class ClothState:
     owner: IntArray
     solver: IntArray = field(default_factory=lambda: np.empty((2, 0), dtype=np.int32))
     tangled: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    acceleration: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
     def __post_init__(self) -> None:
+        if len(self.acceleration) == 0:
+            object.__setattr__(self, "acceleration", np.zeros((len(self.x), 3)))
         if len(self.tangled) == 0:
             object.__setattr__(self, "tangled", np.zeros(len(self.x), dtype=np.int32))
         if self.solver.shape[1] == 0:

@@ -1,0 +1,1 @@
+"""Dressings in another simulator's world."""

@@ -1,0 +1,1 @@
+"""The garment in MuJoCo: another simulator's cloth and contact behind the same interface."""

@@ -1,0 +1,84 @@
+"""Dressings in MuJoCo's world: which runs there are, and what is made of their results."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+from benchmarks.transfer.__main__ import WORLDS, Case, figures, main, run, tables
+from drake_dress.diagrams.scenario import apply_variation, load_scenario
+
+
+def result(world: str, seed: int, time: float | None, force: float = 8.0) -> dict[str, Any]:
+    return {
+        "case": asdict(Case(world, "dummy", "jacket", seed)),
+        "status": 0,
+        "summary": {
+            "success": time is not None,
+            "reason": None if time is not None else "left sleeve: off",
+            "dressing_time_s": time,
+            "max_gripper_force_N": 2.0 * force,
+            "max_penetration_m": 0.001 * (seed + 1),
+            "max_edge_strain": 0.1,
+            "realtime_factor": 0.25,
+            "wall_time_s": 240.0,
+        },
+        "force_p99": force,
+    }
+
+
+RESULTS = [
+    *(result("implicit", seed, 20.0 + seed, 6.0) for seed in range(4)),
+    *(result("mujoco", seed, 22.0 + seed if seed else None) for seed in range(4)),
+]
+
+
+def test_worlds_are_compared_seed_by_seed() -> None:
+    worlds, beside, reasons = tables(RESULTS)
+    assert [row[:3] for row in worlds.rows] == [["mujoco", 4, 3], ["implicit", 4, 4]]
+    assert worlds.rows[0][-4:] == [4.0, 0.1, 0.25, 240.0]
+    (row,) = beside.rows
+    # pairs, both, only mujoco, only implicit, neither; later by 2 s, and 2 N more
+    assert row[:5] == [4, 3, 0, 1, 0]
+    assert row[5].startswith("-2.00")
+    assert row[6].startswith("-2.00")
+    assert reasons.rows == [["mujoco", 0, "left sleeve: off"]]
+    assert not tables(RESULTS[:4])[1].rows
+
+
+def test_three_of_four_dressings_are_asked_in_the_other_world() -> None:
+    found = {f.name: f for f in figures(RESULTS)}
+    share = found["mujoco: runs dressed of 4"]
+    assert (share.value, share.asked, share.met) == (75.0, 75.0, True)
+    assert found["implicit: runs dressed of 4"].asked is None
+    assert found["mujoco: time to dress, median"].value == 24.0
+    worse = figures([*RESULTS, result("mujoco", 9, None)])
+    assert not {f.name: f for f in worse}["mujoco: runs dressed of 5"].met
+
+
+def test_runs_differ_in_the_world_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+
+    def kept(
+        case: Case, scenario: Any, keep: Any, settings: list[str], seed: int, look: Any
+    ) -> Any:
+        given[case.world] = apply_variation(load_scenario(scenario, settings, seed))
+        return {}
+
+    monkeypatch.setattr("benchmarks.transfer.__main__.run_case", kept)
+    for world in WORLDS:
+        run(Case(world, "dummy", "jacket", 1234), None, ["duration=5"])
+    other, own = given["mujoco"], given["implicit"]
+    assert (other.plant.integrator, own.plant.integrator) == ("mujoco", "implicit")
+    other.plant.integrator = "implicit"
+    assert other == own
+    assert own.duration == 5.0
+
+
+def test_wrong_names_are_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--worlds", "newton"])
+    assert ended.value.code == 2
+    assert "newton" in capsys.readouterr().err
