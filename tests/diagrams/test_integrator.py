@@ -58,5 +58,5 @@ def test_explain_refuses_mujoco() -> None:
 def test_limbs_that_taper_are_refused_by_mujoco_alone() -> None:
     tapered = body_capsules(BodyMeasures(elbow_radius=0.04), "standing")
     check_integrator("my.yaml", "implicit", [], tapered)
-    with pytest.raises(UserError, match="my.yaml: person.measures: has limbs that taper"):
+    with pytest.raises(UserError, match=r"person\.measures: has limbs that taper"):
         check_integrator("my.yaml", "mujoco", [], tapered)
