@@ -92,10 +92,6 @@ def make_elements(
     single = _apart(x, triangle, corners)
     gradient, double_area = _shape_gradients(single)
     area = 0.5 * double_area
-    node_area = np.zeros(n)
-    for corner in range(3):
-        np.add.at(node_area, triangle[:, corner], area / 3.0)
-
     hinge, hinge_faces = _hinges(triangle)
     at_rest = x[hinge] if corners is None else _unfolded(single, triangle, hinge, hinge_faces)
     coefficient = _hinge_coefficients(at_rest)
@@ -119,7 +115,7 @@ def make_elements(
         hinge_coefficient=coefficient,
         hinge_weight=weight,
         hinge_rest=rest,
-        node_area=node_area,
+        node_area=_node_areas(triangle, area, n),
         edge=edge,
         edge_rest_length=edge_length,
         triangle_lanes=in_lanes(triangle.astype(np.uint32)),
@@ -127,6 +123,14 @@ def make_elements(
         hinge_lanes=in_lanes(hinge.astype(np.uint32)),
         bend_lanes=in_lanes(np.column_stack([coefficient, weight, rest])),
     )
+
+
+def _node_areas(triangle: IntArray, area: FloatArray, n: int) -> FloatArray:
+    """Returns the area (n,) of each node, m²: a third of each of its triangles."""
+    areas = np.zeros(n)
+    for corner in range(3):
+        np.add.at(areas, triangle[:, corner], area / 3.0)
+    return areas
 
 
 def _apart(x: FloatArray, triangle: IntArray, corners: FloatArray | None) -> FloatArray:
