@@ -36,6 +36,7 @@ from drake_dress.models.dressing.stages import StageState, Task
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.nape import find_nape
 from drake_dress.models.human.heading import headings
+from drake_dress.models.human.neck import distance_to_nape, nape
 from drake_dress.models.immutable import Immutable
 from drake_dress.models.sides import SIDES
 
@@ -234,10 +235,18 @@ class DressingPolicy:
         """Returns how far the coat is laid and let go."""
         if self._collar is None:
             return state.finish
-        place = collar_target(self.person, self._collar, self._margin, joints, self.planner.toward)
-        off = float(np.linalg.norm(self._collar.at(x) - place))
+        toward, collar = self.planner.toward, self._collar.at(x)
+        place = collar_target(self.person, self._collar, self._margin, joints, toward)
+        ends = nape(joints, self.person.shoulder_radius, self.person.neck_radius, toward(joints))
         return advance_finish(
-            state.finish, stages.stage, assignment.facts, off, are_open, self.finish, time
+            state.finish,
+            stages.stage,
+            assignment.facts,
+            float(np.linalg.norm(collar - place)),
+            distance_to_nape(collar, ends),
+            are_open,
+            self.finish,
+            time,
         )
 
     def _planned(

@@ -36,8 +36,8 @@ class FinishParameters:
     Attributes:
         release: whether the coat is laid and let go. If not, the grippers hold it in the end.
         laid_distance: distance of the collar from its place below which the coat is laid, m.
-        open_distance: greatest distance at which the grippers open if the collar comes no nearer,
-            m.
+        open_distance: greatest distance of the collar from the nape at which the grippers open if
+            the collar comes no nearer to its place, m. A high collar may lie higher on the nape.
         stall_time: time without progress after which the collar counts as coming no nearer, s.
         stall_progress: approach of the collar that counts as progress, m.
         least_time: shortest time for which the coat is laid, s. The person lowers the arms
@@ -94,6 +94,7 @@ def advance_finish(
     stages: tuple[Stage, Stage],
     facts: tuple[SleeveFacts, SleeveFacts],
     off: float,
+    from_nape: float,
     are_open: bool,
     parameters: FinishParameters,
     time: float,
@@ -105,6 +106,7 @@ def advance_finish(
         stages: of left and right sleeve.
         facts: of left and right sleeve.
         off: distance of the collar from its place, m.
+        from_nape: distance of the collar from the nearest point of the nape, m.
         are_open: whether both grippers have opened.
         parameters: settings.
         time: current time, s.
@@ -127,6 +129,6 @@ def advance_finish(
     if time - state.begun < p.least_time:
         return state
     stalled = time - state.since > p.stall_time
-    if off < p.laid_distance or (stalled and off < p.open_distance):
+    if off < p.laid_distance or (stalled and from_nape < p.open_distance):
         return replace(state, phase=Phase.LAID)
     return state

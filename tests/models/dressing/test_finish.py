@@ -28,14 +28,14 @@ def laid(
     """Returns the state after the collar had these distances, m, at successive times."""
     state = FinishState()
     for k, off in enumerate(offs):
-        state = advance_finish(state, DONE, (ON, ON), off, are_open, p, k * period)
+        state = advance_finish(state, DONE, (ON, ON), off, off, are_open, p, k * period)
     return state
 
 
 @pytest.mark.parametrize("stage", [Stage.PREPARE, Stage.DRESS])
 def test_nothing_is_laid_before_both_sleeves_are_done(stage: Stage) -> None:
     for stages in ((stage, Stage.DONE), (Stage.DONE, stage)):
-        state = advance_finish(FinishState(), stages, (ON, ON), 0.0, False, P, 1.0)
+        state = advance_finish(FinishState(), stages, (ON, ON), 0.0, 0.0, False, P, 1.0)
         assert state == FinishState()
         assert state.stages(stages) == stages
 
@@ -61,13 +61,20 @@ def test_a_collar_that_comes_no_nearer_is_let_go_only_near_the_nape() -> None:
     assert laid(coming).phase == Phase.LAYING, "it still comes nearer"
 
 
+def test_a_collar_that_lies_high_on_the_nape_is_let_go_as_well() -> None:
+    state = FinishState()
+    for k in range(20):
+        state = advance_finish(state, DONE, (ON, ON), 0.06, 0.01, False, P, 0.5 * k)
+    assert state.phase == Phase.LAID
+
+
 def test_grippers_that_have_opened_do_not_close() -> None:
     state = laid([0.0] * 12)
-    state = advance_finish(state, DONE, (ON, ON), 0.0, True, P, 7.0)
+    state = advance_finish(state, DONE, (ON, ON), 0.0, 0.0, True, P, 7.0)
     assert state.phase == Phase.RELEASED
     assert state.since == 7.0
     assert state.stages(DONE) == (4, 4)
-    after = advance_finish(state, (Stage.PREPARE, Stage.DRESS), (OFF, ON), 1.0, True, P, 8.0)
+    after = advance_finish(state, (Stage.PREPARE, Stage.DRESS), (OFF, ON), 1.0, 1.0, True, P, 8.0)
     assert after == state
 
 
@@ -76,7 +83,7 @@ def test_a_sleeve_that_is_lost_is_dressed_again(side: int, s: float, linked: boo
     lost = replace(ON, s=s, linked=linked)
     for state in (laid([0.1] * 3), laid([0.0] * 12)):
         facts = (lost, ON) if side == 0 else (ON, lost)
-        assert advance_finish(state, DONE, facts, 0.0, False, P, 9.0) == FinishState()
+        assert advance_finish(state, DONE, facts, 0.0, 0.0, False, P, 9.0) == FinishState()
 
 
 def test_without_release_the_coat_is_held() -> None:
