@@ -36,6 +36,7 @@ SCENARIOS = (
     "passive_standing",
     "passive_sitting",
     "active_standing",
+    "gown_front",
     "lab",
 )
 METHODS = ("global", "full")

@@ -81,7 +81,10 @@ def check_fit(setup: Setup) -> None:
         mesh = read_whole(garment.mesh, setup.source.parent).mesh()
     girths = person_girths(setup.station.measures)
     fit = judge(garment_sizes(mesh, setup.garments.belief), girths)
+    from_front = setup.scenario.station.side == "front"
     for finding in (*fit.impossible, *fit.reasons):
+        if finding.level == "unknown" and from_front:
+            continue
         more = len(fit.reasons) - 1
         others = f" ({more} more)" if more else ""
         message = f"{finding.text}{others}; {_HINT}"

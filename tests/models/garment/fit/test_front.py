@@ -30,10 +30,10 @@ def turned_about(mesh: GarmentMesh) -> GarmentMesh:
 
 @pytest.mark.parametrize("spacing", [0.025, 0.06])
 @pytest.mark.parametrize("preset", COATS)
-def test_every_coat_opens_in_front(preset: str, spacing: float) -> None:
+def test_every_coat_opens_where_it_was_cut(preset: str, spacing: float) -> None:
     mesh = make_coat(COATS[preset], spacing)
     found = find_openings(mesh)
-    assert found.opening == "front"
+    assert found.opening == COATS[preset].opens
     assert list(found.loops) == ["rim"]
     # with the cuffs, that is the whole border
     named = sum(len(loop) for loop in found.loops.values())

@@ -30,7 +30,7 @@ def lengths(sizes: GarmentSizes) -> dict[str, Any]:
     return found | dict(zip("least median most".split(), sizes.edges, strict=True))
 
 
-@pytest.mark.parametrize("preset", COATS)
+@pytest.mark.parametrize("preset", ["jacket", "overcoat"])
 @pytest.mark.parametrize("spacing", [0.03, 0.05])
 def test_measures_are_those_of_the_pattern(preset: str, spacing: float) -> None:
     p: CoatParameters = COATS[preset]
