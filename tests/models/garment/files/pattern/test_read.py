@@ -41,7 +41,17 @@ def test_a_worn_coat_keeps_its_panels_sizes_and_has_the_openings_of_a_coat(
     # all cloth is there: two fronts, the back and four half sleeves
     a, b, c = (x[mesh.faces[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    assert area == pytest.approx(0.806, rel=0.02)
+    # curved edges take 1 % of the panels' polygons
+    assert area == pytest.approx(polygons(), rel=0.02)
+
+
+def polygons() -> float:
+    """Returns the area of the panels with straight edges, m²."""
+    total = 0.0
+    for panel in small_coat()["pattern"]["panels"].values():
+        x, y = np.array(panel["vertices"]).T
+        total += 0.5 * abs(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+    return 1e-4 * total
 
 
 def tube() -> bytes:
