@@ -51,6 +51,8 @@ def write_report(
 def _page(log: RunLog, summary: dict[str, Any], m: Measures, rules: SuccessRules) -> str:
     success = bool(summary.get("success"))
     verdict = "Both sleeves are on" if success else "The dressing failed"
+    if success and summary.get("stays_on"):
+        verdict = "Both sleeves are on, and stay on"
     detail = (
         f"after {_figure(summary.get('dressing_time_s'), '{:.1f} s')} of simulated time"
         if success
@@ -142,9 +144,12 @@ def _sleeve_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
     """Returns the progress of each sleeve, and whether the arm and hand are through it."""
     rows = []
     for side in SIDES:
-        s = summary.get(f"s_{side}")
+        s = summary.get(f"s_dressed_{side}")
         met = s is not None and s >= rules.min_s
         rows.append(_Row(f"progress s, {side}", f"≥ {rules.min_s:g}", _figure(s, "{:.2f}"), met))
+    if summary.get("stays_on") is not None:
+        rows += _release_rows(summary, rules)
+    for side in SIDES:
         far = _figure(summary.get(f"armhole_to_shoulder_{side}_m"), "{:.1f} cm", 100.0)
         rows.append(_Row(f"{side} armhole to shoulder, along the arm", "", far, None))
     for side in SIDES:
@@ -155,6 +160,24 @@ def _sleeve_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
     for side in SIDES:
         through = bool(summary.get(f"hand_through_cuff_{side}"))
         rows.append(_Row(f"{side} hand through the cuff", "", "yes" if through else "no", None))
+    return rows
+
+
+def _release_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
+    """Returns whether the coat stays on once the grippers have let go."""
+    rows, after = [], rules.release
+    for side in SIDES:
+        s = summary.get(f"s_{side}")
+        met = s is not None and s >= after.min_s
+        name = f"progress s after the release, {side}"
+        rows.append(_Row(name, f"≥ {after.min_s:g}", _figure(s, "{:.2f}"), met))
+    stays = bool(summary["stays_on"])
+    rows.append(_Row("the coat stays on", "yes", "yes" if stays else "no", stays))
+    far = summary.get("collar_to_neck_m")
+    most = after.max_collar_to_neck
+    met = far is not None and far <= most
+    shown = _figure(far, "{:.1f} cm", 100.0)
+    rows.append(_Row("collar to neck", f"≤ {100.0 * most:g} cm", shown, met))
     return rows
 
 

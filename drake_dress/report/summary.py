@@ -66,7 +66,8 @@ def summarize(
     over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` is the
     strain of the worst edge at its worst sample. `max_contact_force_N` is the largest force at one
     node, `max_total_contact_force_N` the largest sum over the nodes. `dressing_time_s` is the first
-    time from which both sleeves stay on (s and linking number) until the coat is laid. `stays_on`
+    time from which both sleeves stay on (s and linking number) until the coat is laid, and
+    `s_dressed_left`, `…_right` are the progress then; both are final if it is not laid. `stays_on`
     is whether both are still on 3 s after the grippers have let go, None if they have not.
     `collar_to_neck_m` is the final distance of the collar's back from the nape. `late_plans` is the
     share of the global controller's solves that took longer than the modelled delay.
@@ -92,7 +93,7 @@ def summarize(
     release = judge_release(log, m, rules.release)
     reason = _reason(log, m, release, rules) or _arm_reason(log, arms, rules)
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
-    summary |= _sleeve_figures(log, m)
+    summary |= _sleeve_figures(log, m, release.held)
     summary["stays_on"] = release.stays_on
     summary["collar_to_neck_m"] = release.collar_to_neck
     summary |= _course_figures(log, m, release.held, rules, wall_time)
@@ -197,11 +198,13 @@ def _damage(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     return None
 
 
-def _sleeve_figures(log: RunLog, m: Measures) -> dict[str, Any]:
-    """Returns the final progress of each sleeve."""
+def _sleeve_figures(log: RunLog, m: Measures, held: int) -> dict[str, Any]:
+    """Returns the progress of each sleeve: final, and when the coat began to be laid."""
     figures: dict[str, Any] = {}
     for side in SIDES:
         figures[f"s_{side}"] = _number(log.dressing[side][-1, 0]) if len(log) else None
+        dressed = _number(log.dressing[side][max(held, 1) - 1, 0]) if len(log) else None
+        figures[f"s_dressed_{side}"] = dressed
         figures[f"armhole_to_shoulder_{side}_m"] = _to_shoulder(log, side)
     for k, side in enumerate(SIDES):
         figures[f"arm_inside_{side}"] = bool(len(log)) and abs(int(m.linking[-1, k])) == 1

@@ -68,6 +68,7 @@ def test_sleeves_that_sink_on_the_shoulders_stay_on(summary_of: SummaryOf) -> No
     assert summary["stays_on"] is True
     assert summary["success"] is True, summary["reason"]
     assert summary["s_left"] == 1.75
+    assert summary["s_dressed_left"] == 2.0
     assert summary["dressing_time_s"] == 0.0
 
 
