@@ -310,7 +310,7 @@ BAD_MESHES = {
         ["a.obj", "manifold"],
     ),
     "wrong unit": ("a.obj", _obj(SQUARE, ["1 2 3", "1 3 4"]), "mm", ["a.obj", "unit"]),
-    "no sleeves": ("a.obj", _obj(SQUARE, ["1 2 3", "1 3 4"]), "m", ["a.obj", "loop"]),
+    "flat piece": ("a.obj", _obj(SQUARE, ["1 2 3", "1 3 4"]), "m", ["a.obj", "flat"]),
 }
 
 

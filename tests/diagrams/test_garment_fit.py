@@ -47,7 +47,13 @@ def check(*settings: str, source: Path = DUMMY) -> None:
 
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_shipped_scenarios_fit(path: Path) -> None:
-    fit = fit_of(apply_variation(load_scenario(path)))
+    scenario = load_scenario(path)
+    fit = fit_of(apply_variation(scenario))
+    # a gown that is put on from the front is not judged yet
+    if scenario.station.side == "front":
+        assert fit.fits is None
+        assert {finding.level for finding in fit.reasons} <= {"unknown"}
+        return
     assert fit.fits is True
     assert fit.reasons == ()
 
