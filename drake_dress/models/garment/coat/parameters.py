@@ -76,15 +76,15 @@ class CoatParameters:
     hem_girth: float | None = None
     hem_opening: float | None = None
     elbow_girth: float | None = None
+    collar: str = "stand"
     neck_depth: float | None = None
     nape_depth: float | None = None
     lapel_width: float | None = None
     lapel_depth: float | None = None
+    opens: str = "front"
     vent_length: float | None = None
     hood_height: float | None = None
     sleeve_slope_deg: float | None = None
-    collar: str = "stand"
-    opens: str = "front"
 
     @property
     def lengths(self) -> dict[str, float]:
