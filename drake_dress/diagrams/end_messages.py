@@ -94,17 +94,15 @@ def export_release(
     for side in SIDES:
         command = builder.AddNamedSystem(f"{side}_gripper_command", SchunkWsgCommandSender())
         builder.Connect(position.get_output_port(), command.GetInputPort("position"))
-        publisher = builder.AddNamedSystem(
+        message = command.get_output_port()
+        _publish(
+            builder,
+            bus,
             f"{side}_gripper_publisher",
-            LcmPublisherSystem.Make(
-                channel=commands[side],
-                lcm_type=lcmt_schunk_wsg_command,
-                lcm=bus,
-                publish_period=1.0 / _RATE,
-                use_cpp_serializer=True,
-            ),
+            commands[side],
+            lcmt_schunk_wsg_command,
+            message,
         )
-        builder.Connect(command.get_output_port(), publisher.get_input_port())
         inbox = _subscribed(
             builder, bus, f"{side}_gripper_messages", statuses[side], decoders[side]
         )
@@ -165,17 +163,15 @@ def send_gripper_status(
         status = builder.AddNamedSystem(f"{side}_gripper_status", SchunkWsgStatusSender())
         builder.Connect(state.get_output_port(), status.get_input_port(0))
         builder.Connect(no_force.get_output_port(), status.get_input_port(1))
-        publisher = builder.AddNamedSystem(
+        message = status.get_output_port()
+        _publish(
+            builder,
+            bus,
             f"{side}_gripper_publisher",
-            LcmPublisherSystem.Make(
-                channel=channels[side],
-                lcm_type=lcmt_schunk_wsg_status,
-                lcm=bus,
-                publish_period=1.0 / _RATE,
-                use_cpp_serializer=True,
-            ),
+            channels[side],
+            lcmt_schunk_wsg_status,
+            message,
         )
-        builder.Connect(status.get_output_port(), publisher.get_input_port())
 
 
 def export_cue(builder: DiagramBuilder, bus: LcmInterfaceSystem, channel: str) -> None:
@@ -203,6 +199,28 @@ def receive_cue(
     receiver = builder.AddNamedSystem("cue", CueReceiver())
     builder.Connect(inbox.get_output_port(), receiver.get_input_port())
     builder.Connect(receiver.get_output_port(), cue)
+
+
+def _publish(
+    builder: DiagramBuilder,
+    bus: LcmInterfaceSystem,
+    name: str,
+    channel: str,
+    lcm_type: Any,
+    message: OutputPort,
+) -> None:
+    """Adds a publisher of a C++ message."""
+    publisher = builder.AddNamedSystem(
+        name,
+        LcmPublisherSystem.Make(
+            channel=channel,
+            lcm_type=lcm_type,
+            lcm=bus,
+            publish_period=1.0 / _RATE,
+            use_cpp_serializer=True,
+        ),
+    )
+    builder.Connect(message, publisher.get_input_port())
 
 
 def _subscribed(

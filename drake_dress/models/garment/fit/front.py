@@ -8,16 +8,14 @@ neck and another for the hem.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from drake_dress.models.arrays import IntArray
 from drake_dress.models.garment.edges import boundary_loops
+from drake_dress.models.garment.front import Opening
 from drake_dress.models.garment.mesh import REGION_NAMES, GarmentMesh
 from drake_dress.models.sides import SIDES
-
-Opening = Literal["front", "back", "closed"]
 
 # Shares of the distance between underarm and shoulder, and between hem and underarm: a loop that
 # reaches higher than the first contains the collar, one that reaches lower than the second the hem.

@@ -9,8 +9,9 @@ from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 from scipy.spatial import cKDTree
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.garment.fit.front import Opening, find_openings, underarm
+from drake_dress.models.garment.fit.front import find_openings, underarm
 from drake_dress.models.garment.fit.section import cloth_around, front_gap
+from drake_dress.models.garment.front import Opening
 from drake_dress.models.garment.mesh import (
     LOOP_NAMES,
     REGION_NAMES,
