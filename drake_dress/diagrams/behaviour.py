@@ -1,7 +1,7 @@
 """The person's behaviour: arms on springs, arms that follow the garment, or motions of its own.
 
     PassivePerson | ActivePerson ──set-point──▶ ArmMuscles ──┐
-                       dummy: constant tone ────────────────┴▶ (+ HandTremor, ArmStirring) ──▶ plant
+                       dummy: constant tone ────────────────┴▶ (+ tremor, spasm, stirring) ──▶ plant
     ActivePerson | zeros ──intent──▶ log
 
 The controller receives none of this.
@@ -24,12 +24,14 @@ from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.arm import Arms
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Turn
+from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.human.stirring import DRIVE, StirringParameters
 from drake_dress.models.human.tremor import TremorParameters, driving_torque, tremor_torque
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.active_person import ActivePerson
 from drake_dress.systems.arm_lowering import ArmLowering
 from drake_dress.systems.arm_muscles import ArmMuscles
+from drake_dress.systems.arm_spasm import ArmSpasm
 from drake_dress.systems.arm_stirring import ArmStirring
 from drake_dress.systems.hand_tremor import HandTremor
 from drake_dress.systems.passive_person import PassivePerson
@@ -49,7 +51,8 @@ class Behaviour:
         active: parameters of passive and active persons; a passive one only uses `following`.
         motions: of an active person.
         tremor: of any kind of person; None for steady hands.
-        seed: of the tremor.
+        spasm: of any kind of person; None for an arm without.
+        seed: of tremor and spasms.
         lowering: of the arms once both sleeves are on. A dummy's arms are lowered by somebody.
         stirring: small motions once the coat is let go.
     """
@@ -58,6 +61,7 @@ class Behaviour:
     active: ActiveParameters = field(default_factory=ActiveParameters)
     motions: tuple[Motion, ...] = ()
     tremor: TremorParameters | None = None
+    spasm: SpasmParameters | None = None
     seed: int = 0
     lowering: Lowering = Lowering()
     stirring: StirringParameters = StirringParameters()
@@ -98,6 +102,7 @@ def add_behaviour(
     lowering = None
     if behaviour.lowering.duration > 0.0:
         pose = np.clip(angles_of(behaviour.lowering.pose), *np.moveaxis(arms.limits, 1, 0))
+        pose = np.where(np.array(arms.has_tone)[:, None], pose, arms.rest)
         lowering = builder.AddNamedSystem(
             "arm_lowering", ArmLowering(pose, behaviour.lowering.duration, plant.time_step())
         )
@@ -112,6 +117,11 @@ def add_behaviour(
         )
     if behaviour.tremor is not None and behaviour.tremor.amplitude > 0.0:
         force = _trembling(builder, plant, person, arms, behaviour, force)
+    if behaviour.spasm is not None and behaviour.spasm.torque > 0.0:
+        dofs = person.arm_dofs(plant)
+        spasm = ArmSpasm(behaviour.spasm, behaviour.seed, plant.num_velocities(), dofs)
+        builder.AddNamedSystem("arm_spasm", spasm)
+        force = _added(builder, force, spasm.get_output_port())
     if behaviour.stirring.amplitude > 0.0:
         force = _stirring(builder, plant, person, arms, behaviour.stirring, force, grippers_open)
     builder.Connect(force, plant.get_applied_generalized_force_input_port())
@@ -213,11 +223,14 @@ def _trembling(
 ) -> OutputPort:
     """Returns `force` with the tremor's torques added."""
     assert behaviour.tremor is not None
-    torque = [tremor_torque(behaviour.tremor, *of_arm) for of_arm in _swinging(plant, person, arms)]
+    torque = _of_muscles(
+        arms,
+        [tremor_torque(behaviour.tremor, *of_arm) for of_arm in _swinging(plant, person, arms)],
+    )
     tremor = builder.AddNamedSystem(
         "hand_tremor",
         HandTremor(
-            np.concatenate(torque),
+            torque,
             behaviour.tremor.frequency,
             behaviour.seed,
             plant.num_velocities(),
@@ -237,14 +250,17 @@ def _stirring(
     grippers_open: OutputPort,
 ) -> OutputPort:
     """Returns `force` with the torques added by which a dressed person stirs."""
-    torque = [
-        driving_torque(DRIVE, p.amplitude, p.frequency, *of_arm)
-        for of_arm in _swinging(plant, person, arms)
-    ]
+    torque = _of_muscles(
+        arms,
+        [
+            driving_torque(DRIVE, p.amplitude, p.frequency, *of_arm)
+            for of_arm in _swinging(plant, person, arms)
+        ],
+    )
     stirring = builder.AddNamedSystem(
         "arm_stirring",
         ArmStirring(
-            np.concatenate(torque),
+            torque,
             p.frequency,
             plant.num_velocities(),
             person.arm_dofs(plant),
@@ -253,6 +269,11 @@ def _stirring(
     )
     builder.Connect(grippers_open, stirring.get_input_port())
     return _added(builder, force, stirring.get_output_port())
+
+
+def _of_muscles(arms: Arms, torque: list[FloatArray]) -> FloatArray:
+    """Returns torques of both arms (8,) without those of an arm that has no muscle tone, N·m."""
+    return np.concatenate([own * works for own, works in zip(torque, arms.has_tone, strict=True)])
 
 
 def _swinging(
@@ -264,8 +285,8 @@ def _swinging(
     found = []
     for i, arm in enumerate(arms.arms):
         mine, rest = dofs[4 * i : 4 * i + 4], arms.rest[i]
-        stiffness = np.diag(arms.stiffness) + arm.gravity_stiffness(rest)
-        found.append((mass[np.ix_(mine, mine)], arms.damping, stiffness, arm.jacobian(rest)))
+        stiffness = np.diag(arms.stiffness[i]) + arm.gravity_stiffness(rest)
+        found.append((mass[np.ix_(mine, mine)], arms.damping[i], stiffness, arm.jacobian(rest)))
     return found
 
 

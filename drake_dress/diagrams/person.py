@@ -13,7 +13,7 @@ exceeds the negative stiffness of the arm's weight (up to 7.6 N·m/rad for the m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -45,55 +45,15 @@ from drake_dress.models.human.body import (
     capsule_arrays,
     shoulder_joint,
 )
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.shapes import limb_shape
 
-Limits = tuple[float, float]
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
 # Stance, N·m/rad and N·m·s/rad: a coat that pulls at one side of the chest with 20 N turns the
 # person by less than a degree; critically damped with the torso's inertia.
 _STANCE_STIFFNESS, _STANCE_DAMPING = 300.0, 40.0
-
-
-@dataclass(frozen=True)
-class JointParameters:
-    """Stiffness, damping and limits of the arms' joints, the same for both arms.
-
-    Attributes:
-        shoulder_stiffness: of each of the shoulder's three hinges, N·m/rad.
-        shoulder_damping: of each of these hinges, N·m·s/rad.
-        elbow_stiffness: N·m/rad.
-        elbow_damping: N·m·s/rad.
-        abduction_limits: smallest and largest angle, rad; the limits below likewise.
-        extension_limits: backward is positive.
-        rotation_limits: outward is positive.
-        elbow_limits: of its flexion.
-
-    Raises:
-        UserError: stiffness or damping is negative or not finite, or limits are not two finite
-            angles in ascending order.
-    """
-
-    shoulder_stiffness: float = 6.0
-    shoulder_damping: float = 3.0
-    elbow_stiffness: float = 3.6
-    elbow_damping: float = 1.2
-    abduction_limits: Limits = (-0.6, 2.6)
-    extension_limits: Limits = (-2.6, 1.2)
-    rotation_limits: Limits = (-1.2, 1.2)
-    elbow_limits: Limits = (0.0, 2.5)
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name.endswith("_limits"):
-                expected = _expected_of_limits(value)
-            else:
-                good = _is_number(value) and value >= 0.0
-                expected = None if good else "a finite number, 0 or more"
-            if expected is not None:
-                raise UserError("person.joints", field.name, f"is {value!r}, expected {expected}")
 
 
 @dataclass(frozen=True)
@@ -177,7 +137,7 @@ def add_person(
         measures: body sizes and masses.
         posture: standing or sitting.
         arms: rest pose of each arm. An angle beyond a limit is kept, and the limit moved to it.
-        joints: stiffness, damping and limits.
+        joints: stiffness, damping and limits, by side.
         position: of the torso on the floor; the origin when None.
         turns: whether the torso turns about the vertical; else it is welded to the world.
 
@@ -196,7 +156,7 @@ def add_person(
     points: list[tuple[int, FloatArray]] = []
     for side in SIDES:
         own = measures.of(side)
-        upper, fore = _add_arm(plant, model, torso, own, posture, side, arms[side], joints)
+        upper, fore = _add_arm(plant, model, torso, own, posture, side, arms[side], joints.of(side))
         bodies[f"{side}_upper_arm"], bodies[f"{side}_forearm"] = upper, fore
         hand = np.array([0.0, 0.0, -own.forearm_length])
         points += [
@@ -239,24 +199,33 @@ def person_arms(
 ) -> Arms:
     """Returns the model of both arms that `add_person` makes from the same values."""
     rest = np.array([angles_of(arms[side]) for side in SIDES])
-    limits = np.array([getattr(joints, f"{name}_limits") for name in JOINT_NAMES]).T
+    own = [joints.of(side) for side in SIDES]
     left, right = (Arm(measures, posture, side) for side in SIDES)
     return Arms(
         (left, right),
         rest,
-        np.stack([[np.minimum(limits[0], r), np.maximum(limits[1], r)] for r in rest]),
-        np.array([joints.shoulder_stiffness] * 3 + [joints.elbow_stiffness]),
-        np.array([joints.shoulder_damping] * 3 + [joints.elbow_damping]),
+        np.stack(
+            [
+                [np.minimum(j.limits[0], r), np.maximum(j.limits[1], r)]
+                for j, r in zip(own, rest, strict=True)
+            ]
+        ),
+        np.stack([j.stiffness for j in own]),
+        np.stack([j.damping for j in own]),
+        (own[0].tone > 0.0, own[1].tone > 0.0),
     )
 
 
-def person_model(body: BodyMeasures, stance: Posture, person: Person) -> PersonModel:
-    """Returns the controllers' model of a person: capsules, shoulders and limb radii."""
+def person_model(
+    body: BodyMeasures, stance: Posture, person: Person, arms: Arms | None = None
+) -> PersonModel:
+    """Returns the controllers' model of a person: capsules, shoulders, limb radii and arms."""
     of_arms = [c for c in person.capsules if c.body != "torso"]
     return PersonModel(
         capsules=person.capsules,
         shoulders=np.stack([shoulder_joint(body, stance, side) for side in SIDES]),
         radius=capsule_arrays(of_arms)[2].reshape(2, 3, 2),
+        arms=arms,
     )
 
 
@@ -369,18 +338,3 @@ def joint_positions(plant: MultibodyPlant, context: Context, person: Person) -> 
             for body, p in person.joint_points
         ]
     )
-
-
-def _is_number(value: object) -> bool:
-    return (
-        isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
-    )
-
-
-def _expected_of_limits(value: object) -> str | None:
-    """Returns what was expected instead of `value`; None if it is a valid pair of limits."""
-    if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(_is_number, value)):
-        return "two finite angles in rad"
-    if value[0] >= value[1]:
-        return "lower before upper, rad"
-    return None

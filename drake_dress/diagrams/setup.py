@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drake_dress.diagrams.garment import build_garment, check_opening
 from drake_dress.diagrams.integrator import check_integrator
-from drake_dress.diagrams.person import Person, person_model
+from drake_dress.diagrams.person import Person, person_arms, person_model
 from drake_dress.diagrams.planning import Rates
 from drake_dress.diagrams.prediction import Predictor
 from drake_dress.diagrams.scenario import Scenario
@@ -70,12 +70,13 @@ class Setup:
             person: as added to a plant.
             costs: the user's own, in addition to those that the scenario lists.
         """
-        controller = self.scenario.controller
+        controller, s = self.scenario.controller, self.station
+        arms = person_arms(s.measures, s.posture, s.arms, s.joints)
         in_real_time = self.scenario.station.kind == "hardware"
         return controller_policy(
             controller,
             self.garments.belief,
-            person_model(self.station.measures, self.station.posture, person),
+            person_model(s.measures, s.posture, person, arms),
             solve_budget(controller.global_mpc, in_real_time),
             costs,
             self.station.in_front,

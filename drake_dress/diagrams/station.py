@@ -65,7 +65,6 @@ from drake_dress.diagrams.cameras import Camera, export_cameras
 from drake_dress.diagrams.oracles import export_oracles
 from drake_dress.diagrams.panda_driver import SimPandaDriver
 from drake_dress.diagrams.person import (
-    JointParameters,
     Person,
     add_person,
     person_arms,
@@ -101,6 +100,7 @@ from drake_dress.models.human.body import (
     arm_points,
     shoulder_height,
 )
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_measurement import ArmMeasurement

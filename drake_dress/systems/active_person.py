@@ -67,9 +67,10 @@ class ActivePerson(LeafSystem):
         self._loops = [np.asarray(mesh.loops[f"{side}_armhole"]) for side in SIDES]
         self._signs = [float(loop_orientation(mesh, side)) for side in SIDES]
         self._turns = tuple(m for m in motions if isinstance(m, Turn))
+        self._has_tone = arms.has_tone
         self._period = period
         self._arms = [
-            ActiveArm(arm, arms.rest[i], arms.limits[i], arms.stiffness, motions, parameters)
+            ActiveArm(arm, arms.rest[i], arms.limits[i], arms.stiffness[i], motions, parameters)
             for i, arm in enumerate(arms.arms)
         ]
         self._states = [self.DeclareDiscreteState(arm.initial_state().flat()) for arm in self._arms]
@@ -89,6 +90,8 @@ class ActivePerson(LeafSystem):
         yaw = 0.0 if self._yaw_dof is None else float(joints[self._yaw_dof])
         angles = joints[self._dofs].reshape(2, 4)
         for i, index in enumerate(self._states):
+            if not self._has_tone[i]:
+                continue
             active = self._arms[i]
             armhole = find_armhole(
                 x[self._loops[i]], self._signs[i], active.arm, angles[i], yaw, self._origin
@@ -110,4 +113,6 @@ class ActivePerson(LeafSystem):
     def _calc_intent(self, context: Context, output: BasicVector) -> None:
         for i, index in enumerate(self._states):
             state = ArmState.of(context.get_discrete_state(index).value())
+            if not self._has_tone[i]:
+                continue
             output[i] = float(self._arms[i].has_intent(state, context.get_time()))

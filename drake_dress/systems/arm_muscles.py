@@ -48,6 +48,6 @@ class ArmMuscles(LeafSystem):
         force = np.zeros(self._count)
         for i, arm in enumerate(a.arms):
             force[self._index[4 * i : 4 * i + 4]] = muscle_torque(
-                arm, set_point[i], rate[i], a.rest[i], a.stiffness, a.damping
+                arm, set_point[i], rate[i], a.rest[i], a.stiffness[i], a.damping[i]
             )
         output.SetFromVector(force)

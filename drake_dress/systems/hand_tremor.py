@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from drake_dress.models.human.tremor import TremorWave
+from drake_dress.systems.arm_torque import ArmTorque
 
 
-class HandTremor(LeafSystem):
+class HandTremor(ArmTorque):
     """Applies tremor torques to both arms, independently; see `models/human/tremor.py`.
 
     .. pydrake_system::
@@ -36,17 +36,6 @@ class HandTremor(LeafSystem):
         velocity_count: int,
         velocity_index: np.ndarray,
     ) -> None:
-        super().__init__()
         rng = np.random.default_rng(seed)
-        self._waves = [TremorWave(frequency, rng) for _ in range(2)]
-        self._torque = np.asarray(torque)
-        self._count, self._index = velocity_count, np.asarray(velocity_index)
-        self.DeclareVectorOutputPort(
-            "generalized_force", velocity_count, self._calc, {self.time_ticket()}
-        )
-
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        time = context.get_time()
-        force = np.zeros(self._count)
-        force[self._index] = self._torque * np.repeat([w.value(time) for w in self._waves], 4)
-        output.SetFromVector(force)
+        waves = [TremorWave(frequency, rng) for _ in range(2)]
+        super().__init__(torque, waves, velocity_count, velocity_index)

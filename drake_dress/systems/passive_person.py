@@ -25,7 +25,8 @@ class PassivePerson(LeafSystem):
     only.
 
     Args:
-        arms: Kinematics, joints and rest pose; the set-point starts at the rest pose.
+        arms: Kinematics, joints and rest pose; the set-point starts at the rest pose. That of an
+            arm without tone stays there.
         joint_count: k.
         arm_dofs: (8,) indices of the arms' joints among the k joints.
         parameters: How the arms follow the garment.
@@ -57,11 +58,13 @@ class PassivePerson(LeafSystem):
         set_point = context.get_discrete_state(self._state).value().reshape(2, 4).copy()
         a = self._arms
         for i, arm in enumerate(a.arms):
+            if not a.has_tone[i]:
+                continue
             rate = following_rate(
                 set_point[i],
                 angles[i],
                 a.rest[i],
-                a.stiffness,
+                a.stiffness[i],
                 arm.gravity_stiffness(set_point[i]),
                 self._parameters,
             )

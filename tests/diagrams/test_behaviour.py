@@ -15,7 +15,6 @@ from pydrake.systems.primitives import ConstantVectorSource, PassThrough
 
 from drake_dress.diagrams.behaviour import Behaviour, Kind, add_behaviour
 from drake_dress.diagrams.person import (
-    JointParameters,
     Person,
     add_person,
     joint_positions,
@@ -25,6 +24,7 @@ from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
 from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.stirring import StirringParameters

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drake_dress.diagrams.person import JointParameters, person_arms
+from drake_dress.diagrams.person import person_arms
 from drake_dress.diagrams.scenario import (
     Scenario,
     apply_variation,
@@ -23,6 +23,7 @@ from drake_dress.diagrams.sections.person import arms, joints, measures
 from drake_dress.errors import UserError
 from drake_dress.models.human.body import BodyMeasures, body_capsules
 from drake_dress.models.human.girths import girth_of
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.sides import SIDES
 
 # Bodies as a parametric model of skin gives them, m.

@@ -8,7 +8,7 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_dress.diagrams.person import JointParameters, add_person, joint_positions
+from drake_dress.diagrams.person import add_person, joint_positions
 from drake_dress.models.arm.clearance import Capsules, clearance
 from drake_dress.models.human.body import (
     ArmPose,
@@ -17,6 +17,7 @@ from drake_dress.models.human.body import (
     body_capsules,
     capsule_arrays,
 )
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.sides import Side
 
 M = BodyMeasures()

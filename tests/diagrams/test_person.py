@@ -20,7 +20,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_dress.diagrams.person import (
-    JointParameters,
     Person,
     add_person,
     joint_positions,
@@ -36,6 +35,7 @@ from drake_dress.models.human.body import (
     arm_points,
     shoulder_height,
 )
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.measures import FOREARM_MASS
 from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side

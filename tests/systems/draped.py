@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from drake_dress.diagrams.person import JointParameters
 from drake_dress.diagrams.station import (
     SimulatedStation,
     StationParameters,
@@ -13,6 +12,7 @@ from drake_dress.diagrams.station import (
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.body import ArmPose, BodyMeasures
+from drake_dress.models.human.joints import JointParameters
 
 H = 0.005
 

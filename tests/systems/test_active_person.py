@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.person import JointParameters, person_arms
+from drake_dress.diagrams.person import person_arms
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.active import ActiveParameters, ArmState, Want
 from drake_dress.models.human.body import ArmPose, BodyMeasures
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.motions import Motion, Reach, Turn, Wave
 from drake_dress.systems.active_person import ActivePerson
 

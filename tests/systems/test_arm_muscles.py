@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from drake_dress.diagrams.person import JointParameters, person_arms
+from drake_dress.diagrams.person import person_arms
 from drake_dress.models.human.body import ArmPose, BodyMeasures
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.systems.arm_muscles import ArmMuscles
 
 POSE = ArmPose(0.2, 0.8, 0.1, 0.3)

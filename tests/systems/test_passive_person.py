@@ -1,9 +1,10 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from drake_dress.diagrams.person import JointParameters, person_arms
+from drake_dress.diagrams.person import person_arms
 from drake_dress.models.human.body import ArmPose, BodyMeasures
 from drake_dress.models.human.following import FollowingParameters
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.systems.passive_person import PassivePerson
 
 POSE = ArmPose(0.2, 0.8, 0.1, 0.3)

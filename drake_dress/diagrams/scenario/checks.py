@@ -6,11 +6,10 @@ import re
 
 from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
-    Behaviour,
     Coat,
     Controller,
-    Joints,
     Motion,
+    Person,
     Safety,
     Scenario,
     Station,
@@ -21,6 +20,7 @@ from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.human.arm import JOINT_NAMES
+from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import sources_of
 
 
@@ -149,16 +149,17 @@ def check_cameras(source: str, scenario: Scenario) -> None:
             )
 
 
-def check_joints(source: str, joints: Joints) -> None:
+def check_joints(source: str, person: Person) -> None:
     """Checks that the limits of each joint are a smaller and a larger angle."""
-    for name in JOINT_NAMES:
-        limits = getattr(joints, f"{name}_limits_deg")
-        if limits is not None and not (len(limits) == 2 and limits[0] < limits[1]):
-            raise UserError(
-                source,
-                f"person.joints.{name}_limits_deg",
-                f"is {limits}, expected the smallest and the largest angle in degrees",
-            )
+    for group in ("joints", "left_joints", "right_joints"):
+        for name in JOINT_NAMES:
+            limits = getattr(getattr(person, group), f"{name}_limits_deg")
+            if limits is not None and not (len(limits) == 2 and limits[0] < limits[1]):
+                raise UserError(
+                    source,
+                    f"person.{group}.{name}_limits_deg",
+                    f"is {limits}, expected the smallest and the largest angle in degrees",
+                )
 
 
 def check_coat(source: str, coat: Coat) -> None:
@@ -170,8 +171,9 @@ def check_coat(source: str, coat: Coat) -> None:
             raise UserError(source, f"garment.coat.{error.key}", error.message) from error
 
 
-def check_behaviour(source: str, behaviour: Behaviour) -> None:
-    """Checks the motions against each other and against the kind of person."""
+def check_behaviour(source: str, person: Person) -> None:
+    """Checks the motions against each other, the kind of person and what the arms can do."""
+    behaviour = person.behaviour
     key = "person.behaviour.motions"
     if behaviour.motions and behaviour.kind != "active":
         raise UserError(
@@ -187,6 +189,7 @@ def check_behaviour(source: str, behaviour: Behaviour) -> None:
                 source, f"{key}[{i}]", f"is {came}, expected just one of {', '.join(names)}"
             )
         _check_speed(source, f"{key}[{i}]", motion, behaviour.max_hand_speed)
+        _check_tone(source, f"{key}[{i}].{given[0]}", getattr(motion, given[0]), person)
         if motion.reach is not None:
             side = motion.reach.side
             sides = {"left", "right"} if side == "both" else {side}
@@ -197,6 +200,19 @@ def check_behaviour(source: str, behaviour: Behaviour) -> None:
                     f"is {side}, expected one reach for each hand",
                 )
             reaching |= sides
+
+
+def _check_tone(source: str, key: str, motion: object, person: Person) -> None:
+    """Checks that no arm without muscle tone is to move by itself."""
+    moved = getattr(motion, "side", None)  # a turn moves both arms with the body
+    for side, group in zip(SIDES, (person.left_joints, person.right_joints), strict=True):
+        tone = person.joints.tone if group.tone is None else group.tone
+        if tone == 0.0 and moved in (side, "both"):
+            raise UserError(
+                source,
+                f"{key}.side",
+                f"is {moved}, but the {side} arm is paralysed (tone 0), expected an arm with tone",
+            )
 
 
 def _check_speed(source: str, key: str, motion: Motion, max_hand_speed: float) -> None:

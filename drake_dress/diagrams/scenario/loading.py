@@ -95,9 +95,9 @@ def _checked(
     check_safety(source, scenario.safety, 1.0 / scenario.controller.command_rate)
     check_controller(source, scenario.controller)
     check_costs(source, scenario.controller.costs)
-    check_joints(source, scenario.person.joints)
+    check_joints(source, scenario.person)
     check_coat(source, scenario.garment.coat)
-    check_behaviour(source, scenario.person.behaviour)
+    check_behaviour(source, scenario.person)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)
     return scenario

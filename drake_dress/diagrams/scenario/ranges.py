@@ -5,6 +5,7 @@ import re
 
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
+from drake_dress.models.dressing.stages import FIRST
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.coat import COATS, COLLARS, OPENINGS, SIZE_TABLES
@@ -41,8 +42,10 @@ CHOICES = {
         f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
         for motion in ("reach", "withdraw", "wave")
     },
+    "person.behaviour.spasm.side": ("left", "right", "both"),
     "plant.fidelity": tuple(FIDELITIES),
     "plant.integrator": ("implicit", "projective_dynamics", "mujoco"),
+    "controller.stages.first": FIRST,
     "controller.method": ("full", "global", "local"),
     "controller.local.solver": ("constrained_ddp", "cone"),
     "station.kind": ("simulated", "hardware"),
@@ -154,6 +157,13 @@ _RANGES: dict[str, tuple[float, float]] = {
     "shoulder_damping": (0.0, 1000.0),
     "elbow_stiffness": (0.0, 1000.0),
     "elbow_damping": (0.0, 1000.0),
+    "joints.tone": (0.0, 1.0),
+    "left_joints.tone": (0.0, 1.0),
+    "right_joints.tone": (0.0, 1.0),
+    "stages.alike_room": (0.0, 1.0),
+    "spasm.torque": (0.0, 30.0),
+    "spasm.interval": (1.0, 600.0),
+    "spasm.duration": (0.0, 60.0),
     **{
         f"{name}_limits_deg": (-180.0, 180.0)
         for name in ("abduction", "extension", "rotation", "elbow")

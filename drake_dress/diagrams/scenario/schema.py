@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from drake_dress.diagrams.person import JointParameters
 from drake_dress.diagrams.scenario.fidelity import FIDELITIES
 from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
 from drake_dress.models.arm import resolved_rate
@@ -36,7 +35,9 @@ from drake_dress.models.human import (
 )
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.skin.phenotype import Phenotype
+from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
@@ -270,6 +271,8 @@ class Joints:
             empty, -1.2 to 1.2 rad, that is -69 to 69 degrees.
         elbow_limits_deg: smallest and largest elbow flexion, degrees. If empty, 0 to 2.5 rad, that
             is 0 to 143 degrees.
+        tone: share of the arms' weight that their muscles carry, 0 to 1. With less than 1 an arm
+            rests lower than its pose; at 0 it is paralysed and has no motion of its own.
     """
 
     shoulder_stiffness: float = JointParameters.shoulder_stiffness
@@ -280,6 +283,34 @@ class Joints:
     extension_limits_deg: list[float] | None = None
     rotation_limits_deg: list[float] | None = None
     elbow_limits_deg: list[float] | None = None
+    tone: float = JointParameters.tone
+
+
+@dataclass
+class SideJoints:
+    """Springs, dampers, limits and tone of one arm, where they differ from `person.joints`.
+
+    Attributes:
+        shoulder_stiffness: stiffness of each shoulder joint, N·m/rad.
+        shoulder_damping: damping of each shoulder joint, N·m·s/rad.
+        elbow_stiffness: stiffness of the elbow, N·m/rad.
+        elbow_damping: damping of the elbow, N·m·s/rad.
+        abduction_limits_deg: smallest and largest sideways elevation, degrees.
+        extension_limits_deg: smallest and largest backward extension, degrees.
+        rotation_limits_deg: smallest and largest rotation about the arm's own axis, degrees.
+        elbow_limits_deg: smallest and largest elbow flexion, degrees.
+        tone: share of the arm's weight that its muscles carry; 0 for a paralysed arm.
+    """
+
+    shoulder_stiffness: float | None = None
+    shoulder_damping: float | None = None
+    elbow_stiffness: float | None = None
+    elbow_damping: float | None = None
+    abduction_limits_deg: list[float] | None = None
+    extension_limits_deg: list[float] | None = None
+    rotation_limits_deg: list[float] | None = None
+    elbow_limits_deg: list[float] | None = None
+    tone: float | None = None
 
 
 @mirror_of(following.FollowingParameters)
@@ -378,6 +409,23 @@ class Tremor(Mirror):
 
 
 @dataclass
+class Spasm:
+    """Spasms of an arm: it bends and is drawn to the body; see models/human/spasm.py.
+
+    Attributes:
+        side: arm that has them.
+        torque: mean torque that bends the elbow, N·m.
+        interval: mean time from one spasm to the next, s.
+        duration: time for which a spasm has its full strength, s.
+    """
+
+    side: str = "right"
+    torque: float = SpasmParameters.torque
+    interval: float = SpasmParameters.interval
+    duration: float = SpasmParameters.duration
+
+
+@dataclass
 class Lowering:
     """Both arms are lowered once both sleeves are on; see models/human/lowering.py.
 
@@ -411,6 +459,7 @@ class Behaviour:
         max_hand_speed: greatest hand speed of the person's own motions, m/s.
         max_joint_speed: greatest joint speed of the person's own motions, rad/s.
         tremor: tremor of both hands; none if empty.
+        spasm: spasms of an arm; none if empty.
         lowering: both arms are lowered once both sleeves are on; a dummy's arms by somebody.
         stirring: small motions of both arms once the coat is let go.
     """
@@ -421,6 +470,7 @@ class Behaviour:
     max_hand_speed: float = ActiveParameters.max_hand_speed
     max_joint_speed: float = ActiveParameters.max_joint_speed
     tremor: Tremor | None = None
+    spasm: Spasm | None = None
     lowering: Lowering = field(default_factory=Lowering)
     stirring: Stirring = field(default_factory=Stirring)
 
@@ -480,6 +530,8 @@ class Person:
         left_arm: rest pose of the left arm.
         right_arm: rest pose of the right arm.
         joints: springs, dampers and limits of the arm joints.
+        left_joints: those of the left arm that differ.
+        right_joints: those of the right arm that differ.
         behaviour: the person's own motions.
     """
 
@@ -491,6 +543,8 @@ class Person:
     left_arm: Arm = field(default_factory=Arm)
     right_arm: Arm = field(default_factory=Arm)
     joints: Joints = field(default_factory=Joints)
+    left_joints: SideJoints = field(default_factory=SideJoints)
+    right_joints: SideJoints = field(default_factory=SideJoints)
     behaviour: Behaviour = field(default_factory=Behaviour)
 
 

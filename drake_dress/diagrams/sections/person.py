@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from drake_dress.diagrams.behaviour import Behaviour, Kind
-from drake_dress.diagrams.person import JointParameters
+from drake_dress.diagrams.person import angles_of
 from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.models.human import motions
 from drake_dress.models.human.active import ActiveParameters
-from drake_dress.models.human.arm import JOINT_NAMES
+from drake_dress.models.human.arm import JOINT_NAMES, Arm
 from drake_dress.models.human.body import ArmMeasures, ArmPose, BodyMeasures, Posture
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.lowering import Lowering
+from drake_dress.models.human.muscles import sagged
+from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.sides import SIDES, Side
 
 
@@ -32,8 +37,16 @@ def posture(person: schema.Person) -> Posture:
 
 
 def arms(person: schema.Person) -> dict[Side, ArmPose]:
-    """Returns the pose of both arms."""
-    return {"left": arm(person.left_arm), "right": arm(person.right_arm)}
+    """Returns the pose in which both arms rest; arms with little muscle tone sag into it."""
+    poses: dict[Side, ArmPose] = {"left": arm(person.left_arm), "right": arm(person.right_arm)}
+    both = joints(person)
+    for side, pose in poses.items():
+        own = both.of(side)
+        if own.tone < 1.0:
+            limb = Arm(measures(person), posture(person), side)
+            angles = np.array(angles_of(pose))
+            poses[side] = ArmPose(*sagged(limb, angles, own.stiffness, own.tone, own.limits))
+    return poses
 
 
 def arm(values: schema.Arm) -> ArmPose:
@@ -46,17 +59,27 @@ def arm(values: schema.Arm) -> ArmPose:
 
 
 def joints(person: schema.Person) -> JointParameters:
-    """Returns stiffness, damping and limits of the arms' joints; degrees become radians."""
-    values = dict(vars(person.joints))
+    """Returns the parameters of the arms' joints; degrees become radians."""
+    both = _joint_values(person.joints)
+    left, right = (
+        JointParameters(**both | own) if own else None
+        for own in map(_joint_values, (person.left_joints, person.right_joints))
+    )
+    return JointParameters(**both, left=left, right=right)
+
+
+def _joint_values(group: schema.Joints | schema.SideJoints) -> dict[str, Any]:
+    """Returns the given values by the names of the model's fields."""
+    values = {name: value for name, value in vars(group).items() if value is not None}
     for name in JOINT_NAMES:
-        limits = values.pop(f"{name}_limits_deg")
+        limits = values.pop(f"{name}_limits_deg", None)
         if limits is not None:
             values[f"{name}_limits"] = tuple(np.deg2rad(limits).tolist())
-    return JointParameters(**values)
+    return values
 
 
 def behaviour(b: schema.Behaviour, seed: int) -> Behaviour:
-    """Returns the person's behaviour; `seed` is that of its tremor."""
+    """Returns the person's behaviour; `seed` is that of tremor and spasms."""
     kinds: dict[str, Kind] = {"passive": "passive", "active": "active"}
     return Behaviour(
         kind=kinds.get(b.kind, "dummy"),
@@ -67,10 +90,18 @@ def behaviour(b: schema.Behaviour, seed: int) -> Behaviour:
         ),
         motions=tuple(motion(m) for m in b.motions),
         tremor=model_of(b.tremor) if b.tremor is not None else None,
+        spasm=spasm(b.spasm) if b.spasm is not None else None,
         seed=seed,
         lowering=lowering(b.lowering),
         stirring=model_of(b.stirring),
     )
+
+
+def spasm(values: schema.Spasm) -> SpasmParameters:
+    """Returns an arm's spasms."""
+    given = dict(vars(values))
+    side = given.pop("side")
+    return SpasmParameters(sides=tuple(s for s in SIDES if side in (s, "both")), **given)
 
 
 def lowering(values: schema.Lowering) -> Lowering:

@@ -11,6 +11,7 @@ import numpy as np
 
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
+from drake_dress.models.human.arm import Arms
 from drake_dress.models.human.body import Capsule, capsule_arrays
 from drake_dress.models.human.heading import heading
 from drake_dress.models.human.neck import find_neck
@@ -25,11 +26,13 @@ class PersonModel:
         shoulders: (2,3) shoulder joints in the torso's frame, left and right, m.
         radius: radii of upper arm, forearm and hand, m: (2,3,2) of left and right, at both ends, or
             (3,) for both sides and ends.
+        arms: kinematics of the arms and what they can do; not needed for the shape.
     """
 
     capsules: tuple[Capsule, ...]
     shoulders: FloatArray
     radius: FloatArray | tuple[float, float, float]
+    arms: Arms | None = None
 
     @cached_property
     def torso(self) -> FloatArray:

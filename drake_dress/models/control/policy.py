@@ -134,7 +134,7 @@ class DressingPolicy:
             mesh.held,
             settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
-        self.planner = TaskPlanner(mesh, parameters.tasks, from_front)
+        self.planner = TaskPlanner(mesh, parameters.tasks, from_front, person.arms)
         self._collar = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
         # a garment without a neck's edge, or a plan to rest, cannot be laid
         lays = parameters.finish.release and parameters.plans and self._collar is not None

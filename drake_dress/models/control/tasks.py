@@ -39,6 +39,8 @@ from drake_dress.models.dressing.stages import (
     withdraws,
 )
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.ability import are_alike, room_for_second
+from drake_dress.models.human.arm import Arms
 from drake_dress.models.human.heading import Heading, heading, headings
 
 # Advance of s to the next waypoint of a sleeve on its arm.
@@ -113,10 +115,15 @@ class TaskPlanner:
         parameters: settings.
         from_front: whether the garment comes from in front of the person. All targets are then the
             mirror images of those from behind: where they say behind, it is in front.
+        arms: of the person and what they can do; both can do the same if None.
     """
 
     def __init__(
-        self, mesh: GarmentMesh, parameters: TaskParameters, from_front: bool = False
+        self,
+        mesh: GarmentMesh,
+        parameters: TaskParameters,
+        from_front: bool = False,
+        arms: Arms | None = None,
     ) -> None:
         self.mesh = mesh
         self._from_front = from_front
@@ -128,6 +135,10 @@ class TaskPlanner:
         self.signs = (float(loop_orientation(mesh, "left")), float(loop_orientation(mesh, "right")))
         centers = [mesh.rest_position[loop].mean(axis=0) for loop in self.armholes]
         self._reach = float(np.linalg.norm(centers[0] - centers[1]))
+        self._rooms = (0.0, 0.0)
+        if arms is not None and not are_alike(arms):
+            left, right = (room_for_second(arms, i, self._reach, from_front) for i in (0, 1))
+            self._rooms = (left, right)
 
     def sleeves(self, x: FloatArray) -> tuple[SleeveState, SleeveState]:
         """Returns the states of left and right sleeve of the garment at `x` (n,3), m."""
@@ -307,6 +318,7 @@ class TaskPlanner:
             passed=0.0 if linked else float(s) * float(np.linalg.norm(elbow - hand)),
             opening=opening(axis.D(0.0), to, side),
             touches=touches,
+            room=self._rooms[side],
             hand=_place(hand),
             away=_place(offset / max(float(np.linalg.norm(offset)), 1e-12)),
         )

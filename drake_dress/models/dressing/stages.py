@@ -8,8 +8,9 @@ slips down again; released, they slip as well.
 
 Three things differ from the paper, all based on measurements. The garment's reach is compared with
 the distance of the two targets, not of the two armholes, which rises to the limit first and makes
-the task flicker. The first sleeve is that of the arm that opens less, not the nearer one: of eleven
-dressings exactly those failed in which that arm came second. A sleeve counts as on its arm by the
+the task flicker. The first sleeve is that of the arm that can do less, and of two able arms that of
+the arm that opens less, not the nearer one: of eleven dressings exactly those failed in which that
+arm came second. A sleeve counts as on its arm by the
 linking number of its armhole, because the progress s alone also rises when the armhole slides up
 beside the arm.
 """
@@ -19,6 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
+
+from drake_dress.models.sides import SIDES
+
+FIRST = ("auto", *SIDES)
 
 
 class Stage(IntEnum):
@@ -58,6 +63,8 @@ class SleeveFacts:
         opening: inward component of the forearm's direction from hand to elbow, -1 to 1: how far
             the arm opens sideways.
         touches: whether the hand is at the opening already, about to enter.
+        room: volume in which the hand can come to a second sleeve, m³; 0 for both hands if the
+            arms are alike.
         hand: position of the hand, m; away: unit vector from the armhole's centre to it.
     """
 
@@ -69,6 +76,7 @@ class SleeveFacts:
     sight: float = 1.0
     opening: float = 0.0
     touches: bool = False
+    room: float = 0.0
     hand: Place = (0.0, 0.0, 0.0)
     away: Place = (0.0, 0.0, 0.0)
 
@@ -118,6 +126,10 @@ class StageParameters:
             been missed this many times, while the first one stays on its arm.
         swing_time: duration of that swing, s.
         alike: difference in opening below which two arms are treated as equal.
+        alike_room: ratio of the rooms in which two hands can come to the second sleeve above which
+            both arms are treated as equal (models/human/ability.py).
+        first: arm that goes first, `left`, `right`, or `auto`: the one that can do less, and if
+            both can do the same, the one that opens less sideways.
     """
 
     prepared_distance: float = 0.03
@@ -146,6 +158,8 @@ class StageParameters:
     swing_after: int = 6
     swing_time: float = 4.0
     alike: float = 0.03
+    alike_room: float = 0.7
+    first: str = "auto"
 
 
 @dataclass(frozen=True)
@@ -273,12 +287,18 @@ def look(
 
 
 def _choose_first(facts: tuple[SleeveFacts, SleeveFacts], p: StageParameters) -> int:
-    """Returns the sleeve that goes first: that of the arm that opens less sideways.
+    """Returns the sleeve that goes first: that of the arm that can do less, or opens less sideways.
 
-    Such an arm lies in the plane of an armhole that comes from outside. The garment has to turn for
+    An arm that cannot come to the second sleeve has to be in the first one. An arm that opens less
+    sideways lies in the plane of an armhole that comes from outside. The garment has to turn for
     it, which it cannot while it hangs on the other arm. If both arms are alike, the nearer one is
     first.
     """
+    if p.first in SIDES:
+        return SIDES.index(p.first)
+    left, right = facts[0].room, facts[1].room
+    if min(left, right) < p.alike_room * max(left, right):
+        return 0 if left < right else 1
     difference = facts[0].opening - facts[1].opening
     if abs(difference) > p.alike:
         return 0 if difference < 0.0 else 1

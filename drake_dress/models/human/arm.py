@@ -82,6 +82,11 @@ class Arm:
         axes, upper, _ = self._chain(angles)
         return _crossed(axes, np.array([upper, upper, upper, np.zeros(3)])).T
 
+    def potential(self, angles: FloatArray) -> float:
+        """Returns U, J: weight times height of both limbs' centres, from the shoulder's height."""
+        _, carried = self._weights(angles)
+        return float(carried[0, 2])
+
     def gravity_torque(self, angles: FloatArray) -> FloatArray:
         """Returns (4,) −∂U/∂q, the gravity torque on each hinge, N·m.
 
@@ -143,8 +148,9 @@ class Arms:
         arms: kinematics and masses.
         rest: (2,4) angles about which the plant's springs act, rad.
         limits: (2,2,4) lower and upper joint limits of each arm, rad.
-        stiffness: (4,) of an arm's joints, N·m/rad.
-        damping: (4,) of an arm's joints, N·m·s/rad.
+        stiffness: (2,4) of each arm's joints, N·m/rad.
+        damping: (2,4) of each arm's joints, N·m·s/rad.
+        has_tone: whether each arm has muscle tone; one without is paralysed.
     """
 
     arms: tuple[Arm, Arm]
@@ -152,3 +158,4 @@ class Arms:
     limits: FloatArray
     stiffness: FloatArray
     damping: FloatArray
+    has_tone: tuple[bool, bool] = (True, True)
