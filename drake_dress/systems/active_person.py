@@ -113,6 +113,5 @@ class ActivePerson(LeafSystem):
     def _calc_intent(self, context: Context, output: BasicVector) -> None:
         for i, index in enumerate(self._states):
             state = ArmState.of(context.get_discrete_state(index).value())
-            if not self._has_tone[i]:
-                continue
-            output[i] = float(self._arms[i].has_intent(state, context.get_time()))
+            wants = self._arms[i].has_intent(state, context.get_time())
+            output[i] = float(wants and self._has_tone[i])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -27,6 +27,7 @@ from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
+from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.human.stirring import StirringParameters
 from drake_dress.models.human.tremor import TremorParameters
 from drake_dress.models.sides import SIDES, Side
@@ -84,14 +85,16 @@ class Scene:
         return times, np.array(rows)
 
 
-def scene(behaviour: Behaviour, garment: np.ndarray | None = None) -> Scene:
+def scene(
+    behaviour: Behaviour, garment: np.ndarray | None = None, joints: JointParameters = JOINTS
+) -> Scene:
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(PERIOD))
-    person = add_person(plant, M, "standing", ARMS, JOINTS, turns=behaviour.turns)
+    person = add_person(plant, M, "standing", ARMS, joints, turns=behaviour.turns)
     plant.Finalize()
     x = MESH.rest_position + [-2.0, 0.0, 1.4] if garment is None else garment
     nodes = builder.AddSystem(ConstantVectorSource(x.ravel()))
-    arms = person_arms(M, "standing", ARMS, JOINTS)
+    arms = person_arms(M, "standing", ARMS, joints)
     opened = builder.AddSystem(PassThrough(1))
     intent, told = add_behaviour(
         builder,
@@ -417,3 +420,50 @@ def test_who_is_not_told_keeps_the_arms() -> None:
     s.tell("told", 0.0)
     s.simulator.AdvanceTo(3.0)
     np.testing.assert_allclose(s.joints(), start, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["dummy", "passive", "active"])
+def test_a_paralysed_arm_does_nothing_by_itself(kind: Kind) -> None:
+    """It neither follows, nor is lowered, nor stirs; pushed aside, it comes back."""
+    motions = (Wave(start=0.0, sides=("left", "right")),) if kind == "active" else ()
+    limp = replace(JOINTS, right=replace(JOINTS, tone=0.0))
+    s = scene(Behaviour(kind=kind, motions=motions), joints=limp)
+    start = s.joints()
+    s.tell("told", 1.0)
+    s.simulator.AdvanceTo(3.0)
+    s.tell("opened", 1.0)
+    _, way = s.record(6.0)
+    assert np.linalg.norm(way[:, 2] - start[2], axis=1).max() > 0.05
+    np.testing.assert_allclose(way[:, 3:], np.tile(start[3:], (len(way), 1, 1)), atol=1e-3)
+    assert s.intent()[1] == 0.0
+    s.pull(5, np.array([0.0, -6.0, 0.0]))
+    s.simulator.AdvanceTo(9.0)
+    assert np.linalg.norm(s.joints()[5] - start[5]) > 0.05
+    s.pull(5, np.zeros(3))
+    s.simulator.AdvanceTo(14.0)
+    np.testing.assert_allclose(s.joints()[5], start[5], atol=0.01)
+
+
+def test_an_arm_in_spasm_bends_and_comes_back() -> None:
+    spasm = SpasmParameters(sides=("right",), torque=3.0, interval=8.0, duration=1.0)
+    s = scene(replace(STAYS, spasm=spasm, seed=3))
+    start = s.joints()
+    times, way = s.record(30.0)
+    away = np.linalg.norm(way[:, 5] - start[5], axis=1)
+    assert away.max() > 0.1
+    # nearer to the shoulder, since the elbow bends
+    most = way[away.argmax()]
+    assert np.linalg.norm(most[5] - most[3]) < np.linalg.norm(start[5] - start[3]) - 0.02
+    assert np.median(away) < 0.03
+    np.testing.assert_allclose(way[:, :3], np.tile(start[:3], (len(times), 1, 1)), atol=1e-3)
+
+
+def test_a_stiff_elbow_stays_within_its_limits() -> None:
+    stiff = replace(JOINTS, right=replace(JOINTS, elbow_limits=tuple(np.deg2rad([5.0, 15.0]))))
+    s = scene(STAYS, joints=stiff)
+    for side in (2, 5):
+        s.pull(side, np.array([12.0, 0.0, 6.0]))
+        s.simulator.AdvanceTo(s.simulator.get_context().get_time() + 2.0)
+    left, right = (s.plant.GetJointByName(f"{side}_elbow") for side in SIDES)
+    assert right.GetOnePosition(s.context) < np.deg2rad(17.0)
+    assert left.position_upper_limit() > 2.0

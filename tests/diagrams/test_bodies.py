@@ -19,7 +19,7 @@ from drake_dress.diagrams.scenario import (
     resolved_yaml,
 )
 from drake_dress.diagrams.scenario.schema import Measures, SideMeasures, Variation
-from drake_dress.diagrams.sections.person import arms, joints, measures
+from drake_dress.diagrams.sections.person import arm, arms, joints, measures
 from drake_dress.errors import UserError
 from drake_dress.models.human.body import BodyMeasures, body_capsules
 from drake_dress.models.human.girths import girth_of
@@ -103,6 +103,14 @@ def test_girths_set_in_python_replace_default_radii() -> None:
         ("{joints: {elbow_limits_deg: [5]}}", ["person.joints.elbow_limits_deg", "smallest"]),
         ("{joints: {elbow_limits_deg: [9, 5]}}", ["person.joints.elbow_limits_deg", "largest"]),
         ("{joints: {elbow_limits_deg: [0, 500]}}", ["elbow_limits_deg[1]", "-180 to 180"]),
+        ("{left_joints: {elbow_limits_deg: [9, 5]}}", ["person.left_joints.elbow", "largest"]),
+        ("{right_joints: {tone: 1.5}}", ["person.right_joints.tone", "0 to 1"]),
+        (
+            "{right_joints: {tone: 0}, behaviour: {kind: active, motions: [{withdraw: {}}]}}",
+            ["person.behaviour.motions[0].withdraw.side", "both", "right arm is paralysed"],
+        ),
+        ("{behaviour: {spasm: {side: middle}}}", ["person.behaviour.spasm.side", "left"]),
+        ("{behaviour: {spasm: {interval: 2.0}}}", ["person.behaviour.spasm.interval", "4.7"]),
     ],
 )
 def test_unusable_sizes_and_limits_are_told_by_key(
@@ -125,6 +133,23 @@ def test_limits_in_degrees_are_those_of_the_joints(tmp_path: Path) -> None:
     both = person_arms(BodyMeasures(), "standing", arms(person), found)
     np.testing.assert_allclose(both.limits[:, 1, 3], 0.5 * np.pi)
     assert joints(Scenario().person) == JointParameters()
+
+
+def test_an_arm_has_its_own_joints_and_sags_without_tone(tmp_path: Path) -> None:
+    own = "{tone: 0.0, elbow_stiffness: 1.0, elbow_limits_deg: [5, 60]}"
+    text = f"{{joints: {{elbow_stiffness: 9.0, elbow_damping: 2.0}}, right_joints: {own}}}"
+    person = loaded(tmp_path, text).person
+    found = joints(person)
+    assert found.of("left").elbow_stiffness == 9.0
+    assert found.of("right").elbow_stiffness == 1.0
+    assert found.of("right").elbow_damping == 2.0
+    assert found.of("right").elbow_limits == pytest.approx(np.deg2rad((5.0, 60.0)))
+    left, right = arms(person)["left"], arms(person)["right"]
+    assert left == arm(person.left_arm)
+    # default pose: back by 46 degrees
+    assert 0.1 < right.extension < np.deg2rad(40.0)
+    # loads again as it is, although the pose that is given is not the one in which it rests
+    assert arms(checked_scenario(loaded(tmp_path, text)).person) == arms(person)
 
 
 @pytest.mark.parametrize("sizes", [SMALL, HEAVY])

@@ -20,6 +20,7 @@ from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.human.arm import JOINT_NAMES
+from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import sources_of
 
@@ -179,6 +180,12 @@ def check_behaviour(source: str, person: Person) -> None:
         raise UserError(
             source, key, f"are given to a {behaviour.kind} person, expected kind: active"
         )
+    if behaviour.spasm is not None:
+        times = {k: v for k, v in vars(behaviour.spasm).items() if k != "side"}
+        try:
+            SpasmParameters(**times)
+        except UserError as error:
+            raise UserError(source, f"person.behaviour.spasm.{error.key}", error.message) from error
     names = [entry.name for entry in dataclasses.fields(Motion)]
     reaching: set[str] = set()
     for i, motion in enumerate(behaviour.motions):

@@ -2,6 +2,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from drake_dress.models.dressing.stages import (
     SleeveFacts,
@@ -357,6 +358,25 @@ def test_both_are_held_while_both_are_on() -> None:
     slipped = (facts(linked=True, s=1.85), facts(linked=True, s=1.97))
     _, tasks = advance_stages(state, slipped, P, FAR, 1.5)
     assert tasks == (Task.DRESS, Task.DRESS)
+
+
+def test_the_arm_that_can_do_less_goes_first() -> None:
+    """Also where it opens more, and is further away."""
+    able = replace(facts(hand=0.3), room=0.05, opening=-0.1)
+    for room, first in ((0.0, 1), (0.03, 1), (0.04, 0)):
+        state, _ = advance_stages(
+            StageState(), (able, replace(facts(hand=0.6), room=room)), P, FAR, 0.0
+        )
+        assert state.first == first
+
+
+@pytest.mark.parametrize(("name", "first"), [("left", 0), ("right", 1)])
+def test_the_first_arm_can_be_given(name: str, first: int) -> None:
+    p = replace(P, first=name)
+    weak = replace(facts(), room=0.0)
+    for both in ((weak, replace(facts(), room=0.05)), (replace(facts(), room=0.05), weak)):
+        state, _ = advance_stages(StageState(), both, p, FAR, 0.0)
+        assert state.first == first
 
 
 def test_the_arm_that_opens_less_goes_first() -> None:
