@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fit.drawing import SCENARIOS, Case, body_of, coat_of, scenario_of, size_for
+from benchmarks.dressing.cases import SCENARIOS
+from benchmarks.fit.drawing import Case, body_of, coat_of, scenario_of, size_for
 from benchmarks.kept import read_results, write_results
 from drake_dress.diagrams.garment_fit import judged
 from drake_dress.errors import UserError
