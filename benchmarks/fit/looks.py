@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from drake_dress.diagrams.garment_fit import judged
 from drake_dress.errors import UserError
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.models.garment.fit import Fit
+from drake_dress.models.garment.fit.judge import ARMHOLE, BACK, CUFF
 from drake_dress.side_by_side import completed
 
 # What the look calls a garment, in order of the verdict.
@@ -23,6 +24,8 @@ CALLED = ("fits", "tight", "too tight", "cannot go on", "not judged", "cannot be
 FITTING, TOO_TIGHT = CALLED[:2], CALLED[2]
 # Of which the tightest is looked for: key of a coat, or `back_width`.
 MEASURES = ("cuff_girth", "armhole_girth", "back_width")
+# The limits that verdicts follow from; verdicts by other limits are made anew.
+_LIMITS = [list(astuple(limits)) for limits in (CUFF, ARMHOLE, BACK)]
 _TOLD = 30  # looks between two lines of progress
 
 Looks = Mapping[str, dict[str, Any]]
@@ -62,16 +65,18 @@ def all_looks(cases: Sequence[Case], file: Path | None) -> tuple[Looks, Interrup
 
     Args:
         cases: pairs.
-        file: keeps the looks, and has those of earlier studies; None to keep none.
+        file: keeps the looks, and has those of earlier studies; None to keep none. Those by other
+            limits than now are made anew.
 
     Raises:
         UserError: the file has other content.
     """
-    kept = {} if file is None else read_results(file, lambda case: Case(**case).name, "fit")
+    found = {} if file is None else read_results(file, lambda case: Case(**case).name, "fit")
+    kept = {name: each for name, each in found.items() if each.get("limits") == _LIMITS}
     missing = [case for case in cases if case.name not in kept]
     with caught_interrupt() as stop:
         for number, (case, look) in enumerate(completed(look_at, missing, 1, stop), 1):
-            kept[case.name] = {"case": asdict(case), "look": look}
+            kept[case.name] = {"case": asdict(case), "limits": _LIMITS, "look": look}
             if number % _TOLD == 0 or number == len(missing):
                 print(f"looked at {number} of {len(missing)} pairs", flush=True)
                 _keep(file, kept)

@@ -23,7 +23,15 @@ from benchmarks.fit.drawing import (
     scenario_of,
     size_for,
 )
-from benchmarks.fit.looks import CALLED, FITTING, TOO_TIGHT, all_looks, chosen, looks_file
+from benchmarks.fit.looks import (
+    CALLED,
+    FITTING,
+    TOO_TIGHT,
+    all_looks,
+    chosen,
+    look_at,
+    looks_file,
+)
 from benchmarks.fit.tables import figures, tables, told
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
@@ -157,14 +165,16 @@ def test_looks_are_kept_and_not_repeated(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(seen) == len(set(seen)) == len(CASES)
     assert not stop.is_set()
     assert told(every) == "Verdicts of 30 pairs: fits 10, tight 10, too tight 10."
+    # other limits give other verdicts
+    monkeypatch.setattr("benchmarks.fit.looks._LIMITS", [[1.0, 0.0, 0.0]])
+    all_looks(CASES, file)
+    assert len(seen) == 2 * len(CASES)
     file.write_text("{}", encoding="utf-8")
     with pytest.raises(UserError, match="bench fit"):
         all_looks(CASES, file)
 
 
 def test_the_look_tells_what_is_drawn_and_what_is_tight() -> None:
-    from benchmarks.fit.looks import look_at
-
     found = look_at(CASES[0])
     assert found["called"] in CALLED
     assert found["size"] == coat_of(CASES[0]).size
