@@ -15,7 +15,7 @@ import argparse
 from collections.abc import Sequence
 from functools import partial
 
-from benchmarks.fit.drawing import POSTURES, Case, pairs, run
+from benchmarks.fit.drawing import POSTURES, VARIATIONS, Case, pairs, run
 from benchmarks.fit.looks import FITTING, TOO_TIGHT, Looks, all_looks, chosen, looks_file
 from benchmarks.fit.tables import figures, tables, told
 from benchmarks.parser import OneLineParser, at_least_one, exit_with, seed_number
@@ -37,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check(options)
     root = root_of(options)
     seeds = drawn_seeds(options.purpose, max(options.cuts, options.bodies), root)
-    all_pairs = pairs(seeds[: options.cuts], seeds[: options.bodies], options.posture)
+    cuts, bodies = seeds[: options.cuts], seeds[: options.bodies]
+    all_pairs = pairs(cuts, bodies, options.posture, options.variation)
     file = None if options.json is None else looks_file(options.json)
     looks, stop = all_looks(all_pairs, file)
     if stop.is_set():
@@ -46,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     study = Study(_NAME, Case, run, partial(tables, looks=looks), partial(figures, looks=looks))
     said = (
         f"{options.cuts} cuts and {options.bodies} bodies, drawn with `--purpose "
-        f"{options.purpose} --root {root}`, {options.posture}. {told(looks)} "
+        f"{options.purpose} --root {root}`, {options.posture}, variation {options.variation}. "
+        f"{told(looks)} "
         f"{_drawn(cases, looks)}"
     )
     return exit_status(*carry_out(options, study, cases, said))
@@ -83,6 +85,12 @@ def _parser() -> argparse.ArgumentParser:
             f"--{name}", type=at_least_one, default=default, metavar="N", help=f"{text}; {default}"
         )
     parser.add_argument("--posture", choices=tuple(POSTURES), default="standing")
+    parser.add_argument(
+        "--variation",
+        choices=tuple(VARIATIONS),
+        default="few",
+        help="what a run's seed draws besides: pose, fabric and start (few), or nothing",
+    )
     parser.add_argument(
         "--purpose",
         choices=tuple(PURPOSES),

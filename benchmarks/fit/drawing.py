@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.dressing.cases import PERSONS, SCENARIOS, VARIATIONS
+from benchmarks.dressing.cases import PERSONS, SCENARIOS
+from benchmarks.dressing.cases import VARIATIONS as DRESSING
 from benchmarks.study import run_case
 from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.diagrams.scenario.drawn_coat import draw_coat, in_size
@@ -29,6 +30,8 @@ from drake_dress.models.human.skin.phenotype import Phenotype, phenotype_skin
 
 # Posture to its scenario.
 POSTURES = {"standing": PERSONS["dummy"], "sitting": "dummy_sitting.yaml"}
+# What the seed of a run draws besides: pose, fabric and start, or nothing.
+VARIATIONS = {"few": DRESSING["few"], "none": "{}"}
 # Sizes by letters: the tables have them in this order for women and men.
 SIZES = ("XS", "S", "M", "L", "XL", "XXL", "3XL", "4XL", "5XL")
 # Sizes of the coat, counted from the person's own.
@@ -48,23 +51,27 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class Case:
-    """A pair: seeds of its cut, of its body and of its run, and a posture of `POSTURES`."""
+    """A pair: seeds of cut, body and run, a posture of `POSTURES`, one of `VARIATIONS`."""
 
     cut: int
     body: int
     seed: int
     posture: str = "standing"
+    variation: str = "few"
 
     @property
     def name(self) -> str:
         """Name for files and tables."""
-        return f"cut{self.cut}-body{self.body}-{self.posture}"
+        which = "" if self.variation == "few" else f"-{self.variation}"
+        return f"cut{self.cut}-body{self.body}-{self.posture}{which}"
 
 
-def pairs(cuts: Sequence[int], bodies: Sequence[int], posture: str) -> list[Case]:
+def pairs(
+    cuts: Sequence[int], bodies: Sequence[int], posture: str, variation: str = "few"
+) -> list[Case]:
     """Returns every cut with every body, by the seeds of both."""
     return [
-        Case(cut, body, int(_generator(cut, body).integers(1000, 2**31)), posture)
+        Case(cut, body, int(_generator(cut, body).integers(1000, 2**31)), posture, variation)
         for cut in cuts
         for body in bodies
     ]
@@ -101,7 +108,7 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
     return [
         f"garment.coat={json.dumps(keys)}",
         f"person.body={json.dumps(body)}",
-        f"variation={VARIATIONS['few']}",
+        f"variation={VARIATIONS[case.variation]}",
         *overrides,
     ]
 

@@ -35,7 +35,7 @@ from benchmarks.fit.looks import (
 from benchmarks.fit.tables import figures, tables, told
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
-from drake_dress.diagrams.scenario.schema import Coat
+from drake_dress.diagrams.scenario.schema import Coat, Variation
 from drake_dress.errors import UserError
 
 CASES = pairs(range(6), range(5), "standing")
@@ -78,6 +78,9 @@ def test_every_cut_meets_every_body_once() -> None:
     # more cuts or bodies change no pair
     assert set(CASES) <= set(pairs(range(7), range(9), "standing"))
     assert all(case.seed >= 1000 for case in CASES)
+    others = pairs(range(6), range(5), "standing", "none")
+    assert [case.seed for case in others] == [case.seed for case in CASES]
+    assert not {case.name for case in others} & {case.name for case in CASES}
 
 
 def test_a_cut_stays_the_same_on_all_bodies_but_for_its_size() -> None:
@@ -110,7 +113,8 @@ def test_a_pair_is_a_scenario_with_its_coat_body_and_variation() -> None:
         assert getattr(scenario.garment.coat, name) == (drawn and pytest.approx(drawn, abs=1e-5))
     assert scenario.variation.plant_friction > 0.0
     assert scenario.variation.coat_measures == scenario.variation.person_scale == 0.0
-    sitting = scenario_of(Case(case.cut, case.body, case.seed, "sitting"))
+    sitting = scenario_of(Case(case.cut, case.body, case.seed, "sitting", "none"))
+    assert sitting.variation == Variation()
     assert (scenario.person.posture, sitting.person.posture) == ("standing", "sitting")
 
 
