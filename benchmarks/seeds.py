@@ -77,7 +77,13 @@ def chosen_seeds(options: argparse.Namespace) -> tuple[Sequence[int], str]:
             raise UserError("bench", "--root", "is of a draw, expected --draw PURPOSE:N with it")
         first, last = options.seeds[0], options.seeds[-1]
         return options.seeds, f"Seeds {first} to {last}."
-    root = secrets.randbelow(_ROOTS) if options.root is None else options.root
+    root = root_of(options)
     seeds = draw_seeds(options.draw, root)
     said = f"Seeds drawn with `--draw {options.draw.purpose}:{len(seeds)} --root {root}`."
     return seeds, said
+
+
+def root_of(options: argparse.Namespace) -> int:
+    """Returns the root given with `--root`, or a new one."""
+    given: int | None = options.root
+    return secrets.randbelow(_ROOTS) if given is None else given

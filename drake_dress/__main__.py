@@ -44,6 +44,7 @@ BENCHMARKS = {
     "cloth": "accuracy and speed of the cloth schemes, beside other simulators where installed",
     "arms": "every scenario with floating grippers and with two arms; load of the arms",
     "dressing": "success rate over persons, coats and seeds, for each control method",
+    "fit": "drawn coats on drawn bodies: success, beside the verdict of drake-dress garment",
     "explain": "share of hidden effects that are named correctly",
     "gym": "speed of the Gymnasium environment, and dressings controlled through it",
     "hardware": "command rate, latency, fault reactions and memory; run and lab in two processes",

@@ -12,6 +12,10 @@ C = TypeVar("C")
 R = TypeVar("R")
 
 
+class _NotStarted(Exception):
+    """A case came up after the signal."""
+
+
 def completed(
     run: Callable[[C], R], cases: Sequence[C], jobs: int, stop: Interrupt
 ) -> Iterator[tuple[C, R]]:
@@ -20,11 +24,22 @@ def completed(
     After the first ending signal no further case starts, and the next finished case is the last one
     yielded. A second signal raises; cases that have not started are cancelled then, too.
     """
+
+    def started(case: C) -> R:
+        # a thread takes the next case before the loop below hears of the last one
+        if stop.is_set():
+            raise _NotStarted
+        return run(case)
+
     with ThreadPoolExecutor(jobs) as pool:
-        pending = {pool.submit(run, case): case for case in cases}
+        pending = {pool.submit(started, case): case for case in cases}
         try:
             for future in as_completed(pending):
-                yield pending[future], future.result()
+                try:
+                    result = future.result()
+                except _NotStarted:
+                    continue
+                yield pending[future], result
                 if stop.is_set():
                     break
         finally:

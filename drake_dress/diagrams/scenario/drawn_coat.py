@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,6 +62,25 @@ def draw_coat(
         else:
             return coat
     raise UserError("coat", "width", f"is {width}, at which no drawn measures make a coat: {why}")
+
+
+def in_size(coat: Coat, size: str) -> Coat:
+    """Returns a coat in another size of its table.
+
+    Each measure that is given keeps its ratio to that of the cut in the coat's size, so a drawn
+    coat stays the work of the same maker.
+
+    Raises:
+        UserError: the table has no such size.
+    """
+    cut = Coat(preset=coat.preset, size=coat.size, size_table=coat.size_table)
+    before, after = coat_parameters(cut), coat_parameters(replace(cut, size=size))
+    found = replace(coat, size=size)
+    for name in COAT_MEASURES:
+        given, own, other = (getattr(each, name) for each in (coat, before, after))
+        if given is not None and own and other is not None:
+            setattr(found, name, float(given * other / own))
+    return found
 
 
 def _one_of(rng: np.random.Generator, words: Sequence[str]) -> str:

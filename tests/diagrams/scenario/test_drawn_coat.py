@@ -7,7 +7,7 @@ import pytest
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
-from drake_dress.diagrams.scenario.drawn_coat import MEASURE_WIDTH, draw_coat
+from drake_dress.diagrams.scenario.drawn_coat import MEASURE_WIDTH, draw_coat, in_size
 from drake_dress.diagrams.scenario.loading import checked_scenario
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.errors import UserError
@@ -73,3 +73,22 @@ def test_every_measure_of_a_cut_is_drawn() -> None:
     bathrobe = COATS["bathrobe"]
     for name in COAT_MEASURES:
         assert (getattr(coat, name) is None) == (getattr(bathrobe, name) is None)
+
+
+def test_in_another_size_a_coat_keeps_its_ratios_to_the_cut_and_comes_back() -> None:
+    for coat in drawn(3, 4):
+        other = in_size(coat, "XXL")
+        back = in_size(other, str(coat.size))
+        assert (other.size, other.preset, other.size_table) == ("XXL", coat.preset, coat.size_table)
+        for name in COAT_MEASURES:
+            before, after = getattr(coat, name), getattr(back, name)
+            assert after == (None if before is None else pytest.approx(before))
+        own, plain = (
+            coat_parameters(each)
+            for each in (other, Coat(preset=coat.preset, size="XXL", size_table=coat.size_table))
+        )
+        ratios = [own.lengths[k] / plain.lengths[k] for k in own.lengths]
+        assert all(abs(r - 1.0) <= MEASURE_WIDTH * (1 + 1e-9) for r in ratios)
+    assert in_size(Coat(size="M"), "L") == Coat(size="L")
+    with pytest.raises(UserError, match="expected one of"):
+        in_size(coat, "7XL")
