@@ -177,7 +177,7 @@ class StationParameters:
         """Returns the person's skin, which takes a second; None without `phenotype`."""
         if self.phenotype is None:
             return None
-        return person_skin(self.phenotype, self.posture, self.measures.shoulder_height)
+        return person_skin(self.phenotype, self.posture, self.measures)
 
 
 @dataclass(frozen=True)
@@ -302,10 +302,7 @@ def make_simulated_station(
         permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
         builder.ExportOutput(permission.get_output_port(), "permission")
     _export_truth(builder, cloth, plant, intent)
-    skin = p.skin() if p.cameras else None
-    if skin is not None:
-        show_skin(builder, plant, scene_graph, person, skin)
-    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
+    _export_cameras(builder, plant, scene_graph, person, cloth, p)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
@@ -401,6 +398,21 @@ def _export_truth(
     builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
     builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
     builder.ExportOutput(intent, "cheat_intent")
+
+
+def _export_cameras(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    person: Person,
+    cloth: ClothPlant,
+    p: StationParameters,
+) -> None:
+    """Exports the cameras' images of the garment and the person, with its skin if it has one."""
+    skin = p.skin() if p.cameras else None
+    if skin is not None:
+        show_skin(builder, plant, scene_graph, person, skin)
+    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
 
 
 def _wire_drivers(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.human.body import Posture
+from drake_dress.models.human.body import BodyMeasures, Posture
+from drake_dress.models.human.skin.measures import MEASURED
 from drake_dress.models.human.skin.person_skin import PersonSkin, person_skin
 from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.human.skin.skin import Skin
@@ -57,7 +58,14 @@ def logged_skin(log: RunLog) -> LoggedSkin | None:
         person: Any = content["person"]
         given = {key: person["body"][key] for key in _KEYS if person["body"].get(key) is not None}
         posture: Posture = "sitting" if person.get("posture") == "sitting" else "standing"
-        shoulders = (person.get("measures") or {}).get("shoulder_height")
-        return LoggedSkin(log, person_skin(Phenotype(**given), posture, shoulders))
+        return LoggedSkin(log, person_skin(Phenotype(**given), posture, _sizes(person)))
     except (yaml.YAMLError, UserError, AttributeError, KeyError, TypeError):
         return None
+
+
+def _sizes(person: dict[str, Any]) -> BodyMeasures | None:
+    """Returns the sizes of a scenario's person, both arms alike; None if they are not all given."""
+    given = person.get("measures") or {}
+    if not given.keys() >= set(MEASURED):
+        return None
+    return BodyMeasures(**{e.name: given[e.name] for e in fields(BodyMeasures) if e.name in given})

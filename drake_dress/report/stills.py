@@ -44,6 +44,7 @@ _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
 # A glTF mesh, such as an arm's link, makes VTK use physically based shading, darker by this factor.
 _PHYSICAL = 2.6
+_KEY_DIRECTION = (-0.6, -0.35, -1.2)  # in which the key light shines
 _LINING_OFFSET = 2e-3  # m, avoids z-fighting between the lining and the outside
 
 
@@ -173,7 +174,8 @@ class _Scene:
 
     def add_surface(self, surface: Surface, color: _Color) -> None:
         """Adds a closed surface, shaded smoothly."""
-        vertices, faces = surface
+        vertices = surface.vertices
+        faces = _nearest_last(surface.faces, vertices)
         normals = node_normals(faces, vertices)
         self.add(mesh_shape(faces, vertices, normals, "surface"), RigidTransform(), color)
 
@@ -202,6 +204,16 @@ class _Scene:
         return np.array(image.data[:, :, :3])
 
 
+def _nearest_last(faces: IntArray, vertices: FloatArray) -> IntArray:
+    """Returns triangles in an order in which the nearest to the key light is the last.
+
+    VTK draws its map of shadows without a test of depth, so the last triangle that is drawn casts
+    the shadow, also on those before it.
+    """
+    along = vertices[faces].mean(axis=1) @ np.array(_KEY_DIRECTION)
+    return np.ascontiguousarray(faces[np.argsort(-along)])
+
+
 def _render_parameters(brightness: float) -> RenderEngineVtkParams:
     # A key light from the upper front left casts shadows; lamps on all sides, without shadows,
     # brighten the shaded side.
@@ -213,7 +225,7 @@ def _render_parameters(brightness: float) -> RenderEngineVtkParams:
     key = LightParameter(
         type="directional",
         frame="world",
-        direction=(-0.6, -0.35, -1.2),
+        direction=_KEY_DIRECTION,
         intensity=0.55 * brightness,
     )
     return RenderEngineVtkParams(

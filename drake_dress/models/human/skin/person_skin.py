@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from drake_dress.models.arrays import FloatArray, IntArray
-from drake_dress.models.human.body import Posture
+from drake_dress.models.human.body import BodyMeasures, Posture
 from drake_dress.models.human.skin.at_joints import motions_at_joints
+from drake_dress.models.human.skin.measures import body_measures, skin_measures
 from drake_dress.models.human.skin.phenotype import Phenotype, phenotype_skin
 from drake_dress.models.human.skin.posing import moved_vertices
 from drake_dress.models.human.skin.skin import Skin, scaled
+from drake_dress.models.human.skin.within import within_cones
 
 
 @dataclass(frozen=True)
@@ -38,20 +40,22 @@ class PersonSkin:
         return moved_vertices(self.rest, self.motions(joint_position))
 
 
-def person_skin(person: Phenotype, posture: Posture, shoulder_height: float | None) -> PersonSkin:
-    """Returns the skin of a person.
+def person_skin(person: Phenotype, posture: Posture, body: BodyMeasures | None) -> PersonSkin:
+    """Returns the skin of a person, as pictures show it.
 
     Args:
         person: sex, age, height and weight.
         posture: standing or sitting.
-        shoulder_height: of the standing person, to which the whole skin is scaled, m; None: the
-            skin's own. It differs where a scenario gives or varies single measures.
+        body: sizes of the person, whose shoulders' height the skin is scaled to, and out of whose
+            round cones it does not stand; None: those of the skin itself. They differ where a
+            scenario gives or varies single measures.
 
     Raises:
         UserError: as `phenotype_skin`.
     """
     skin = phenotype_skin(person)
-    if shoulder_height is not None:
-        own = 0.5 * (skin.joints["left_shoulder"][2] + skin.joints["right_shoulder"][2])
-        skin = scaled(skin, shoulder_height / float(own))
-    return PersonSkin(skin, posture)
+    if body is None:
+        body = body_measures(skin_measures(skin))
+    own = 0.5 * (skin.joints["left_shoulder"][2] + skin.joints["right_shoulder"][2])
+    skin = scaled(skin, body.shoulder_height / float(own))
+    return PersonSkin(within_cones(skin, body), posture)
