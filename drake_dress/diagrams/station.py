@@ -173,11 +173,11 @@ class StationParameters:
     phenotype: Phenotype | None = None
     in_worker: bool = False
 
-    def skin(self) -> PersonSkin | None:
+    def skin(self, drawn_in: bool = True) -> PersonSkin | None:
         """Returns the person's skin, which takes a second; None without `phenotype`."""
         if self.phenotype is None:
             return None
-        return person_skin(self.phenotype, self.posture, self.measures)
+        return person_skin(self.phenotype, self.posture, self.measures, drawn_in)
 
 
 @dataclass(frozen=True)

@@ -51,14 +51,20 @@ class LoggedSkin:
         return self.person.vertices(self.log.joint_position[sample])
 
 
-def logged_skin(log: RunLog) -> LoggedSkin | None:
-    """Returns the skin of a log's person; None if the scenario has no parametric body."""
+def logged_skin(log: RunLog, drawn_in: bool = True) -> LoggedSkin | None:
+    """Returns the skin of a log's person; None if the scenario has no parametric body.
+
+    Args:
+        log: the log.
+        drawn_in: see `person_skin`.
+    """
     try:
         content: Any = yaml.safe_load(log.scenario_text)
         person: Any = content["person"]
         given = {key: person["body"][key] for key in _KEYS if person["body"].get(key) is not None}
         posture: Posture = "sitting" if person.get("posture") == "sitting" else "standing"
-        return LoggedSkin(log, person_skin(Phenotype(**given), posture, _sizes(person)))
+        skin = person_skin(Phenotype(**given), posture, _sizes(person), drawn_in)
+        return LoggedSkin(log, skin)
     except (yaml.YAMLError, UserError, AttributeError, KeyError, TypeError):
         return None
 

@@ -78,7 +78,7 @@ class MeshcatReplay:
     def __init__(self, meshcat: Meshcat, log: RunLog) -> None:
         self._meshcat = meshcat
         self._log = log
-        self._skin = logged_skin(log)
+        self._skin = logged_skin(log, drawn_in=False)
         self.scene = DressingScene(meshcat, np.asfortranarray(log.faces.T), "dressing")
         self.sample = -1
         self._playing = False

@@ -40,7 +40,9 @@ class PersonSkin:
         return moved_vertices(self.rest, self.motions(joint_position))
 
 
-def person_skin(person: Phenotype, posture: Posture, body: BodyMeasures | None) -> PersonSkin:
+def person_skin(
+    person: Phenotype, posture: Posture, body: BodyMeasures | None, drawn_in: bool = True
+) -> PersonSkin:
     """Returns the skin of a person, as pictures show it.
 
     Args:
@@ -49,6 +51,7 @@ def person_skin(person: Phenotype, posture: Posture, body: BodyMeasures | None) 
         body: sizes of the person, whose shoulders' height the skin is scaled to, and out of whose
             round cones it does not stand; None: those of the skin itself. They differ where a
             scenario gives or varies single measures.
+        drawn_in: whether the skin is drawn in to the cones; False shows it around them.
 
     Raises:
         UserError: as `phenotype_skin`.
@@ -58,4 +61,4 @@ def person_skin(person: Phenotype, posture: Posture, body: BodyMeasures | None) 
         body = body_measures(skin_measures(skin))
     own = 0.5 * (skin.joints["left_shoulder"][2] + skin.joints["right_shoulder"][2])
     skin = scaled(skin, body.shoulder_height / float(own))
-    return PersonSkin(within_cones(skin, body), posture)
+    return PersonSkin(within_cones(skin, body) if drawn_in else skin, posture)
