@@ -194,4 +194,5 @@ def wired(
         record: list to which the local controller appends the problems that it solves.
     """
     control = control_setup(p, record)
-    return make_dressing(p.station, p.setup.garments.plant, control, writer, p.page)
+    skin = None if p.page is None else p.setup.station.skin(drawn_in=False)
+    return make_dressing(p.station, p.setup.garments.plant, control, writer, p.page, skin)

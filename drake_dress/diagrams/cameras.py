@@ -14,14 +14,21 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
+    Role,
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
+from drake_dress.diagrams.person import Person
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.skin.person_skin import PersonSkin
 from drake_dress.systems.garment_geometry import GarmentGeometry
+from drake_dress.systems.joint_oracle import JointOracle
+from drake_dress.systems.skin_geometry import SkinGeometry
+from drake_dress.systems.surface_geometry import SurfaceGeometry
 
 _RENDERER = "vtk"
 _NEAR, _FAR = 0.05, 6.0  # range of rendering, m
@@ -96,10 +103,7 @@ def export_cameras(
         return
     scene_graph.AddRenderer(_RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
     garment = builder.AddNamedSystem("garment_geometry", GarmentGeometry(scene_graph, mesh))
-    builder.Connect(garment_position, garment.get_input_port())
-    builder.Connect(
-        garment.get_output_port(), scene_graph.get_source_configuration_port(garment.source)
-    )
+    _connect(builder, scene_graph, garment, garment_position)
     for camera in cameras:
         core = RenderCameraCore(
             _RENDERER, camera.info, ClippingRange(_NEAR, _FAR), RigidTransform()
@@ -116,3 +120,39 @@ def export_cameras(
         builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
         for port, name in IMAGES.items():
             builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
+
+
+def show_skin(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    person: Person,
+    skin: PersonSkin,
+) -> None:
+    """Makes cameras see a person's skin in place of the round cones.
+
+    The cones keep their other roles: they touch, and Meshcat shows them.
+
+    Args:
+        builder: of the station.
+        plant: finalized, with the person.
+        scene_graph: of the plant.
+        person: of the plant.
+        skin: the person's skin.
+    """
+    for body in person.body_indices.values():
+        for geometry in plant.GetVisualGeometriesForBody(plant.get_body(body)):
+            scene_graph.RemoveRole(plant.get_source_id(), geometry, Role.kPerception)
+    joints = builder.AddNamedSystem("skin_joints", JointOracle(person.joint_points))
+    builder.Connect(plant.get_body_poses_output_port(), joints.get_input_port())
+    seen = builder.AddNamedSystem("skin_geometry", SkinGeometry(scene_graph, skin))
+    _connect(builder, scene_graph, seen, joints.get_output_port())
+
+
+def _connect(
+    builder: DiagramBuilder, scene_graph: SceneGraph, surface: SurfaceGeometry, port: OutputPort
+) -> None:
+    """Connects a surface's input and its scene graph."""
+    builder.Connect(port, surface.get_input_port())
+    configuration = scene_graph.get_source_configuration_port(surface.source)
+    builder.Connect(surface.get_output_port(), configuration)

@@ -17,6 +17,7 @@ from drake_dress.diagrams.station import MOTION, Station
 from drake_dress.diagrams.wiring import Wiring
 from drake_dress.models.control.local_control import LocalState
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.skin.person_skin import PersonSkin
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_controller import ArmController
@@ -24,6 +25,7 @@ from drake_dress.systems.garment_visualizer import GarmentVisualizer
 from drake_dress.systems.global_mpc import GlobalMpc
 from drake_dress.systems.run_recorder import RunRecorder
 from drake_dress.systems.safety_governor import SafetyGovernor
+from drake_dress.systems.skin_visualizer import SkinVisualizer
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def make_dressing(
     control: ControlSetup,
     writer: RunLogWriter | None = None,
     meshcat: Meshcat | None = None,
+    skin: PersonSkin | None = None,
 ) -> Dressing:
     """Returns station and controllers wired together.
 
@@ -101,6 +104,7 @@ def make_dressing(
         control: the controllers.
         writer: open log, if one is kept.
         meshcat: page that shows the run, if any.
+        skin: the person's skin that it shows, if any.
     """
     w = Wiring(station)
     controllers = _add_controllers(w, control)
@@ -108,6 +112,9 @@ def make_dressing(
         _add_recorder(w, writer, mesh, control, controllers)
     if meshcat is not None:
         _add_visualizer(w, meshcat, mesh, controllers)
+        if skin is not None:
+            shown = w.add("skin_visualizer", SkinVisualizer(meshcat, skin))
+            w.connect(w.station, w.true("joint_position"), shown, "joint_position")
     diagram = w.builder.Build()
     diagram.set_name("dressing")
     return Dressing(diagram, station, controllers.mpc, control.local)

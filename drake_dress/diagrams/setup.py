@@ -14,7 +14,14 @@ from drake_dress.diagrams.prediction import Predictor
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.sections.controller import controller_policy, predictor, solve_budget
 from drake_dress.diagrams.sections.effects import effects
-from drake_dress.diagrams.sections.person import arms, behaviour, joints, measures, posture
+from drake_dress.diagrams.sections.person import (
+    arms,
+    behaviour,
+    joints,
+    measures,
+    phenotype,
+    posture,
+)
 from drake_dress.diagrams.sections.safety import safety_limits
 from drake_dress.diagrams.sections.station import cameras, placement
 from drake_dress.diagrams.station import StationParameters, start_grippers
@@ -140,6 +147,7 @@ def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParamete
         placement=placement(station.arms, person, station.side),
         mode=station.arms.mode,
         cameras=cameras(station.cameras),
+        phenotype=phenotype(person),
     )
 
 

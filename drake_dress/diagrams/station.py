@@ -61,7 +61,7 @@ from drake_dress.diagrams.arms import (
     set_up_arms,
 )
 from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
-from drake_dress.diagrams.cameras import Camera, export_cameras
+from drake_dress.diagrams.cameras import Camera, export_cameras, show_skin
 from drake_dress.diagrams.oracles import export_oracles
 from drake_dress.diagrams.panda_driver import SimPandaDriver
 from drake_dress.diagrams.person import (
@@ -101,6 +101,8 @@ from drake_dress.models.human.body import (
     shoulder_height,
 )
 from drake_dress.models.human.joints import JointParameters
+from drake_dress.models.human.skin.person_skin import PersonSkin, person_skin
+from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_measurement import ArmMeasurement
@@ -137,6 +139,7 @@ class StationParameters:
     """Parameters of the simulated station; SI units.
 
     `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
+    `phenotype` is that of a parametric body; its skin is seen, and nothing touches it.
     With `in_front` the garment hangs in front of the person, at `distance_behind`.
     `in_worker` steps the garment in a worker process.
     """
@@ -167,7 +170,14 @@ class StationParameters:
     placement: ArmPlacement | None = None
     mode: str
     cameras: tuple[Camera, ...] = ()
+    phenotype: Phenotype | None = None
     in_worker: bool = False
+
+    def skin(self, drawn_in: bool = True) -> PersonSkin | None:
+        """Returns the person's skin, which takes a second; None without `phenotype`."""
+        if self.phenotype is None:
+            return None
+        return person_skin(self.phenotype, self.posture, self.measures, drawn_in)
 
 
 @dataclass(frozen=True)
@@ -292,7 +302,7 @@ def make_simulated_station(
         permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
         builder.ExportOutput(permission.get_output_port(), "permission")
     _export_truth(builder, cloth, plant, intent)
-    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
+    _export_cameras(builder, plant, scene_graph, person, cloth, p)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
@@ -388,6 +398,21 @@ def _export_truth(
     builder.ExportOutput(plant.get_body_poses_output_port(), "cheat_body_poses")
     builder.ExportOutput(plant.get_state_output_port(), "cheat_plant_state")
     builder.ExportOutput(intent, "cheat_intent")
+
+
+def _export_cameras(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    person: Person,
+    cloth: ClothPlant,
+    p: StationParameters,
+) -> None:
+    """Exports the cameras' images of the garment and the person, with its skin if it has one."""
+    skin = p.skin() if p.cameras else None
+    if skin is not None:
+        show_skin(builder, plant, scene_graph, person, skin)
+    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
 
 
 def _wire_drivers(

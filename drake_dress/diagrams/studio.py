@@ -13,7 +13,7 @@ from pydrake.systems.primitives import PassThrough
 from pydrake.systems.sensors import ImageToLcmImageArrayT, PixelType
 
 from drake_dress.diagrams.arms import add_arms
-from drake_dress.diagrams.cameras import export_cameras
+from drake_dress.diagrams.cameras import export_cameras, show_skin
 from drake_dress.diagrams.person import add_person
 from drake_dress.diagrams.station import StationParameters
 from drake_dress.models.effects.composition import body_with_effects
@@ -73,10 +73,13 @@ class Studio:
         p = self._parameters
         inner = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(inner, p.body_time_step)
-        add_person(plant, self._body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
+        person = add_person(plant, self._body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
         if p.placement is not None:
             add_arms(plant, {side: p.placement.base(side) for side in SIDES})
         plant.Finalize()
+        skin = p.skin()
+        if skin is not None:
+            show_skin(inner, plant, scene_graph, person, skin)
         garment = inner.AddSystem(PassThrough(3 * len(p.mesh.rest_position)))
         inner.ExportInput(garment.get_input_port(), "garment_position")
         export_cameras(inner, scene_graph, p.mesh, garment.get_output_port(), p.cameras)

@@ -19,13 +19,11 @@ from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.person_skin import logged_skin
-from drake_dress.report.scene import DressingScene
+from drake_dress.report.scene import DressingScene, show_skin
 from drake_dress.report.shapes import limb_pose, limb_shape
 from drake_dress.report.web_page import open_page
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
-# Around the body that the garment touches, which stays visible in it.
-_PARAMETRIC_SKIN = Rgba(0.87, 0.70, 0.58, 0.45)
 _ARM = Rgba(0.90, 0.91, 0.92, 1.0)
 _POLL_PERIOD = 0.03  # s
 _TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
@@ -80,7 +78,7 @@ class MeshcatReplay:
     def __init__(self, meshcat: Meshcat, log: RunLog) -> None:
         self._meshcat = meshcat
         self._log = log
-        self._skin = logged_skin(log)
+        self._skin = logged_skin(log, drawn_in=False)
         self.scene = DressingScene(meshcat, np.asfortranarray(log.faces.T), "dressing")
         self.sample = -1
         self._playing = False
@@ -156,10 +154,8 @@ class MeshcatReplay:
         first, second, _ = log.capsules
         for k, (a, b) in enumerate(zip(first[i], second[i], strict=True)):
             self._meshcat.SetTransform(f"dressing/person/{k}", limb_pose(a, b))
-        if self._skin is not None and np.isfinite(log.joint_position[i]).all():
-            vertices = np.asfortranarray(self._skin.vertices(i).T)
-            faces = np.asfortranarray(self._skin.faces.T)
-            self._meshcat.SetTriangleMesh("dressing/skin", vertices, faces, _PARAMETRIC_SKIN)
+        if self._skin is not None and self._skin.is_known(i):
+            show_skin(self._meshcat, "dressing/skin", self._skin.vertices(i), self._skin.faces)
         for arm, poses in enumerate(arm_poses(log, np.array([i]))[0]):
             for k, X in enumerate(poses):
                 self._meshcat.SetTransform(f"dressing/arms/{arm}/{k}", RigidTransform(X))

@@ -3,7 +3,7 @@
 The garment's nodes are quantised with a step of at least 0.1 mm. Each frame is stored as the
 difference to the previous one, with low and high bytes separate, and compressed with deflate. One
 minute of 3,700 nodes takes about ten megabytes. The page inflates it with the browser's own
-DecompressionStream.
+DecompressionStream. A person of a parametric body has a skin, which the page poses itself.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from drake_dress.models.sides import SIDES
 from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.log_schema import STAGE_NAMES
+from drake_dress.report.person_skin import LoggedSkin, logged_skin
 from drake_dress.report.stills import floor_height
 
 MAX_BYTES = 25_000_000
@@ -78,11 +79,14 @@ def _page(log: RunLog, fps: float) -> bytes:
     a, b, radius = log.capsules
     a, b = np.nan_to_num(a[frames]), np.nan_to_num(b[frames])
     arms = arm_poses(log, frames)
-    floor = min(
-        floor_height(position[0], a[0], b[0], radius),
-        float(arms[0, ..., 2, 3].min(initial=np.inf)),
-    )
+    logged = _known_skin(log, frames)
+    low_points = [floor_height(position[0], (a[0], b[0], radius))]
+    low_points.append(float(arms[0, ..., 2, 3].min(initial=np.inf)))
+    if logged is not None:
+        low_points.append(float(logged.vertices(int(frames[0]))[:, 2].min()))
+    floor = min(low_points)
     meta = {
+        "skin": None if logged is None else [len(logged.skin.vertices), len(logged.faces)],
         "frames": len(frames),
         "nodes": position.shape[1],
         "arms": arms.shape[1],
@@ -112,6 +116,7 @@ def _page(log: RunLog, fps: float) -> bytes:
         "capsuleB": _base64(b.astype("<f4").tobytes()),
         "radius": _base64(radius.astype("<f4").tobytes()),
         "grippers": _base64(np.nan_to_num(grippers).astype("<f4").tobytes()),
+        "skin": "" if logged is None else _skin_blob(logged, frames),
         **_arm_blobs(arms, floor),
     }
     template = resources.files("drake_dress.report").joinpath("viewer.html").read_text("utf-8")
@@ -119,6 +124,27 @@ def _page(log: RunLog, fps: float) -> bytes:
     for name, blob in blobs.items():
         page = page.replace(f"@{name}@", blob)
     return page.encode("utf-8")
+
+
+def _known_skin(log: RunLog, frames: IndexArray) -> LoggedSkin | None:
+    """Returns the person's skin; None if there is none, or a joint is not known in a frame."""
+    return logged_skin(log) if np.isfinite(log.joint_position[frames]).all() else None
+
+
+def _skin_blob(logged: LoggedSkin, frames: IndexArray) -> str:
+    """Returns the person's skin, packed.
+
+    The page poses it by the motions of its bones, which are a hundredth of the vertices. Packed are
+    vertices at rest, motions (k,9,3,4), triangles, and skin weights in 1/255.
+    """
+    skin, joints = logged.skin, logged.log.joint_position[frames]
+    parts = [
+        skin.vertices.astype("<f4"),
+        np.stack([logged.person.motions(at) for at in joints]).astype("<f4"),
+        skin.faces.astype("<u2"),
+        np.round(255.0 * skin.weights).astype("u1"),
+    ]
+    return _base64(zlib.compress(b"".join(part.tobytes() for part in parts), 9))
 
 
 def _arm_blobs(poses: FloatArray, floor: float) -> dict[str, str]:

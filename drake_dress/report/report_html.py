@@ -18,7 +18,8 @@ from drake_dress.report.course import course_parts
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import html_page
-from drake_dress.report.stills import CameraPose, render_still
+from drake_dress.report.person_skin import LoggedSkin, logged_skin
+from drake_dress.report.stills import CameraPose, Limbs, Surface, render_still
 from drake_dress.report.summary import SuccessRules, read_summary
 
 _STILL_SIZE = (560, 440)
@@ -291,11 +292,10 @@ def _pictures(log: RunLog, m: Measures) -> str:
         shots.append((name, i, (0.95, -0.95)[k]))
     last = len(log) - 1
     shots += [("end", last, 0.45), ("end, from behind", last, np.pi + 0.45)]
-    figures = []
+    figures, skin = [], logged_skin(log)
     for name, i, azimuth in shots:
         if not m.finite[i]:
             continue
-        a, b, radius = log.capsules
         grippers = np.stack([log.gripper_position[side][i] for side in SIDES])
         target = log.joint_position[i].mean(axis=0) - [0.0, 0.0, 0.12]
         eye = target + 2.9 * np.array([np.cos(azimuth), np.sin(azimuth), 0.22])
@@ -303,7 +303,7 @@ def _pictures(log: RunLog, m: Measures) -> str:
         picture = render_still(
             log.faces,
             log.garment_position(i),
-            (a[i], b[i], radius),
+            _person(log, skin, i),
             grippers,
             camera,
             _STILL_SIZE,
@@ -320,6 +320,14 @@ def _pictures(log: RunLog, m: Measures) -> str:
         for side in missing
     )
     return f'<div class="pictures">{"".join(figures)}</div>{note}'
+
+
+def _person(log: RunLog, skin: LoggedSkin | None, i: int) -> Limbs | Surface:
+    """Returns the person at sample `i`: the skin where it is known, otherwise the limbs."""
+    if skin is not None and skin.is_known(i):
+        return Surface(skin.vertices(i), skin.faces)
+    a, b, radius = log.capsules
+    return a[i], b[i], radius
 
 
 def _png(picture: npt.NDArray[np.uint8]) -> str:

@@ -13,6 +13,8 @@ from drake_dress.report.log_schema import STAGE_NAMES
 
 OUTSIDE = Rgba(0.22, 0.44, 0.70, 1.0)
 LINING = Rgba(0.87, 0.62, 0.28, 1.0)
+# Around the body that the garment touches, which stays visible in it.
+_SKIN = Rgba(0.87, 0.70, 0.58, 0.45)
 _GRIPPER = Rgba(0.2, 0.2, 0.22, 1.0)
 _TARGET = {"left": Rgba(0.05, 0.65, 0.45, 1.0), "right": Rgba(0.85, 0.25, 0.2, 1.0)}
 # Joints whose forecast is shown: elbow and hand of the left, then of the right arm.
@@ -20,6 +22,18 @@ _FORESEEN = {"left": (1, 2), "right": (4, 5)}
 _TEXT = Rgba(0.1, 0.12, 0.15, 1.0)
 _TEXT_HEIGHT = 0.07  # m
 _TEXT_ABOVE = 0.5  # m above the garment, clear of a head
+
+
+def show_skin(meshcat: Meshcat, path: str, vertices: FloatArray, faces: IntArray) -> None:
+    """Draws a person's skin, translucent.
+
+    Args:
+        meshcat: Meshcat instance to draw in.
+        path: Path in Meshcat's tree.
+        vertices: (n,3), m.
+        faces: (F,3) triangles.
+    """
+    meshcat.SetTriangleMesh(path, np.asfortranarray(vertices.T), np.asfortranarray(faces.T), _SKIN)
 
 
 class DressingScene:

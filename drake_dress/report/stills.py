@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +44,24 @@ _FLOOR_RADIUS = 1.6  # m
 _GRIPPER_SIZE = 0.05  # m
 # A glTF mesh, such as an arm's link, makes VTK use physically based shading, darker by this factor.
 _PHYSICAL = 2.6
+_KEY_DIRECTION = (-0.6, -0.35, -1.2)  # in which the key light shines
 _LINING_OFFSET = 2e-3  # m, avoids z-fighting between the lining and the outside
+
+
+class Surface(NamedTuple):
+    """A surface of triangles.
+
+    Attributes:
+        vertices: (n,3), world, m.
+        faces: (F,3), counter-clockwise from outside.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+
+# A person as round cones: ends (c,3), (c,3) and radii (c,2), world, m.
+Limbs = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -64,7 +82,7 @@ class CameraPose:
 def render_still(
     faces: IntArray,
     position: FloatArray,
-    person: tuple[FloatArray, FloatArray, FloatArray],
+    person: Limbs | Surface,
     grippers: FloatArray,
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
@@ -76,7 +94,7 @@ def render_still(
     Args:
         faces: (F,3) triangles of the garment; their normals point outward.
         position: (n,3) nodes, world, m.
-        person: Ends (c,3), (c,3) and radii (c,2) of the person's capsules, world, m.
+        person: The person's limbs, or skin.
         grippers: (g,3) positions of the grippers, world, m.
         camera: Camera pose.
         size: Width and height, pixels.
@@ -86,13 +104,16 @@ def render_still(
     with_arms = arms is not None and len(arms) > 0
     scene = _Scene(with_arms)
     scene.add_garment(faces, position)
-    scene.add_capsules(*person, SKIN_COLOR)
+    if isinstance(person, Surface):
+        scene.add_surface(person, SKIN_COLOR)
+    else:
+        scene.add_capsules(*person, SKIN_COLOR)
     # with arms, the box is only the held cloth between the fingers
     gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
-        floor = floor_height(position, *person)
+        floor = floor_height(position, person)
     if arms is not None:
         scene.add_arms(arms, floor)
     middle = [camera.target[0], camera.target[1], floor - 0.01]
@@ -100,13 +121,13 @@ def render_still(
     return scene.picture(camera, size)
 
 
-def floor_height(
-    position: FloatArray, capsule_a: FloatArray, capsule_b: FloatArray, capsule_radius: FloatArray
-) -> float:
-    """Returns a height just below the garment (n,3) and capsules (c,3), (c,3), (c,2), m."""
+def floor_height(position: FloatArray, person: Limbs | Surface) -> float:
+    """Returns a height just below the garment's nodes (n,3) and the person, m."""
     low = float(position[:, 2].min())
-    if len(capsule_radius):
-        ends = np.stack([capsule_a[:, 2], capsule_b[:, 2]], axis=1) - capsule_radius
+    if isinstance(person, Surface):
+        low = min(low, float(person.vertices[:, 2].min()))
+    elif len(person[2]):
+        ends = np.stack([person[0][:, 2], person[1][:, 2]], axis=1) - person[2]
         low = min(low, float(ends.min()))
     return low - 0.005
 
@@ -151,6 +172,13 @@ class _Scene:
             mesh_shape(faces[:, ::-1], lining, -normals, "garment"), RigidTransform(), LINING_COLOR
         )
 
+    def add_surface(self, surface: Surface, color: _Color) -> None:
+        """Adds a closed surface, shaded smoothly."""
+        vertices = surface.vertices
+        faces = _nearest_last(surface.faces, vertices)
+        normals = node_normals(faces, vertices)
+        self.add(mesh_shape(faces, vertices, normals, "surface"), RigidTransform(), color)
+
     def add_arms(self, poses: FloatArray, floor: float) -> None:
         """Adds robot arms with bases and links at `poses` (a,8,4,4), on columns from the floor."""
         for arm in poses:
@@ -176,6 +204,16 @@ class _Scene:
         return np.array(image.data[:, :, :3])
 
 
+def _nearest_last(faces: IntArray, vertices: FloatArray) -> IntArray:
+    """Returns triangles in an order in which the nearest to the key light is the last.
+
+    VTK draws its map of shadows without a test of depth, so the last triangle that is drawn casts
+    the shadow, also on those before it.
+    """
+    along = vertices[faces].mean(axis=1) @ np.array(_KEY_DIRECTION)
+    return np.ascontiguousarray(faces[np.argsort(-along)])
+
+
 def _render_parameters(brightness: float) -> RenderEngineVtkParams:
     # A key light from the upper front left casts shadows; lamps on all sides, without shadows,
     # brighten the shaded side.
@@ -187,7 +225,7 @@ def _render_parameters(brightness: float) -> RenderEngineVtkParams:
     key = LightParameter(
         type="directional",
         frame="world",
-        direction=(-0.6, -0.35, -1.2),
+        direction=_KEY_DIRECTION,
         intensity=0.55 * brightness,
     )
     return RenderEngineVtkParams(

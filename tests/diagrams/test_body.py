@@ -8,14 +8,21 @@ import pytest
 import trimesh
 import yaml
 
-from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.scenario import (
+    Scenario,
+    apply_variation,
+    checked_scenario,
+    load_scenario,
+)
+from drake_dress.diagrams.scenario.schema import Variation
 from drake_dress.diagrams.scenario.text import resolved_yaml
 from drake_dress.diagrams.sections.person import measures
 from drake_dress.errors import UserError
 from drake_dress.models.human.body import BodyMeasures
-from drake_dress.models.human.skin.measures import body_measures, skin_measures
+from drake_dress.models.human.skin.measures import MEASURED, body_measures, skin_measures
 from drake_dress.models.human.skin.phenotype import Phenotype, phenotype_skin
 from drake_dress.models.human.skin.scan import NEEDED
+from tests.present import present
 
 WORDS = "sex: female, age: 80, height: 1.58, weight: 55"
 
@@ -114,3 +121,72 @@ def test_same_scenario_gives_the_same_measures(tmp_path: Path) -> None:
     path = scenario_with(tmp_path / "s.yaml", f"body: {{{WORDS}}}")
     first, second = (asdict(measures(load_scenario(path).person)) for _ in range(2))
     assert np.array_equal(list(first.values()), list(second.values()))
+
+
+DRAWN = "variation: {person_body: true}\n"
+
+
+def drawn(folder: Path, seed: int, text: str = DRAWN) -> Scenario:
+    path = folder / "drawn.yaml"
+    path.write_text(text, encoding="utf-8")
+    return apply_variation(load_scenario(path, seed=seed))
+
+
+def test_seed_draws_the_body_and_all_its_measures(tmp_path: Path) -> None:
+    first, again, other = (drawn(tmp_path, seed) for seed in (4, 4, 5))
+    assert first == again
+    assert first.variation == Variation()
+    body = present(first.person.body)
+    person = Phenotype(present(body.sex), *map(present, (body.age, body.height, body.weight)))
+    expected = body_measures(skin_measures(phenotype_skin(person)))
+    assert asdict(measures(first.person)) == pytest.approx(asdict(expected), abs=1e-5)
+    one, two = (asdict(measures(s.person)) for s in (first, other))
+    assert all(one[name] != two[name] for name in MEASURED)
+
+
+def test_drawn_body_does_not_change_what_else_is_drawn(tmp_path: Path) -> None:
+    others = "arm_angle_deg: 10, coat_measures: 0.03, person_measures: 0.02"
+    both = drawn(tmp_path, 6, f"variation: {{person_body: true, {others}}}\n")
+    alone = drawn(tmp_path, 6, f"variation: {{{others}}}\n")
+    assert both.garment == alone.garment
+    assert both.person.left_arm == alone.person.left_arm
+    # each measure of the drawn body varies on its own
+    body = drawn(tmp_path, 6)
+    for name in ("upper_arm_length", "chest_width", "hand_radius"):
+        factor = getattr(alone.person.measures, name) / getattr(BodyMeasures, name)
+        plain = getattr(body.person.measures, name)
+        assert getattr(both.person.measures, name) == pytest.approx(plain * factor)
+
+
+def test_drawn_body_is_loaded_again_from_the_log_s_scenario(tmp_path: Path) -> None:
+    once = drawn(tmp_path, 8)
+    (tmp_path / "again.yaml").write_text(resolved_yaml(once), encoding="utf-8")
+    again = load_scenario(tmp_path / "again.yaml")
+    assert again == once
+    assert apply_variation(again) == once
+    # what is not drawn yet can be written and read, too
+    plain = load_scenario(tmp_path / "drawn.yaml", seed=8)
+    assert apply_variation(checked_scenario(plain)) == once
+
+
+@pytest.mark.parametrize(
+    ("person", "key"),
+    [
+        (f"person: {{body: {{{WORDS}}}}}", "person.body"),
+        ("person: {measures: {hand_girth: 0.2}}", "person.measures.hand_radius"),
+        ("person: {right_measures: {forearm_length: 0.3}}", "person.right_measures.forearm_length"),
+        ("", "variation.person_scale"),
+    ],
+)
+def test_sizes_beside_a_drawn_body_are_refused(tmp_path: Path, person: str, key: str) -> None:
+    scale = ", person_scale: 0.05" if not person else ""
+    text = f"variation: {{person_body: true{scale}}}\n{person}\n"
+    with pytest.raises(UserError) as told:
+        drawn(tmp_path, 0, text)
+    assert told.value.key == key
+    assert "beside variation.person_body" in str(told.value)
+
+
+def test_neck_length_can_be_given_beside_a_drawn_body(tmp_path: Path) -> None:
+    scenario = drawn(tmp_path, 0, f"{DRAWN}person: {{measures: {{neck_length: 0.1}}}}\n")
+    assert scenario.person.measures.neck_length == 0.1

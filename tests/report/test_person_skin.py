@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from drake_dress.models.human.skin.phenotype import Phenotype, phenotype_skin
+from drake_dress.models.human.skin.person_skin import person_skin
+from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.report.log import RunLog
 from drake_dress.report.person_skin import logged_skin
 from drake_dress.report.replay import MeshcatReplay
@@ -27,7 +28,7 @@ def logged(path: Path, scenario: str) -> RunLog:
 def test_skin_is_that_of_the_scenario_with_its_shoulders_in_place(tmp_path: Path) -> None:
     with logged(tmp_path / "run.h5", BODY) as log:
         found = present(logged_skin(log))
-        expected = phenotype_skin(Phenotype("male", 50, 1.8, 85))
+        expected = person_skin(Phenotype("male", 50, 1.8, 85), "standing", None).rest
         assert np.array_equal(found.skin.vertices, expected.vertices)
         for sample in range(len(log)):
             shoulders = log.joint_position[sample][[0, 3]].mean(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import zlib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 
 from drake_dress.errors import UserError
 from drake_dress.report.log import RunLog
-from drake_dress.report.replay_html import _encode, _frames, write_replay_html
+from drake_dress.report.person_skin import logged_skin
+from drake_dress.report.replay_html import _encode, _frames, _skin_blob, write_replay_html
 from tests.present import present
 from tests.report import synthetic
 from tests.report.browser import needs_chromium, screenshot
@@ -50,6 +52,51 @@ def test_limbs_that_grow_toward_their_ends_look_thicker(page: Path, tmp_path: Pa
     plain = skin(page, "plain")
     assert plain > 0.002
     assert skin(tmp_path / "replay.html", "grown") > 1.15 * plain
+
+
+BODY = "person: {body: {sex: male, age: 50, height: 1.8, weight: 85}}\n"
+
+
+def test_skin_is_posed_from_what_the_page_holds(tmp_path: Path) -> None:
+    """Vertices at rest, motions of bones and weights give the vertices of each frame."""
+    garment = synthetic.coat(0.06)
+    data = synthetic.dressing(garment, count=4)
+    path = synthetic.write(tmp_path / "run.h5", garment, data, scenario=BODY)
+    with RunLog.open(path) as log:
+        skin = present(logged_skin(log))
+        n, count = len(skin.skin.vertices), len(skin.faces)
+        packed = zlib.decompress(base64.b64decode(_skin_blob(skin, np.arange(4))))
+        ends = np.cumsum([0, 12 * n, 4 * 9 * 12 * 4, 6 * count, 9 * n])
+        assert len(packed) == ends[-1]
+        rest, moving, faces, weights = (packed[a:b] for a, b in pairwise(ends))
+        assert np.array_equal(np.frombuffer(faces, "<u2").reshape(-1, 3), skin.faces)
+        w = np.frombuffer(weights, "u1").reshape(n, 9).astype(float)
+        w /= w.sum(axis=1, keepdims=True)
+        motions = np.frombuffer(moving, "<f4").reshape(4, 9, 3, 4).astype(float)
+        at_rest = np.column_stack([np.frombuffer(rest, "<f4").reshape(n, 3), np.ones(n)])
+        for i in range(4):
+            found = np.einsum("nb,bij,nj->ni", w, motions[i], at_rest)
+            # 1/255 of a weight, for two bones that are a hand's breadth apart
+            assert found == pytest.approx(skin.vertices(i), abs=2e-3)
+
+
+@needs_chromium
+def test_page_shows_the_skin(page: Path, tmp_path: Path) -> None:
+    garment = synthetic.coat(0.05)
+    data = synthetic.dressing(garment)
+    path = synthetic.write(tmp_path / "run.h5", garment, data, scenario=BODY)
+    with RunLog.open(path) as log:
+        write_replay_html(log, tmp_path / "replay.html")
+    assert (tmp_path / "replay.html").stat().st_size - page.stat().st_size < 300_000
+
+    def skin(of: Path, name: str) -> float:
+        picture = screenshot(f"{of.as_uri()}#t=0", tmp_path, name)[170:530]
+        red, blue = picture[:, :, 0], picture[:, :, 2]
+        return float(((red > blue + 0.12) & (red > 0.4)).mean())
+
+    with_skin, without = skin(tmp_path / "replay.html", "skin"), skin(page, "cones")
+    # the synthetic person of cones is thin and has no legs
+    assert with_skin > 1.5 * without
 
 
 @needs_chromium

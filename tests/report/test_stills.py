@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from drake_dress.report.stills import CameraPose, node_normals, render_still
+from drake_dress.report.stills import CameraPose, Surface, node_normals, render_still
+from tests.models.human.skin.bodies import WOMAN, skin_of
 from tests.report import synthetic
 
 
@@ -47,6 +49,25 @@ def test_limbs_that_grow_toward_their_ends_show_more_skin() -> None:
         return float(there.mean())
 
     assert skin(_picture(0.0, 2.0)) > 1.2 * skin(_picture(0.0))
+
+
+def test_a_skin_is_shown_in_place_of_limbs() -> None:
+    garment = synthetic.coat(0.06)
+    skin = skin_of(WOMAN)
+    picture = render_still(
+        garment.faces,
+        garment.rest_position + [-9.0, 0.0, 0.0],
+        Surface(skin.vertices, skin.faces.astype(np.int32)),
+        grippers=np.zeros((0, 3)),
+        camera=CameraPose((4.0, 0.0, 1.0), (0.0, 0.0, 0.85)),
+        size=(240, 320),
+    ).astype(float)
+    there = (picture[:, :, 0] > picture[:, :, 2] + 30.0) & (picture[:, :, 0] > 100.0)
+    rows = np.nonzero(there.any(axis=1))[0]
+    # 1.63 m of the 2.47 m that the picture shows at 4 m
+    assert (rows[-1] - rows[0]) / 320 == pytest.approx(1.63 / 2.47, abs=0.05)
+    # the soles are on the floor, whose disk is all around them
+    assert not there[rows[-1] + 3 :].any()
 
 
 def test_normals_of_a_flat_sheet_are_its_normal() -> None:

@@ -8,6 +8,7 @@ from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Coat,
     Controller,
+    Measures,
     Motion,
     Person,
     Safety,
@@ -20,6 +21,7 @@ from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.human.arm import JOINT_NAMES
+from drake_dress.models.human.skin.measures import MEASURED
 from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import sources_of
@@ -170,6 +172,34 @@ def check_coat(source: str, coat: Coat) -> None:
             body_of_size(coat.size_table, coat.size)
         except UserError as error:
             raise UserError(source, f"garment.coat.{error.key}", error.message) from error
+
+
+def check_drawn_body(source: str, scenario: Scenario) -> None:
+    """Checks that nothing else gives the sizes of a person whose body is drawn.
+
+    Loading sets all measures, so only those that differ from the default person's are given ones.
+    """
+    if not scenario.variation.person_body:
+        return
+    person, default = scenario.person, Measures()
+    measures, sides = person.measures, ("left_measures", "right_measures")
+    given = [f"measures.{n}" for n in MEASURED if getattr(measures, n) != getattr(default, n)]
+    given += [
+        f"{side}.{name}"
+        for side in sides
+        for name, value in vars(getattr(person, side)).items()
+        if value is not None
+    ]
+    keys = ["person.body"] if person.body is not None else [f"person.{name}" for name in given]
+    if scenario.variation.person_scale > 0.0:
+        keys.append("variation.person_scale")
+    if keys:
+        raise UserError(
+            source,
+            keys[0],
+            "is given beside variation.person_body, which draws the person's sizes; "
+            "expected one of them",
+        )
 
 
 def check_behaviour(source: str, person: Person) -> None:

@@ -19,6 +19,7 @@ from drake_dress.diagrams.scenario.checks import (
     check_coat,
     check_controller,
     check_costs,
+    check_drawn_body,
     check_hardware,
     check_joints,
     check_safety,
@@ -89,6 +90,7 @@ def _checked(
     except (RuntimeError, ValueError, TypeError) as error:
         raise UserError(source, "", f"cannot be read: {error}") from error
     check_ranges(source, "", scenario)
+    check_drawn_body(source, scenario)
     fill_in_body(source, scenario.person, _given_measures(content))
     check_ranges(source, "person.measures", scenario.person.measures)
     _move_force_limit(source, content, scenario)

@@ -1063,12 +1063,15 @@ class Lab:
 
 @dataclass
 class Variation:
-    """Quantities that the seed draws, uniformly within plus or minus these widths.
+    """Quantities that the seed draws: numbers uniformly within plus or minus these widths.
 
     Attributes:
         arm_angle_deg: width on abduction, extension and elbow of each arm, degrees.
         coat_scale: relative width on all lengths of the garment at once.
         coat_measures: relative width on each measure of the coat independently.
+        person_body: whether the person is an adult drawn with sex, age, height and weight as in the
+            United States (docs/persons.md). Not beside `person.body`, given measures of the person,
+            or `person_scale`, which would be a second size.
         person_scale: relative width on all body lengths at once; masses scale with the cube.
         person_measures: relative width on each body measure independently.
         plant_stiffness: relative width on stretch and bending stiffness.
@@ -1079,6 +1082,7 @@ class Variation:
     arm_angle_deg: float = 0.0
     coat_scale: float = 0.0
     coat_measures: float = 0.0
+    person_body: bool = False
     person_scale: float = 0.0
     person_measures: float = 0.0
     plant_stiffness: float = 0.0

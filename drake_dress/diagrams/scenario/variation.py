@@ -9,8 +9,10 @@ from dataclasses import fields
 
 import numpy as np
 
+from drake_dress.diagrams.scenario.body import fill_in_body
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters, coat_scale
 from drake_dress.diagrams.scenario.schema import (
+    Body,
     Coat,
     Person,
     Scenario,
@@ -18,10 +20,11 @@ from drake_dress.diagrams.scenario.schema import (
     Variation,
 )
 from drake_dress.diagrams.sections.person import measures
+from drake_dress.models.human.skin.drawing import draw_phenotype
 from drake_dress.models.sides import SIDES
 
 # Added to the seed for the generators of the later groups.
-_COAT, _PERSON = 1, 2
+_COAT, _PERSON, _BODY = 1, 2, 3
 _MASSES = ("upper_arm_mass", "forearm_mass")
 
 Draw = Callable[[float], float]
@@ -48,6 +51,8 @@ def apply_variation(scenario: Scenario) -> Scenario:
     drawn.station.start.lateral_offset += draw(v.start_offset)
     if v.coat_measures > 0.0:
         _vary_coat(drawn.garment.coat, v.coat_measures, _uniform(scenario.seed, _COAT))
+    if v.person_body:
+        _draw_body(drawn.person, np.random.default_rng((scenario.seed, _BODY)))
     if v.person_scale > 0.0 or v.person_measures > 0.0:
         _vary_person(drawn.person, v, _uniform(scenario.seed, _PERSON))
     drawn.variation = Variation()
@@ -62,6 +67,13 @@ def _vary_coat(coat: Coat, width: float, draw: Draw) -> None:
         if value is not None:
             # given measures are scaled when the coat is made
             setattr(coat, name, value / coat_scale(coat, name) * factor)
+
+
+def _draw_body(person: Person, rng: np.random.Generator) -> None:
+    """Replaces the person's body by that of a drawn adult."""
+    drawn = draw_phenotype(rng)
+    person.body = Body(str(drawn.sex), drawn.age, drawn.height, drawn.weight, drawn.muscle)
+    fill_in_body("variation.person_body", person, given=())
 
 
 def _vary_person(person: Person, v: Variation, draw: Draw) -> None:

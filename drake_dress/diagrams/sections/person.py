@@ -17,6 +17,7 @@ from drake_dress.models.human.body import ArmMeasures, ArmPose, BodyMeasures, Po
 from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.muscles import sagged
+from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.sides import SIDES, Side
 
@@ -29,6 +30,17 @@ def measures(person: schema.Person) -> BodyMeasures:
     left, right = (own if own.given else None for own in sides)
     body: BodyMeasures = model_of(person.measures, left=left, right=right)
     return body
+
+
+def phenotype(person: schema.Person) -> Phenotype | None:
+    """Returns sex, age, height and weight; None if the body is a scan, or measures alone."""
+    body = person.body
+    if body is None:
+        return None
+    sex, age, height, weight = body.sex, body.age, body.height, body.weight
+    if sex is None or age is None or height is None or weight is None:
+        return None
+    return Phenotype(sex, age, height, weight, body.muscle)
 
 
 def posture(person: schema.Person) -> Posture:

@@ -1,11 +1,16 @@
 """Sizes: body measures by size code, and a cut's measures for a body.
 
-The codes and the girths and statures that they stand for are the intervals of EN 13402-3 (size
-designation of clothes): letters by bust or chest, numbers by half the chest (men) or by the bust
-(women), children by stature. The standard leaves the other body measures open. They follow here
-from straight lines over chest or stature, as pattern makers grade them: across the shoulders, for
-instance, 1 cm for 4 cm of a man's chest. Codes beyond the standard (4XL, 5XL, numbers at both ends)
-go on in its steps.
+Letters stand for the intervals of bust or chest of EN 13402-3 (size designation of clothes),
+children's codes for its statures. Numbers are not in the standard but in the trade: half the chest
+(men), half the bust less 6 cm (women, to 46), both of which are the middles of its intervals. The
+standard leaves the other body measures open. They follow here from straight lines over chest or
+stature, as pattern makers grade them: across the shoulders, for instance, 1 cm for 4 cm of a man's
+chest.
+
+Sources, as the standard itself is not public: its intervals of the bust, 74 to 102 cm in steps of 4
+and 107 to 131 cm in steps of 6, in the documentation of the R package Anthropometry
+(`bustSizesStandard`); letters, also 4XL and 5XL, in Wikipedia, "Joint European standard for size
+labelling of clothes". Children's chests are from memory, unchecked.
 """
 
 from __future__ import annotations
@@ -22,10 +27,11 @@ SIZE_TABLES = ("women", "men", "children")
 _LETTERS = ("XS", "S", "M", "L", "XL", "XXL", "3XL", "4XL", "5XL")
 _NUMBERS = tuple(range(34, 61, 2))
 # Middles of the intervals of chest and bust, m.
-_MEN_LETTERS = (0.82, 0.90, 0.98, 1.06, 1.14, 1.235, 1.35, 1.47, 1.59)
+_MEN_LETTERS = (0.82, 0.90, 0.98, 1.06, 1.14, 1.235, 1.35, 1.475, 1.60)
 _WOMEN_LETTERS = (0.78, 0.86, 0.94, 1.025, 1.13, 1.25, 1.37, 1.49, 1.61)
-_WOMEN_NUMBERS = tuple(0.80 + 0.04 * k for k in range(6)) + tuple(
-    1.00 + 0.06 * k for k in range(1, 9)
+# 34 is 80 cm; steps of 4 cm to 104 cm (46), then of 6 cm.
+_WOMEN_NUMBERS = tuple(0.80 + 0.04 * k for k in range(7)) + tuple(
+    1.04 + 0.06 * k for k in range(1, 8)
 )
 # Stature, cm, and chest, m, of children.
 _CHILDREN = {

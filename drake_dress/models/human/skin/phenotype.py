@@ -17,9 +17,10 @@ from drake_dress.models.human.skin.body_file import BodyFile, read_body
 from drake_dress.models.human.skin.macro import Macro, age_parameter
 from drake_dress.models.human.skin.skin import Skin, enclosed_volume, skin_of_points
 
-# Mass over the volume inside the skin, kg/m³, lungs included. Tissue of adults has 1030 to 1070
-# (Durnin and Womersley 1974); the air of a relaxed breath takes 3 to 5 % of the volume (functional
-# residual capacity 2.7 to 3.3 l, ICRP 89). So it is within 2 % of this for most persons.
+# Mass over the volume inside the skin, kg/m³, lungs included. Without air, adults have 1015 to 1062
+# (equations of Durnin and Womersley 1974, Br J Nutr 32:77, for skinfolds of 40 to 70 mm together).
+# A relaxed breath leaves 3.3 l of air in a man of 1.76 m and 2.8 l in a woman of 1.63 m (Crapo and
+# others 1982). Together that is 970 to 1020, so this is within 3 % for most adults.
 DENSITY = 1000.0
 AGE_RANGE = (4.0, 100.0)  # years
 HEIGHT_RANGE = (0.8, 2.3)  # m

@@ -39,15 +39,15 @@ def rest_pose(skin: Skin, side: Side) -> ArmPose:
     return ArmPose(abduction, extension, rotation, flexion)
 
 
-def posed_vertices(
+def bone_motions(
     skin: Skin, arms: Mapping[Side, ArmPose], posture: Posture = "standing"
 ) -> FloatArray:
-    """Returns the vertices (n,3) of a posed skin in the torso's frame, m.
+    """Returns the motions (9,3,4) of `ALL_BONES` from rest to a pose: rotation, translation in m.
 
     Args:
         skin: at rest.
-        arms: angles of each arm; a side that is missing stays at rest.
-        posture: who sits has horizontal thighs; the feet stay on the floor.
+        arms: pose of each arm; an arm that is not given stays as it is at rest.
+        posture: standing or sitting. Sitting persons have their thighs horizontal.
     """
     motions = dict.fromkeys(ALL_BONES, _STILL)
     for side, pose in arms.items():
@@ -56,11 +56,23 @@ def posed_vertices(
         for side in SIDES:
             motions |= _leg_motions(skin, side)
     transform = np.stack([np.column_stack(motions[name]) for name in ALL_BONES])
-    blended = (skin.weights @ transform.reshape(len(ALL_BONES), 12)).reshape(-1, 3, 4)
-    vertices = np.einsum("nij,nj->ni", blended[:, :, :3], skin.vertices) + blended[:, :, 3]
     if posture == "sitting":
-        vertices[:, 2] -= sitting_drop(skin)
-    return np.asarray(vertices)
+        transform[:, 2, 3] -= sitting_drop(skin)
+    return transform
+
+
+def moved_vertices(skin: Skin, motions: FloatArray) -> FloatArray:
+    """Returns the vertices (n,3) of a skin whose bones moved by `motions` (9,3,4), m."""
+    blended = (skin.weights @ motions.reshape(len(ALL_BONES), 12)).reshape(-1, 3, 4)
+    turned = np.einsum("nij,nj->ni", blended[:, :, :3], skin.vertices)
+    return np.asarray(turned + blended[:, :, 3])
+
+
+def posed_vertices(
+    skin: Skin, arms: Mapping[Side, ArmPose], posture: Posture = "standing"
+) -> FloatArray:
+    """Returns the vertices (n,3) of a posed skin in the torso's frame, m; see `bone_motions`."""
+    return moved_vertices(skin, bone_motions(skin, arms, posture))
 
 
 def sitting_drop(skin: Skin) -> float:

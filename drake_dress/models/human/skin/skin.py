@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,6 +62,12 @@ class Skin:
     def faces_without(self, parts: tuple[str, ...]) -> IndexArray:
         """Returns the faces none of whose vertices belong to some parts."""
         return self.faces_of(tuple(part for part in PARTS if part not in parts))
+
+
+def scaled(skin: Skin, factor: float) -> Skin:
+    """Returns a skin that is larger by a factor in all directions."""
+    joints = {name: factor * place for name, place in skin.joints.items()}
+    return replace(skin, vertices=factor * skin.vertices, joints=joints)
 
 
 def enclosed_volume(vertices: FloatArray, faces: IndexArray) -> float:

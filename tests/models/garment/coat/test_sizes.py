@@ -49,6 +49,8 @@ def test_tables_have_the_sizes_that_are_promised() -> None:
         ("men", "M", 0.94, 1.02),
         ("men", "XXL", 1.18, 1.29),
         ("men", "3XL", 1.29, 1.41),
+        ("men", "4XL", 1.41, 1.54),
+        ("men", "5XL", 1.54, 1.66),
         ("men", "48", 0.94, 0.98),
         ("women", "S", 0.82, 0.90),
         ("women", "M", 0.90, 0.98),
@@ -56,12 +58,21 @@ def test_tables_have_the_sizes_that_are_promised() -> None:
         ("women", "XL", 1.07, 1.19),
         ("women", "36", 0.82, 0.86),
         ("women", "48", 1.07, 1.13),
+        ("women", "3XL", 1.31, 1.43),
+        ("women", "5XL", 1.55, 1.67),
     ],
 )
 def test_sizes_stand_for_the_girths_of_the_standard(
     table: str, code: str, low: float, high: float
 ) -> None:
     assert low < body_of_size(table, code).chest < high
+
+
+def test_women_s_numbers_are_the_middles_of_the_intervals() -> None:
+    edges = [*range(78, 103, 4), *range(107, 132, 6)]  # cm, from 34 on
+    for number, low, high in zip(range(34, 54, 2), edges, edges[1:], strict=False):
+        bust = 100.0 * body_of_size("women", str(number)).chest
+        assert bust == pytest.approx(0.5 * (low + high), abs=0.51), number
 
 
 @pytest.mark.parametrize(
