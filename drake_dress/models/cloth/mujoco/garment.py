@@ -23,14 +23,15 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.material import Material
+from drake_dress.models.cloth.mujoco.approach import contact_parameters
 from drake_dress.models.cloth.mujoco.bodies import BODY_BIT, CLOTH_BIT, bodies_xml, meshes_xml
 from drake_dress.models.cloth.mujoco.settings import MujocoSettings
 from drake_dress.models.cloth.mujoco.text import numbers
 
 # Thickness of a fabric that does not bend, m.
 _THIN = 1e-5
-# Time constant and damping ratio of contact. The integrator replaces rows that the time step cannot
-# resolve by the stiffest without rebound; with MuJoCo's default garments sink in by centimetres.
+# Time constant and damping ratio of contact of layers. The integrator replaces rows that the time
+# step cannot resolve by the stiffest without rebound.
 _STIFF = 'solref="0.001 1"'
 # Upper limit of the memory for contacts, which is used as needed.
 _MEMORY = "256M"
@@ -63,7 +64,7 @@ def model_xml(
 {_fabric(elements, material, area)}
 </worldbody>
 <deformable>
-{_edges(elements, held, material)}
+{_edges(elements, held, material, time_step)}
 {_layers(elements, held, material) if settings.self_collision else ""}
 </deformable>
 </mujoco>"""
@@ -89,7 +90,7 @@ def _fabric(elements: Elements, material: Material, area: float) -> str:
     )
 
 
-def _edges(elements: Elements, held: IntArray, material: Material) -> str:
+def _edges(elements: Elements, held: IntArray, material: Material, time_step: float) -> str:
     """Returns the flex that touches the bodies."""
     return _flex(
         "edges",
@@ -97,7 +98,7 @@ def _edges(elements: Elements, held: IntArray, material: Material) -> str:
         elements.node_count,
         material,
         f'contype="{CLOTH_BIT}" conaffinity="{BODY_BIT}" selfcollide="none" condim="3" '
-        f'friction="{material.friction:.12g} 0.005 0.0001"',
+        f'friction="{material.friction:.12g} 0.005 0.0001" {contact_parameters(time_step)}',
     )
 
 
@@ -108,7 +109,7 @@ def _layers(elements: Elements, held: IntArray, material: Material) -> str:
         _without(elements.triangle, held),
         elements.node_count,
         material,
-        'contype="4" conaffinity="4" selfcollide="auto" condim="1"',
+        f'contype="4" conaffinity="4" selfcollide="auto" condim="1" {_STIFF}',
     )
 
 
@@ -119,7 +120,7 @@ def _flex(name: str, element: IntArray, count: int, material: Material, contact:
     nodes = " ".join(f"node_{i}" for i in range(count))
     return (
         f'<flex name="{name}" dim="{element.shape[1] - 1}" radius="{material.margin:.12g}" '
-        f'body="{nodes}" element="{numbers(element)}"><contact {contact} {_STIFF}/></flex>'
+        f'body="{nodes}" element="{numbers(element)}"><contact {contact}/></flex>'
     )
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.matrices import bending_bound, stretch_matrix
+from drake_dress.models.cloth.mujoco.approach import stop_at_the_surface
 from drake_dress.models.cloth.mujoco.bodies import HEAVY, Bodies
 from drake_dress.models.cloth.mujoco.garment import model_xml, touching_edges
 from drake_dress.models.cloth.mujoco.settings import MujocoSettings, import_mujoco
@@ -106,7 +107,9 @@ class Simulator:
             given = force.copy()
             given[self._held] = 0.0
             data.qfrc_applied[self._dof] += given
-        mujoco.mj_step(self._model, data)
+        mujoco.mj_step1(self._model, data)
+        stop_at_the_surface(data, self._h)
+        mujoco.mj_step2(self._model, data)
         full = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
         if any(data.warning[kind].number for kind in full):
             raise ValueError(f"MuJoCo has no memory for {data.ncon} contacts or more")
