@@ -1,6 +1,6 @@
 """Dresses with MuJoCo as the world, and compares with the package's own simulation.
 
-    drake-dress bench transfer --seeds 0-19 --json out/transfer.json
+    drake-dress bench transfer --draw report:20 --root 44 --json benchmarks/transfer/results.json
 
 Every run is a separate `drake-dress run` of a varied `dummy_standing`; its seed draws pose, body,
 coat, fabric and start, as in `bench dressing`. Controllers do not know which world they act on.
@@ -34,14 +34,27 @@ from benchmarks.pairs import (
 )
 from benchmarks.parser import OneLineParser, exit_with
 from benchmarks.seeds import add_seed_options, chosen_seeds
+from benchmarks.statistics import wilson
 from benchmarks.study import Study, add_choices, add_study_options, carry_out, exit_status, run_case
 from drake_dress.models.cloth.mujoco.settings import import_mujoco
+from drake_dress.models.sides import SIDES
+from drake_dress.report.summary import SuccessRules
 
 _NAME = "transfer"
 WORLDS = ("mujoco", "implicit")
 # Share of runs that are to dress in MuJoCo's world, %.
 _ASKED = 75.0
-_HEADER = [*GROUP_HEADER, "penetration, mm", "edge strain", "real-time factor", "wall time, s"]
+_HEADER = [
+    *GROUP_HEADER,
+    "both sleeves on",
+    "stay on",
+    "penetration, mm",
+    "runs too deep",
+    "edge strain",
+    "real-time factor",
+    "wall time, s",
+]
+_RULES = SuccessRules()
 
 
 @dataclass(frozen=True)
@@ -116,6 +129,8 @@ def figures(results: Sequence[dict[str, Any]]) -> list[Figure]:
         name = f"{world}: runs dressed of {len(runs)}"
         asked = world == "mujoco"
         found.append(at_least(name, share, "%", _ASKED) if asked else Figure(name, share, "%"))
+        for end, value in zip(("lower", "upper"), wilson(dressed(runs), len(runs)), strict=True):
+            found.append(Figure(f"{world}: {end} end of the 90 % interval", 100.0 * value, "%"))
         time = dressing_time(runs)
         if time is not None:
             found.append(Figure(f"{world}: time to dress, median", time, "s"))
@@ -142,14 +157,30 @@ def _lists(
 
 
 def _more(runs: Sequence[dict[str, Any]]) -> list[float]:
-    """Returns the largest penetration, mm, and strain; median speed and wall time, s."""
+    """Returns the cells of `_HEADER` after those of `GROUP_HEADER`.
+
+    They are counts of runs with both sleeves on, of those that stay on, the largest penetration,
+    mm, the count of runs beyond its limit, the largest strain; median speed and wall time, s.
+    """
     summaries = [r["summary"] for r in runs]
+    depths = [s["max_penetration_m"] for s in summaries]
     return [
-        1e3 * max(s["max_penetration_m"] for s in summaries),
+        sum(map(_sleeves_on, summaries)),
+        sum(bool(s["stays_on"]) for s in summaries),
+        1e3 * max(depths),
+        sum(depth > _RULES.max_penetration for depth in depths),
         max(s["max_edge_strain"] for s in summaries),
         _pace(runs),
         float(np.median([s["wall_time_s"] for s in summaries])),
     ]
+
+
+def _sleeves_on(summary: dict[str, Any]) -> bool:
+    """Returns whether both sleeves were on when the coat was laid, or at the end if it was not."""
+    return all(
+        summary[f"arm_inside_{side}"] and (summary[f"s_dressed_{side}"] or 0.0) >= _RULES.min_s
+        for side in SIDES
+    )
 
 
 def _pace(runs: Sequence[dict[str, Any]]) -> float:

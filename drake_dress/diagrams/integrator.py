@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from drake_dress.errors import UserError
 from drake_dress.models.cloth.mujoco.settings import import_mujoco
 from drake_dress.models.effects.effect import (
@@ -15,8 +13,6 @@ from drake_dress.models.effects.effect import (
     FrictionEffect,
     StretchEffect,
 )
-from drake_dress.models.human.body import Capsule
-from drake_dress.models.human.shape import capsule_arrays
 
 MUJOCO = "mujoco"
 # Why MuJoCo's garment cannot have effects of some kinds.
@@ -28,19 +24,16 @@ _REASONS: dict[type[Effect], str] = {
 }
 
 
-def check_integrator(
-    source: str, integrator: str, effects: Sequence[Effect], capsules: Sequence[Capsule]
-) -> None:
+def check_integrator(source: str, integrator: str, effects: Sequence[Effect]) -> None:
     """Checks that MuJoCo, where it is asked for, is installed and can express all effects.
 
     Args:
         source: name of the scenario in messages.
         integrator: `plant.integrator`.
         effects: those that are switched on.
-        capsules: of the person.
 
     Raises:
-        UserError: it is not installed, or an effect or the person's shape is beyond it.
+        UserError: it is not installed, or an effect is beyond it.
     """
     if integrator != MUJOCO:
         return
@@ -53,14 +46,6 @@ def check_integrator(
                     f"is on with plant.integrator: mujoco ({reason}), "
                     "expected it off or another integrator",
                 )
-    _, _, radii = capsule_arrays(capsules)
-    if np.any(radii[:, 0] != radii[:, 1]):
-        raise UserError(
-            source,
-            "person.measures",
-            "has limbs that taper, with plant.integrator: mujoco (its bodies are capsules), "
-            "expected one radius for each limb, or another integrator",
-        )
     import_mujoco()
 
 

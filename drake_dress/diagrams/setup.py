@@ -31,7 +31,6 @@ from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
-from drake_dress.models.human.body import body_capsules
 
 
 @dataclass(frozen=True)
@@ -107,8 +106,7 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
     check_opening(plant, scenario.station.side, str(source))
     station = station_parameters(scenario, plant)
-    capsules = body_capsules(station.measures, station.posture)
-    check_integrator(str(source), station.integrator, station.effects, capsules)
+    check_integrator(str(source), station.integrator, station.effects)
     limits = safety_limits(scenario.safety)
     broken = limits.broken_at(start_grippers(station))
     if broken is not None:

@@ -548,7 +548,7 @@ def _integrator(p: StationParameters, held: IntArray) -> Integrator:
     if p.integrator == "mujoco":
         # layers collide within its own step
         return _with_effects(
-            p, Scheme(p.mesh.held, p.time_step, MujocoSettings(self_collision=p.self_collision))
+            p, Scheme(held, p.time_step, MujocoSettings(self_collision=p.self_collision))
         )
     if p.integrator == "projective_dynamics":
         settings = ProjectiveSettings(quasi_newton=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,8 +21,13 @@ def result(world: str, seed: int, time: float | None, force: float = 8.0) -> dic
             "success": time is not None,
             "reason": None if time is not None else "left sleeve: off",
             "dressing_time_s": time,
+            "arm_inside_left": True,
+            "arm_inside_right": True,
+            "s_dressed_left": 1.95 if time is not None else 1.8,
+            "s_dressed_right": 2.0,
+            "stays_on": True if time is not None else None,
             "max_gripper_force_N": 2.0 * force,
-            "max_penetration_m": 0.001 * (seed + 1),
+            "max_penetration_m": 0.002 * (seed + 1),
             "max_edge_strain": 0.1,
             "realtime_factor": 0.25,
             "wall_time_s": 240.0,
@@ -38,7 +45,8 @@ RESULTS = [
 def test_worlds_are_compared_seed_by_seed() -> None:
     worlds, beside, reasons = tables(RESULTS)
     assert [row[:3] for row in worlds.rows] == [["mujoco", 4, 3], ["implicit", 4, 4]]
-    assert worlds.rows[0][-4:] == [4.0, 0.1, 0.25, 240.0]
+    # both on, stay on, mm, deeper than 5 mm, strain, speed, wall time
+    assert worlds.rows[0][-7:] == [3, 3, 8.0, 2, 0.1, 0.25, 240.0]
     (row,) = beside.rows
     # pairs, both, only mujoco, only implicit, neither; later by 2 s, and 2 N more
     assert row[:5] == [4, 3, 0, 1, 0]
@@ -53,6 +61,8 @@ def test_three_of_four_dressings_are_asked_in_the_other_world() -> None:
     share = found["mujoco: runs dressed of 4"]
     assert (share.value, share.asked, share.met) == (75.0, 75.0, True)
     assert found["implicit: runs dressed of 4"].asked is None
+    ends = [found[f"mujoco: {end} end of the 90 % interval"].value for end in ("lower", "upper")]
+    assert 30.0 < ends[0] < 75.0 < ends[1] < 98.0
     assert found["mujoco: time to dress, median"].value == 24.0
     worse = figures([*RESULTS, result("mujoco", 9, None)])
     assert not {f.name: f for f in worse}["mujoco: runs dressed of 5"].met
@@ -75,6 +85,29 @@ def test_runs_differ_in_the_world_alone(monkeypatch: pytest.MonkeyPatch) -> None
     other.plant.integrator = "implicit"
     assert other == own
     assert own.duration == 5.0
+
+
+def test_results_are_kept_and_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A second call with the same root runs what is missing, and no seed twice."""
+    ran: list[str] = []
+
+    def once(case: Case, keep: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
+        ran.append(case.name)
+        assert case.seed >= 1000
+        return result(case.world, case.seed, 20.0)
+
+    monkeypatch.setattr("benchmarks.transfer.__main__.run", once)
+    monkeypatch.setattr("benchmarks.transfer.__main__.import_mujoco", lambda: None)
+    kept = str(tmp_path / "transfer.json")
+    for count, new in ((1, 2), (3, 4)):
+        draw = ["--draw", f"report:{count}", "--root", "7", "--json", kept, "--jobs", "1"]
+        before = len(ran)
+        assert main(draw) == 0
+        assert len(ran) - before == new
+    assert len(set(ran)) == len(ran)
+    assert "90 % interval" in capsys.readouterr().out
 
 
 def test_wrong_names_are_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from drake_dress.models.cloth.elements import Elements
 from drake_dress.models.cloth.finite import explain_not_finite
 from drake_dress.models.cloth.influences import NO_INFLUENCES, Influences
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.cloth.mujoco.bodies import check_shapes
+from drake_dress.models.cloth.mujoco.bodies import check_shapes, shapes_of
 from drake_dress.models.cloth.mujoco.settings import (
     DEFAULT_SETTINGS,
     MujocoSettings,
@@ -34,7 +34,7 @@ class MujocoCloth(SteppedCloth):
     The step is a function of its arguments alone: positions and velocities of all nodes and bodies
     and the solver's warm start are set before each. Held nodes and bodies move as prescribed
     (`bodies.py`). Compared with `ImplicitCloth`, cloth under compression does not buckle below the
-    mesh size, contact and friction are slightly soft, triangles touch the person and not only
+    mesh size, contact and friction are slightly soft, edges touch the person and not only
     nodes, and layers keep twice the margin apart. Layers that approach by more than 4 mm in a step
     may pass through each other, and are not led back. There are no derivatives.
 
@@ -67,7 +67,7 @@ class MujocoCloth(SteppedCloth):
             raise ValueError("MuJoCo's fabric is isotropic, expected no fibres")
         import_mujoco()
         self._settings = settings
-        # made at the first step, for the number of bodies that it has
+        # made at the first step, for the bodies that it has, and anew for others
         self._simulator: Simulator | None = None
 
     def step(
@@ -92,8 +92,9 @@ class MujocoCloth(SteppedCloth):
         """
         _check_influences(influences)
         check_shapes(obstacles)
-        if self._simulator is None or self._simulator.body_count != obstacles.count:
-            self._simulator = Simulator(self, self._settings, obstacles.count)
+        shapes = shapes_of(obstacles)
+        if self._simulator is None or not np.array_equal(self._simulator.shapes, shapes):
+            self._simulator = Simulator(self, self._settings, shapes)
         finite = np.isfinite(state.x).all() and np.isfinite(state.v).all()
         if not (finite and np.isfinite(held_velocity).all()):
             explain_not_finite(state.x, state.v, held_velocity, self.held)

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.matrices import bending_bound, stretch_matrix
+from drake_dress.models.cloth.mujoco.approach import stop_at_the_surface
 from drake_dress.models.cloth.mujoco.bodies import HEAVY, Bodies
-from drake_dress.models.cloth.mujoco.garment import model_xml, touching_triangles
+from drake_dress.models.cloth.mujoco.garment import model_xml, touching_edges
 from drake_dress.models.cloth.mujoco.settings import MujocoSettings, import_mujoco
 from drake_dress.models.cloth.mujoco.touching import Touching, touching
 from drake_dress.models.cloth.state import ClothState, SteppedCloth
@@ -38,23 +39,23 @@ class Simulator:
     Args:
         cloth: the garment.
         settings: solver settings.
-        body_count: number of the bodies, all capsules.
+        shapes: (count,3) of the bodies, from `shapes_of`.
     """
 
-    def __init__(self, cloth: SteppedCloth, settings: MujocoSettings, body_count: int) -> None:
+    def __init__(self, cloth: SteppedCloth, settings: MujocoSettings, shapes: FloatArray) -> None:
         self._mujoco = mujoco = import_mujoco()
         # Warnings would go to a log file in the current folder; MjData counts them.
         mujoco.set_mju_user_warning(lambda message: None)
-        self.body_count = body_count
+        self.shapes = shapes
         e, held = cloth.elements, cloth.held
         self._rest, self._held, self._h = e.rest_position, held, cloth.time_step
         self._friction = cloth.material.friction
-        self._triangle = touching_triangles(e, held)
+        self._edge = touching_edges(e, held)
         self._model: Any = mujoco.MjModel.from_xml_string(
-            model_xml(e, cloth.material, held, self._h, cloth.gravity, settings, body_count)
+            model_xml(e, cloth.material, held, self._h, cloth.gravity, settings, shapes)
         )
         self._data: Any = mujoco.MjData(self._model)
-        self._bodies = Bodies(self._model, body_count)
+        self._bodies = Bodies(self._model, shapes)
         nodes = self._model.flex_vertbodyid[: e.node_count]
         axes = np.arange(3)
         self._dof = self._model.body_dofadr[nodes][:, None] + axes
@@ -106,7 +107,9 @@ class Simulator:
             given = force.copy()
             given[self._held] = 0.0
             data.qfrc_applied[self._dof] += given
-        mujoco.mj_step(self._model, data)
+        mujoco.mj_step1(self._model, data)
+        stop_at_the_surface(data, self._h)
+        mujoco.mj_step2(self._model, data)
         full = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
         if any(data.warning[kind].number for kind in full):
             raise ValueError(f"MuJoCo has no memory for {data.ncon} contacts or more")
@@ -119,7 +122,7 @@ class Simulator:
     def touching(self) -> Touching:
         """Returns the contact of nodes and bodies in the last step."""
         return touching(
-            self._mujoco, self._model, self._data, self._dof, self._triangle, self._friction
+            self._mujoco, self._model, self._data, self._dof, self._edge, self._friction
         )
 
     def info(self) -> MujocoInfo:

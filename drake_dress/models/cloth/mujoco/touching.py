@@ -32,11 +32,11 @@ class Touching:
 
 
 def touching(
-    mujoco: Any, model: Any, data: Any, dof: IntArray, triangle: IntArray, friction: float
+    mujoco: Any, model: Any, data: Any, dof: IntArray, edge: IntArray, friction: float
 ) -> Touching:
     """Returns the contact of nodes and bodies in the last step.
 
-    The force of a contact acts on the nodes of its triangle by MuJoCo's own weights, Jᵀ f. A node
+    The force of a contact acts on the nodes of its edge by MuJoCo's own weights, Jᵀ f. A node
     between two bodies has the whole force, and counts as touching the one that pushes it more.
 
     Args:
@@ -44,7 +44,7 @@ def touching(
         model: MjModel.
         data: MjData after a step.
         dof: (n,3) degrees of freedom of the nodes.
-        triangle: (F,3) nodes of the triangles of the flex that touches bodies.
+        edge: (E,2) nodes of the edges of the flex that touches bodies.
         friction: coefficient of friction.
     """
     n = len(dof)
@@ -63,31 +63,27 @@ def touching(
     force = moved[dof]
 
     normal_force = data.efc_force[row]
-    nodes = triangle[contact.elem[of_body, 1]]
+    nodes = edge[contact.elem[of_body, 1]]
     bodies = contact.geom[of_body, 0]
     weight = _weights(data.flexvert_xpos[nodes], contact.pos[of_body])
     pushes = np.zeros((n, int(bodies.max()) + 1))
     normal = np.zeros((n, 3))
-    for corner in range(3):
-        share = weight[:, corner] * normal_force
-        np.add.at(pushes, (nodes[:, corner], bodies), share)
-        np.add.at(normal, nodes[:, corner], share[:, None] * contact.frame[of_body, :3])
+    for end in range(2):
+        share = weight[:, end] * normal_force
+        np.add.at(pushes, (nodes[:, end], bodies), share)
+        np.add.at(normal, nodes[:, end], share[:, None] * contact.frame[of_body, :3])
     touched = np.linalg.norm(force, axis=1) > _LEAST
     force[~touched] = 0.0
     owner = np.where(touched, pushes.argmax(axis=1), -1).astype(np.int32)
     return Touching(force, owner, _modes(force, normal, touched, friction))
 
 
-def _weights(corner: FloatArray, point: FloatArray) -> FloatArray:
-    """Returns (c,3) barycentric weights, none negative, of points (c,3) in triangles (c,3,3)."""
-    e1, e2, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], point - corner[:, 0]
-    a, b, c = (np.einsum("ij,ij->i", u, v) for u, v in ((e1, e1), (e1, e2), (e2, e2)))
-    d, e = np.einsum("ij,ij->i", p, e1), np.einsum("ij,ij->i", p, e2)
-    determinant = np.maximum(a * c - b * b, 1e-30)
-    s, t = (c * d - b * e) / determinant, (a * e - b * d) / determinant
-    weight = np.clip(np.stack([1.0 - s - t, s, t], axis=1), 0.0, 1.0)
-    shares: FloatArray = weight / weight.sum(axis=1, keepdims=True)
-    return shares
+def _weights(end: FloatArray, point: FloatArray) -> FloatArray:
+    """Returns (c,2) the weights of the ends (c,2,3) of edges at their nearest points to (c,3)."""
+    along = end[:, 1] - end[:, 0]
+    length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
+    second = np.clip(np.einsum("ij,ij->i", point - end[:, 0], along) / length2, 0.0, 1.0)
+    return np.stack([1.0 - second, second], axis=1)
 
 
 def _modes(force: FloatArray, normal: FloatArray, touched: Any, friction: float) -> IntArray:
