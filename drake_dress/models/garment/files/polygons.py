@@ -8,6 +8,7 @@ ear with the shortest diagonal first (Meisters 1975, "Polygons have ears").
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,6 +46,25 @@ def triangulated(
     owner = np.concatenate(owners)
     order = np.argsort(owner, kind="stable")
     return np.concatenate(triangles)[order], owner[order]
+
+
+def corners_triangulated(
+    position: FloatArray, polygons: Sequence[Sequence[int]]
+) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Returns triangles of numbered corners, for files that say something of each corner.
+
+    Args:
+        position: (n,3).
+        polygons: node indices of each, at least three.
+
+    Returns:
+        (k,) the node of each corner of all polygons in order; (F,3) triangles as indices of
+        corners; and (F,) the polygons, ascending.
+    """
+    node = np.array([corner for polygon in polygons for corner in polygon], dtype=np.int64)
+    ends = np.cumsum([0, *map(len, polygons)]).tolist()
+    corner, owner = triangulated(position[node], [range(a, b) for a, b in pairwise(ends)])
+    return node, corner, owner
 
 
 def _quads(position: FloatArray, corners: IndexArray) -> IndexArray:
