@@ -78,14 +78,8 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
                 # several words are several groups or one name with spaces: either may be asked for
                 groups = tuple(dict.fromkeys((*words, " ".join(words))))
             part = parts.setdefault(tuple(filter(None, (name, *groups))), len(parts))
-        elif keyword in _CURVED:
-            raise UserError(
-                source, f"line {line}", f"{keyword!r} is a curved surface, expected polygons"
-            )
-        elif keyword not in _PASSED:
-            raise UserError(
-                source, f"line {line}", f"{keyword[:40]!r} is no statement of the OBJ format"
-            )
+        else:
+            _check_passed(keyword, line, source)
     _check_range(polygons, polygon_line, len(nodes), source)
     position = np.array(nodes, dtype=np.float64).reshape(-1, 3)
     node, corner, owner = corners_triangulated(position, polygons)
@@ -99,6 +93,18 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
         face_line=np.array(polygon_line, dtype=np.int64)[owner],
         uv=_texture_of(textures, polygon_textures)[corner] if textures else None,
     )
+
+
+def _check_passed(keyword: str, line: int, source: str) -> None:
+    """Raises UserError if a statement describes a curved surface, or is none of the format."""
+    if keyword in _CURVED:
+        raise UserError(
+            source, f"line {line}", f"{keyword!r} is a curved surface, expected polygons"
+        )
+    if keyword not in _PASSED:
+        raise UserError(
+            source, f"line {line}", f"{keyword[:40]!r} is no statement of the OBJ format"
+        )
 
 
 def _statements(text: str) -> Iterator[tuple[int, str, list[str]]]:
