@@ -49,6 +49,7 @@ BENCHMARKS = {
     "gym": "speed of the Gymnasium environment, and dressings controlled through it",
     "hardware": "command rate, latency, fault reactions and memory; run and lab in two processes",
     "inputs": "reaction to damaged scenarios, garment files, measured logs and messages",
+    "files": "garment files of all kinds, made at run time: read right, or refused for a reason",
     "killed": "files left by runs that are killed, terminated or out of disk space",
     "local": "constrained DDP compared with the exact optimum",
     "delay": "solve time of the global controller on this machine",

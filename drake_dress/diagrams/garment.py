@@ -128,6 +128,7 @@ def _read_once(path: Path, mesh: schema.Mesh, progress: Progress) -> tuple[Whole
             facing=mesh.facing,
             weld=mesh.weld,
             front=mesh.front,
+            rest=mesh.rest,
             take=tuple(mesh.take),
             leave_out=tuple(mesh.leave_out),
             loops=mesh.loops,

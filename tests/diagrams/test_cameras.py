@@ -10,9 +10,10 @@ from pydrake.systems.primitives import ConstantVectorSource
 from scipy.spatial import cKDTree
 
 from drake_dress.diagrams.cameras import Camera, export_cameras, show_skin
-from drake_dress.diagrams.person import JointParameters, add_person, joint_positions
+from drake_dress.diagrams.person import add_person, joint_positions
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.human.body import ArmPose
+from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.skin.measures import body_measures, skin_measures
 from drake_dress.models.human.skin.person_skin import PersonSkin
 from drake_dress.models.sides import Side

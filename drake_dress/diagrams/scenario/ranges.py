@@ -12,6 +12,7 @@ from drake_dress.models.garment.coat import COATS, COLLARS, OPENINGS, SIZE_TABLE
 from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.garment.mesh_options import FRONTS, SCALE_RANGE, WELD_RANGE
+from drake_dress.models.garment.rest import RESTS
 from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.human.skin.phenotype import AGE_RANGE, HEIGHT_RANGE, WEIGHT_RANGE
 from drake_dress.models.human.skin.scan import JOINT_NAMES
@@ -33,6 +34,7 @@ CHOICES = {
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
     "garment.mesh.front": FRONTS,
+    "garment.mesh.rest": RESTS,
     "person.posture": ("standing", "sitting"),
     "person.body.sex": ("female", "male"),
     "person.body.scan.unit": tuple(UNITS),

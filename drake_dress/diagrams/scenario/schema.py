@@ -142,6 +142,9 @@ class Mesh:
             position are merged.
         front: front edges that coincide from neck to hem, such as a closed zip: `auto` and `open`
             keep them apart, `closed` sews them. With `open` the garment must be open.
+        rest: rest shape of the cloth. `mesh`: that of the file. `uv`: the size that it has in the
+            texture coordinates, where these are its flat pattern; meshes come draped on a body.
+            `auto`: `uv` where it can be, else `mesh`.
         take: parts of the file that are the garment, if not all are: names of objects or groups,
             sizes such as `>0.5 m` of connected parts, or places such as `near (0.1, 0, 1.2) m`.
         leave_out: parts to omit, in the same words; `<0.05 m` omits smaller connected parts.
@@ -159,6 +162,7 @@ class Mesh:
     facing: str | None = MeshOptions.facing
     weld: float = MeshOptions.weld
     front: str = MeshOptions.front
+    rest: str = MeshOptions.rest
     take: list[str] = field(default_factory=list)
     leave_out: list[str] = field(default_factory=list)
     loops: dict[str, list[int] | str] = field(default_factory=dict)

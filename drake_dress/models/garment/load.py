@@ -39,6 +39,7 @@ from drake_dress.models.garment.mesh_options import FRONTS, MeshOptions
 from drake_dress.models.garment.parts import check_one_part
 from drake_dress.models.garment.placed_loops import placed_loops
 from drake_dress.models.garment.plausible import check_plausible
+from drake_dress.models.garment.rest import MESH, at_rest
 from drake_dress.models.garment.simplify import to_spacing
 
 __all__ = ["EXTENSIONS", "UNITS", "MeshOptions", "WholeGarment", "load_garment", "read_garment"]
@@ -128,6 +129,7 @@ def load_garment(
     facing: str | None = None,
     take: Sequence[str] = (),
     front: str = FRONTS[0],
+    rest: str = MESH,
     progress: Progress = _silent,
 ) -> GarmentMesh:
     """Returns the garment of an OBJ, PLY, STL or glTF file, in the pose of `GarmentMesh`.
@@ -148,13 +150,14 @@ def load_garment(
             with y up, +y with x up.
         take: the only objects, groups, sizes or places to take, as in `leave_out`.
         front: `auto`, `open` or `closed`; see `MeshOptions`.
+        rest: `mesh`, `uv` or `auto`; see `MeshOptions`.
         progress: function that is called with the current task and the fraction of it that is done.
 
     Raises:
         UserError: the file, an option or the mesh is unusable; see `read_garment` and
             `WholeGarment.at_spacing`.
     """
-    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing, take, front)
+    options = MeshOptions(unit, up, weld, leave_out, loops, grasp, scale, facing, take, front, rest)
     whole = read_garment(path, options, progress)
     return whole.mesh() if spacing is None else whole.at_spacing(spacing, progress)
 
@@ -195,15 +198,16 @@ def _in_likely_unit(
     used = raw.position[np.unique(raw.faces)]
     diagonal = max(float(np.linalg.norm(np.ptp(used, axis=0))), 1e-12)
     found = []
+    as_it_is = replace(options, rest=MESH)
     for unit in units_that_fit(diagonal):
         with suppress(UserError):
-            whole = _checked(raw, parts, replace(options, unit=unit), progress)
+            whole = _checked(raw, parts, replace(as_it_is, unit=unit), progress)
             width = shoulder_width(whole.position, whole.loops)
             if is_life_size(width):
                 found.append((unit, width, whole))
     if not found:
         # as large as a jacket: what is wrong with it besides its size is told
-        like = _checked(raw.scaled(JACKET / diagonal), parts, replace(options, unit="m"), progress)
+        like = _checked(raw.scaled(JACKET / diagonal), parts, replace(as_it_is, unit="m"), progress)
         width = shoulder_width(like.position, like.loops) * diagonal / JACKET
         scale = f"garment.mesh.scale: {options.scale * ADULT / width:.2g}"
         raise UserError(
@@ -213,6 +217,8 @@ def _in_likely_unit(
             f"with garment.mesh.unit: m and {scale} they would be {ADULT} m wide",
         )
     unit, width, best = min(found, key=lambda item: from_adult(item[1]))
+    if options.rest != MESH:
+        best = _checked(raw, parts, replace(options, unit=unit), progress)
     note = f"the unit is {unit}, in which the shoulders are {width:.2f} m wide"
     return replace(best, notes=(note, *best.notes))
 
@@ -235,6 +241,9 @@ def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progre
     node, face = raw.node, raw.face
     check_manifold(raw.faces, len(raw.position), source, node, face)
     check_one_layer(raw)
+    raw, told = at_rest(
+        raw, options.rest, lambda share: progress("bringing the cloth to its flat size", share)
+    )
     faces = _outward(raw.position, raw.faces).astype(np.int32)
     given = options.loops or {}
     loops = {
@@ -252,7 +261,7 @@ def _checked(raw: RawMesh, parts: _Parts, options: MeshOptions, progress: Progre
     position, faces, placed = placed_loops(raw.position, faces, places, source)
     loops = with_openings(position, faces, loops | placed, options.up, options.facing, source)
     position = turned(position, options.up, options.facing)
-    whole = WholeGarment(source, position, faces, loops, grasp, notes)
+    whole = WholeGarment(source, position, faces, loops, grasp, (*notes, *told))
     whole = _front_as_asked(whole, sewn_edges(unmerged, raw), options.front, raw)
     whole.mesh().validate(source)
     return whole

@@ -151,8 +151,9 @@ def _turned_alike(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
         )
     faces = mesh.faces.copy()
     faces[turn] = faces[turn][:, ::-1]
+    uv = None if mesh.uv is None else np.where(turn[:, None, None], mesh.uv[:, ::-1], mesh.uv)
     told = f"{turn.sum()} of {count} triangles are wound the other way round"
-    return replace(mesh, faces=faces), [
+    return replace(mesh, faces=faces, uv=uv), [
         f"{told}, the first is {mesh.face(int(np.argmax(turn)))}: they are turned"
     ]
 

@@ -9,6 +9,7 @@ from drake_dress.errors import UserError
 from drake_dress.models.garment.axes import AXES, facings
 from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.mesh import LOOP_NAMES
+from drake_dress.models.garment.rest import MESH, RESTS
 from drake_dress.models.sides import SIDES
 
 WELD_RANGE = (0.0, 0.02)  # m
@@ -39,6 +40,8 @@ class MeshOptions:
         scale: factor on all coordinates, in addition to the unit.
         front: what to do with front edges that coincide from neck to hem: `open` and `auto` keep
             them apart, `closed` sews them. With `open` the garment must be open.
+        rest: rest shape of the cloth: `mesh`, that of the file; `uv`, the size that it has in the
+            texture coordinates; `auto`, the latter where they are a flat pattern of the mesh.
     """
 
     unit: str = "m"
@@ -51,6 +54,7 @@ class MeshOptions:
     facing: str | None = None
     take: Sequence[str] = ()
     front: str = FRONTS[0]
+    rest: str = MESH
 
     def check(self, source: str) -> None:
         """Raises UserError if an option is unknown or out of range."""
@@ -58,6 +62,7 @@ class MeshOptions:
             ("unit", self.unit, (*UNITS, AUTO)),
             ("up", self.up, AXES),
             ("front", self.front, FRONTS),
+            ("rest", self.rest, RESTS),
         ):
             if word not in known:
                 raise UserError(source, key, f"is {word!r}, expected one of {', '.join(known)}")

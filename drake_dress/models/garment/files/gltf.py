@@ -18,6 +18,7 @@ import trimesh
 from trimesh.resolvers import FilePathResolver
 
 from drake_dress.errors import UserError
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.files.raw import RawMesh, too_many
 
 _MAGIC, _JSON, _HEADER = b"glTF", 0x4E4F534A, 20  # bytes
@@ -50,11 +51,10 @@ def read_gltf(data: bytes, path: Path, most_faces: int) -> RawMesh:
     _check(header, source)
     try:
         scene = trimesh.load_scene(
-            io.BytesIO(data),
+            io.BytesIO(_plain(data, header)),
             file_type="glb" if data[:4] == _MAGIC else "gltf",
             resolver=FilePathResolver(source),
             process=False,
-            skip_materials=True,
         )
     except Exception as error:
         # trimesh raises whatever NumPy, json or the file system raise, also a plain AssertionError
@@ -63,6 +63,7 @@ def read_gltf(data: bytes, path: Path, most_faces: int) -> RawMesh:
     positions: list[np.ndarray] = [np.empty((0, 3))]
     faces: list[np.ndarray] = [np.empty((0, 3), dtype=np.int64)]
     parts: list[np.ndarray] = [np.empty(0, dtype=np.int64)]
+    textures: list[np.ndarray] = [np.empty((0, 3, 2))]
     names: list[tuple[str, ...]] = []
     count = 0
     for node in scene.graph.nodes_geometry:
@@ -77,6 +78,7 @@ def read_gltf(data: bytes, path: Path, most_faces: int) -> RawMesh:
             raise UserError(source, f"mesh {name!r}", "names vertices that it lacks")
         positions.append(np.asarray(mesh.vertices) @ placed[:3, :3].T + placed[:3, 3])
         faces.append(own + count)
+        textures.append(_texture(mesh)[own])
         parts.append(np.full(len(own), len(names)))
         names.append(tuple(dict.fromkeys((str(node), str(name)))))
         count += len(mesh.vertices)
@@ -88,7 +90,34 @@ def read_gltf(data: bytes, path: Path, most_faces: int) -> RawMesh:
         np.concatenate(faces),
         face_part=np.concatenate(parts),
         part_names=tuple(names) or ((),),
+        uv=np.concatenate(textures),
     )
+
+
+def _texture(mesh: trimesh.Trimesh) -> FloatArray:
+    """Returns (n,2) texture coordinates of a mesh's vertices; NaN if it has none."""
+    uv = getattr(mesh.visual, "uv", None)
+    if uv is None or np.shape(uv) != (len(mesh.vertices), 2):
+        return np.full((len(mesh.vertices), 2), np.nan)
+    return np.asarray(uv, dtype=np.float64)
+
+
+def _plain(data: bytes, header: Mapping[str, Any]) -> bytes:
+    """Returns the file with one material without images, since trimesh ties textures to these."""
+    plain = {key: value for key, value in header.items() if key not in ("images", "textures")}
+    plain["materials"] = [{}]
+    plain["meshes"] = [
+        {**mesh, "primitives": [{**primitive, "material": 0} for primitive in mesh["primitives"]]}
+        for mesh in header.get("meshes", ())
+    ]
+    text = json.dumps(plain).encode()
+    if data[:4] != _MAGIC:
+        return text
+    text += b" " * (-len(text) % 4)
+    (first,) = struct.unpack_from("<I", data, 12)
+    rest = data[_HEADER + first :]
+    length = _HEADER + len(text) + len(rest)
+    return struct.pack("<4s4I", _MAGIC, 2, length, len(text), _JSON) + text + rest
 
 
 def _header(data: bytes, source: str) -> Mapping[str, Any]:

@@ -2,8 +2,8 @@
 
 The readers of mesh libraries fail on some dialects of the format (byte order marks, tabs, comments
 at line ends, relative indices between nodes, Latin-1 names), and do not report the line. This
-reader takes nodes, polygons, objects and groups, and skips everything else that the format defines
-for polygons. It refuses the rest and reports the line.
+reader takes nodes, polygons, texture coordinates, objects and groups, and skips everything else
+that the format defines for polygons. It refuses the rest and reports the line.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from drake_dress.errors import UserError
-from drake_dress.models.garment.files.polygons import triangulated
+from drake_dress.models.arrays import FloatArray
+from drake_dress.models.garment.files.polygons import corners_triangulated
 from drake_dress.models.garment.files.raw import RawMesh, too_many
 from drake_dress.models.garment.files.text import Numbers, decoded, lines_of
 
-# Statements that change nothing about the surface: texture, normals, materials, smoothing, lines,
-# points, display. Names (`o`, `g`) are read for `leave_out`.
+# Statements that change nothing about the surface: normals, materials, smoothing, lines, points,
+# display. Names (`o`, `g`) are read for `leave_out`.
 _PASSED = frozenset(
-    "vt vn vp l p s mg mtllib usemtl maplib usemap bevel c_interp d_interp lod shadow_obj "
+    "vn vp l p s mg mtllib usemtl maplib usemap bevel c_interp d_interp lod shadow_obj "
     "trace_obj call csh".split()
 )
 _CURVED = frozenset(
@@ -31,7 +32,7 @@ _CURVED = frozenset(
 # A name or path may end in a backslash, which is then not a line continuation.
 _NAMED = frozenset(("o", "g", "mtllib", "usemtl", "maplib", "usemap"))
 _MOST_CORNERS = 1000  # of one polygon
-_INDEX = re.compile(r"([+-]?\d{1,18})(?:/[+-]?\d*){0,2}", re.ASCII)
+_INDEX = re.compile(r"([+-]?\d{1,18})(?:/([+-]?\d{0,18}))?(?:/[+-]?\d*)?", re.ASCII)
 
 
 def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
@@ -48,8 +49,10 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
     """
     numbers = Numbers(source)
     nodes: list[list[float]] = []
+    textures: list[list[float]] = []
     node_line: list[int] = []
     polygons: list[list[int]] = []
+    polygon_textures: list[list[int]] = []
     polygon_line: list[int] = []
     polygon_part: list[int] = []
     parts: dict[tuple[str, ...], int] = {(): 0}
@@ -59,8 +62,11 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
         if keyword == "v":
             nodes.append(_node(numbers, words, line, source))
             node_line.append(line)
+        elif keyword == "vt":
+            textures.append(_texture(words))
         elif keyword in ("f", "fo"):
             polygons.append(_corners(words, len(nodes), line, source))
+            polygon_textures.append(_texture_corners(words, len(textures)))
             polygon_line.append(line)
             polygon_part.append(part)
             if len(polygons) > most_faces:
@@ -72,26 +78,33 @@ def read_obj(data: bytes, source: str, most_faces: int) -> RawMesh:
                 # several words are several groups or one name with spaces: either may be asked for
                 groups = tuple(dict.fromkeys((*words, " ".join(words))))
             part = parts.setdefault(tuple(filter(None, (name, *groups))), len(parts))
-        elif keyword in _CURVED:
-            raise UserError(
-                source, f"line {line}", f"{keyword!r} is a curved surface, expected polygons"
-            )
-        elif keyword not in _PASSED:
-            raise UserError(
-                source, f"line {line}", f"{keyword[:40]!r} is no statement of the OBJ format"
-            )
+        else:
+            _check_passed(keyword, line, source)
     _check_range(polygons, polygon_line, len(nodes), source)
     position = np.array(nodes, dtype=np.float64).reshape(-1, 3)
-    faces, owner = triangulated(position, polygons)
+    node, corner, owner = corners_triangulated(position, polygons)
     return RawMesh.of(
         source,
         position,
-        faces,
+        node[corner],
         face_part=np.array(polygon_part, dtype=np.int64)[owner],
         part_names=tuple(parts),
         node_line=np.array(node_line, dtype=np.int64),
         face_line=np.array(polygon_line, dtype=np.int64)[owner],
+        uv=_texture_of(textures, polygon_textures)[corner] if textures else None,
     )
+
+
+def _check_passed(keyword: str, line: int, source: str) -> None:
+    """Raises UserError if a statement describes a curved surface, or is none of the format."""
+    if keyword in _CURVED:
+        raise UserError(
+            source, f"line {line}", f"{keyword!r} is a curved surface, expected polygons"
+        )
+    if keyword not in _PASSED:
+        raise UserError(
+            source, f"line {line}", f"{keyword[:40]!r} is no statement of the OBJ format"
+        )
 
 
 def _statements(text: str) -> Iterator[tuple[int, str, list[str]]]:
@@ -155,6 +168,38 @@ def _corners(words: list[str], count: int, line: int, source: str) -> list[int]:
             f"a face with {len(corners)} corners, expected 3 to {_MOST_CORNERS}",
         )
     return corners
+
+
+def _texture(words: list[str]) -> list[float]:
+    """Returns u, v; NaN where there are no two numbers, as the surface does not depend on them."""
+    try:
+        u, v = (float(word) for word in words[:2])
+    except ValueError:
+        return [np.nan, np.nan]
+    return [u, v]
+
+
+def _texture_corners(words: list[str], count: int) -> list[int]:
+    """Returns the texture coordinates of a polygon's corners, counted from 0; -1 for none."""
+    corners = []
+    for word in words:
+        match = _INDEX.fullmatch(word)
+        text = "" if match is None else match[2] or ""
+        index = int(text) if text.strip("+-") else 0
+        corners.append(index - 1 if index > 0 else count + index if -count <= index < 0 else -1)
+    return corners
+
+
+def _texture_of(textures: list[list[float]], polygons: list[list[int]]) -> FloatArray:
+    """Returns (k,2) texture coordinates of all corners of all polygons, NaN where there are none.
+
+    Args:
+        textures: u and v in the order of the file.
+        polygons: which of them each corner has; -1 or one that the file lacks for none.
+    """
+    known = np.array([*textures, [np.nan, np.nan]], dtype=np.float64)
+    which = np.array([corner for polygon in polygons for corner in polygon], dtype=np.int64)
+    return np.asarray(known[np.where(which < len(textures), which, -1)])
 
 
 def _check_range(polygons: list[list[int]], lines: list[int], count: int, source: str) -> None:

@@ -19,6 +19,8 @@ from drake_dress.models.garment.files.polygons import triangulated
 from drake_dress.models.garment.files.raw import RawMesh, too_many
 
 _LIST_NAMES = ("vertex_indices", "vertex_index")
+# Names of texture coordinates of nodes, as different programs write them.
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _END = re.compile(rb"^end_header[ \t]*(\r\n|\n|\r)", re.MULTILINE)
 _MOST_HEADER = 100_000  # bytes
 
@@ -83,7 +85,11 @@ def _mesh(elements: dict[str, Element], rows: dict[str, Rows], source: str) -> R
     polygons: list[list[int]] = rows["face"][name]
     _check_polygons(polygons, len(position), source)
     faces, _ = triangulated(position, polygons) if polygons else (_no_faces(), None)
-    return RawMesh.of(source, position, faces)
+    pair = next((pair for pair in _UV_NAMES if set(pair) <= set(elements["vertex"].names)), None)
+    if pair is None:
+        return RawMesh.of(source, position, faces)
+    uv = np.stack([np.asarray(vertex[name], dtype=np.float64) for name in pair], axis=1)
+    return RawMesh.of(source, position, faces, uv=uv[faces])
 
 
 def _no_faces() -> IndexArray:

@@ -1,13 +1,14 @@
 """Cuts polygons into triangles.
 
-Quads are cut along the shorter diagonal that lies inside. Convex polygons are cut in a zigzag,
-which avoids long fans. All others are cut by ear clipping in the plane of their vector area, the
-ear with the shortest diagonal first (Meisters 1975, "Polygons have ears").
+Quads are cut along the shorter diagonal that lies inside and leaves two triangles. Convex polygons
+are cut in a zigzag, which avoids long fans. All others are cut by ear clipping in the plane of
+their vector area, the ear with the shortest diagonal first (Meisters 1975, "Polygons have ears").
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,8 @@ MaskArray = BoolArray
 
 # Sine of a corner's angle, below which it counts as straight.
 _STRAIGHT = 1e-6
+# Share of a quad's area, below which a triangle of it is none: the quad has a straight corner.
+_LEAST_SHARE = 1e-3
 
 
 def triangulated(
@@ -47,22 +50,48 @@ def triangulated(
     return np.concatenate(triangles)[order], owner[order]
 
 
+def corners_triangulated(
+    position: FloatArray, polygons: Sequence[Sequence[int]]
+) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Returns triangles of numbered corners, for files that say something of each corner.
+
+    Args:
+        position: (n,3).
+        polygons: node indices of each, at least three.
+
+    Returns:
+        (k,) the node of each corner of all polygons in order; (F,3) triangles as indices of
+        corners; and (F,) the polygons, ascending.
+    """
+    node = np.array([corner for polygon in polygons for corner in polygon], dtype=np.int64)
+    ends = np.cumsum([0, *map(len, polygons)]).tolist()
+    corner, owner = triangulated(position[node], [range(a, b) for a, b in pairwise(ends)])
+    return node, corner, owner
+
+
 def _quads(position: FloatArray, corners: IndexArray) -> IndexArray:
     """Returns (k,2,3) triangles of (k,4) quads."""
     first, second = corners[:, [[0, 1, 2], [0, 2, 3]]], corners[:, [[0, 1, 3], [1, 2, 3]]]
-    inside_first, inside_second = (_lie_inside(position, corners, cut) for cut in (first, second))
+    share_first, share_second = (_least_share(position, corners, cut) for cut in (first, second))
     a, b, c, d = (position[corners[:, k]] for k in range(4))
     longer = np.linalg.norm(a - c, axis=1) > np.linalg.norm(b - d, axis=1)
-    use_second = inside_second & (longer | ~inside_first)
+    both = np.minimum(share_first, share_second) > _LEAST_SHARE
+    use_second = np.where(both, longer, share_second > share_first)
     return np.where(use_second[:, None, None], second, first)
 
 
 def _lie_inside(position: FloatArray, corners: IndexArray, cut: IndexArray) -> MaskArray:
     """Returns (k,) whether all triangles of a cut are oriented as their polygon."""
+    return np.asarray(_least_share(position, corners, cut) > 0.0)
+
+
+def _least_share(position: FloatArray, corners: IndexArray, cut: IndexArray) -> FloatArray:
+    """Returns (k,) the smallest share that a triangle of a cut has of its polygon's area."""
     normal = _vector_area(position[corners])
     x = position[cut]
     areas = np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0])
-    return np.asarray((np.einsum("kti,ki->kt", areas, normal) > 0.0).all(axis=1))
+    size = np.maximum((normal**2).sum(axis=1), 1e-300)
+    return np.asarray(np.einsum("kti,ki->kt", areas, normal).min(axis=1) / size)
 
 
 def _larger(position: FloatArray, corners: IndexArray) -> IndexArray:

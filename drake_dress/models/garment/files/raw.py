@@ -42,6 +42,8 @@ class RawMesh:
         became: (m,) the node that each node of the file was merged into, -1 for none.
         node_line: (m,) line of each node of the file, counted from 1; None in binary files.
         face_line: (F,) line of each face; None in binary files.
+        uv: (F,3,2) texture coordinates of each corner, NaN where the file gives none; None if it
+            gives none at all.
     """
 
     source: str
@@ -53,6 +55,7 @@ class RawMesh:
     became: IndexArray
     node_line: IndexArray | None = None
     face_line: IndexArray | None = None
+    uv: FloatArray | None = None
 
     @staticmethod
     def of(
@@ -64,13 +67,16 @@ class RawMesh:
         part_names: tuple[tuple[str, ...], ...] = ((),),
         node_line: IndexArray | None = None,
         face_line: IndexArray | None = None,
+        uv: FloatArray | None = None,
     ) -> RawMesh:
         """Returns a mesh whose nodes are those of the file."""
         every = np.arange(len(position))
         if face_part is None:
             face_part = np.zeros(len(faces), dtype=np.int64)
+        if uv is not None and not np.isfinite(uv).any():
+            uv = None
         return RawMesh(
-            source, position, faces, face_part, part_names, every, every, node_line, face_line
+            source, position, faces, face_part, part_names, every, every, node_line, face_line, uv
         )
 
     def scaled(self, factor: float) -> RawMesh:
@@ -89,6 +95,7 @@ class RawMesh:
             faces=new[faces],
             face_part=self.face_part[keep],
             face_line=None if self.face_line is None else self.face_line[keep],
+            uv=None if self.uv is None else self.uv[keep],
             file_node=self.file_node[used],
             became=np.where(self.became < 0, -1, new[self.became]),
         )

@@ -47,6 +47,16 @@ def test_quads_are_cut_inside_and_along_the_shorter_diagonal() -> None:
     assert all({1, 3} <= set(face) for face in faces.tolist())
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-7, -1e-7])
+@pytest.mark.parametrize("start", range(4))
+def test_a_quad_with_a_straight_corner_is_cut_there(off: float, start: int) -> None:
+    # the diagonal that leaves the straight corner out is the shorter one
+    x = np.array([[0, 0, 0], [1, off, 0], [2, 0, 0], [1.2, 3, 0]])
+    quad = np.roll(np.arange(4), start).tolist()
+    faces, _ = triangulated(x, [quad])
+    assert np.linalg.norm(areas(x, faces), axis=1).min() > 1.0
+
+
 def test_mixed_polygons_keep_their_order() -> None:
     x = star(np.ones(8), 0.0)
     faces, owner = triangulated(x, [[0, 1, 2], range(8), [0, 2, 4, 6], [5, 6, 7]])
