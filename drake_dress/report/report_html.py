@@ -303,7 +303,7 @@ def _pictures(log: RunLog, m: Measures) -> str:
         picture = render_still(
             log.faces,
             log.garment_position(i),
-            (a[i], b[i], radius),
+            (a[i], b[i], radius, log.of_chair),
             grippers,
             camera,
             _STILL_SIZE,

@@ -27,9 +27,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
 from drake_dress.models.arm.description import link_meshes
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
-from drake_dress.report.shapes import limb_shape, mesh_shape
+from drake_dress.report.shapes import CHAIR_COLOR, limb_shape, mesh_shape
 
 _Color = tuple[float, float, float]
 
@@ -61,10 +61,16 @@ class CameraPose:
     field_of_view: float = 0.6
 
 
+# Capsules of a person: ends and radii, and which of them are a wheelchair's.
+Person = (
+    tuple[FloatArray, FloatArray, FloatArray] | tuple[FloatArray, FloatArray, FloatArray, BoolArray]
+)
+
+
 def render_still(
     faces: IntArray,
     position: FloatArray,
-    person: tuple[FloatArray, FloatArray, FloatArray],
+    person: Person,
     grippers: FloatArray,
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
@@ -76,7 +82,8 @@ def render_still(
     Args:
         faces: (F,3) triangles of the garment; their normals point outward.
         position: (n,3) nodes, world, m.
-        person: Ends (c,3), (c,3) and radii (c,2) of the person's capsules, world, m.
+        person: Ends (c,3), (c,3) and radii (c,2) of the person's capsules, world, m; and, where
+            there is a wheelchair, which of them (c,) are its own.
         grippers: (g,3) positions of the grippers, world, m.
         camera: Camera pose.
         size: Width and height, pixels.
@@ -86,13 +93,17 @@ def render_still(
     with_arms = arms is not None and len(arms) > 0
     scene = _Scene(with_arms)
     scene.add_garment(faces, position)
-    scene.add_capsules(*person, SKIN_COLOR)
+    capsules = person[:3]
+    of_chair = np.zeros(len(capsules[2]), dtype=bool) if len(person) == 3 else person[3]
+    for which, color in ((~of_chair, SKIN_COLOR), (of_chair, CHAIR_COLOR)):
+        first, second, radius = (values[which] for values in capsules)
+        scene.add_capsules(first, second, radius, color)
     # with arms, the box is only the held cloth between the fingers
     gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
-        floor = floor_height(position, *person)
+        floor = floor_height(position, *capsules)
     if arms is not None:
         scene.add_arms(arms, floor)
     middle = [camera.target[0], camera.target[1], floor - 0.01]

@@ -11,6 +11,7 @@ from drake_dress.diagrams.scenario.schema import (
     Controller,
     Joints,
     Motion,
+    Person,
     Safety,
     Scenario,
     Station,
@@ -159,6 +160,16 @@ def check_joints(source: str, joints: Joints) -> None:
                 f"person.joints.{name}_limits_deg",
                 f"is {limits}, expected the smallest and the largest angle in degrees",
             )
+
+
+def check_chair(source: str, person: Person) -> None:
+    """Checks that who has a wheelchair sits in it."""
+    if person.chair is not None and person.posture != "sitting":
+        raise UserError(
+            source,
+            "person.chair",
+            f"is given to a {person.posture} person, expected person.posture: sitting",
+        )
 
 
 def check_coat(source: str, coat: Coat) -> None:

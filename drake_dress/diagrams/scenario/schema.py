@@ -33,6 +33,7 @@ from drake_dress.models.human import (
     prediction,
     stirring,
     tremor,
+    wheelchair,
 )
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
@@ -467,6 +468,11 @@ class Body:
     scan: BodyScan | None = None
 
 
+@mirror_of(wheelchair.Wheelchair)
+class Chair(Mirror):
+    """The wheelchair that the person sits in, sizes in m; see models/human/wheelchair.py."""
+
+
 @dataclass
 class Person:
     """The person who is dressed.
@@ -481,6 +487,7 @@ class Person:
         right_arm: rest pose of the right arm.
         joints: springs, dampers and limits of the arm joints.
         behaviour: the person's own motions.
+        chair: wheelchair of a sitting person; none if empty. `{}` is a chair of the person's size.
     """
 
     posture: str = "standing"
@@ -492,6 +499,7 @@ class Person:
     right_arm: Arm = field(default_factory=Arm)
     joints: Joints = field(default_factory=Joints)
     behaviour: Behaviour = field(default_factory=Behaviour)
+    chair: Chair | None = None
 
 
 @dataclass
