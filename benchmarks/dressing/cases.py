@@ -23,6 +23,7 @@ PERSONS = {
     "passive_standing": "passive_standing.yaml",
     "passive_sitting": "passive_sitting.yaml",
     "active": "active_standing.yaml",
+    "wheelchair": "wheelchair.yaml",
 }
 COATS = {
     "jacket": "{preset: jacket, body_length: 0.70, chest: 1.28, shoulder_width: 0.52, "
