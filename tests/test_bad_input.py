@@ -63,6 +63,19 @@ BAD_YAML = {
         "lab: {faults: [{start: -1}]}",
         ["lab.faults[0].start", "0 to"],
     ),
+    "chair of one who stands": ("person: {chair: {}}", ["person.chair", "posture: sitting"]),
+    "arm in the chair": (
+        "person: {posture: sitting, chair: {}}",
+        ["person.left_arm", "inside the wheelchair", "abduction_deg"],
+    ),
+    "narrow chair": (
+        "person: {posture: sitting, chair: {seat_width: 0.2}}",
+        ["person.chair.seat_width", "width of the hips"],
+    ),
+    "unknown armrests": (
+        "person: {posture: sitting, chair: {armrests: up}}",
+        ["person.chair.armrests", "both or left or right or none"],
+    ),
     "unknown posture": ("person: {posture: lying}", ["person.posture", "standing or sitting"]),
     "unknown person": (
         "person: {behaviour: {kind: robot}}",

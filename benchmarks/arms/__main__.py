@@ -37,6 +37,7 @@ SCENARIOS = (
     "passive_sitting",
     "active_standing",
     "gown_front",
+    "wheelchair",
     "lab",
 )
 METHODS = ("global", "full")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks.dressing.cases import COATS, METHODS, PERSONS, VARIATIONS, Case, cases, run
+from benchmarks.dressing.cases import COATS, METHODS, PERSONS, STUDIED, VARIATIONS, Case, cases, run
 from benchmarks.dressing.drawn import drawn
 from benchmarks.dressing.page import study_page
 from benchmarks.dressing.parquet import write_table
@@ -41,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(prog="drake-dress bench dressing", description=__doc__)
     add_choices(parser, methods=METHODS, persons=PERSONS, coats=COATS)
+    parser.set_defaults(persons=list(STUDIED))
     parser.add_argument(
         "--variation",
         choices=tuple(VARIATIONS),

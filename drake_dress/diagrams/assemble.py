@@ -139,9 +139,8 @@ def hardware_parts(
 
 def described_person(p: StationParameters) -> Person:
     """Returns the scenario's person, in a plant of its own that is never simulated."""
-    return add_person(
-        MultibodyPlant(p.body_time_step), p.measures, p.posture, p.arms, p.joints, turns=False
-    )
+    plant = MultibodyPlant(p.body_time_step)
+    return add_person(plant, p.measures, p.posture, p.arms, p.joints, turns=False, chair=p.chair)
 
 
 def planned_arms(p: StationParameters, person: Person) -> ArmSetup:

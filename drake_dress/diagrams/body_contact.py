@@ -1,4 +1,4 @@
-"""Contact of the arms with trunk, legs and each other.
+"""Contact of the arms with trunk, legs, each other and a wheelchair.
 
 The model is Drake's compliant point contact between shapes as thick as the limbs. An arm that
 overlaps the torso in the rest pose, such as one that hangs at the side, is taken to be compressed
@@ -23,6 +23,7 @@ from drake_dress.models.human.body import (
     capsule_arrays,
     shoulder_joint,
 )
+from drake_dress.models.human.shape import PERSON
 from drake_dress.models.sides import Side
 from drake_dress.report.shapes import limb_shape
 
@@ -43,7 +44,7 @@ def add_body_contact(
     posture: Posture,
     arms: dict[Side, ArmPose],
 ) -> None:
-    """Registers the collision geometry of a person.
+    """Registers the collision geometry of a person and the chair.
 
     The shoulder girdle has none, because the upper arms begin in it.
 
@@ -56,9 +57,11 @@ def add_body_contact(
         arms: rest pose of each arm.
     """
     half = 0.5 * measures.shoulder_width
-    trunk = [
-        c for c in capsules if c.body == "torso" and not abs(c.a_B[1]) == abs(c.b_B[1]) == half
-    ]
+
+    def is_girdle(c: Capsule) -> bool:
+        return c.part == PERSON and abs(c.a_B[1]) == abs(c.b_B[1]) == half
+
+    trunk = [c for c in capsules if c.body == "torso" and not is_girdle(c)]
     for number, capsule in enumerate(trunk):
         _collide(plant, bodies["torso"], capsule, 0.0, f"contact_{number}")
     still = _placed(trunk, np.eye(3), np.zeros(3))

@@ -41,16 +41,18 @@ from drake_dress.models.human.body import (
     BodyMeasures,
     Capsule,
     Posture,
-    body_capsules,
     capsule_arrays,
     shoulder_joint,
 )
 from drake_dress.models.human.joints import JointParameters
+from drake_dress.models.human.shape import CHAIR
+from drake_dress.models.human.wheelchair import Wheelchair, seated_capsules
 from drake_dress.models.round_cone import solid
 from drake_dress.models.sides import SIDES, Side
-from drake_dress.report.shapes import limb_shape
+from drake_dress.report.shapes import CHAIR_COLOR, limb_shape
 
 _SKIN = np.array([0.87, 0.68, 0.55, 1.0])
+_CHAIR = np.array([*CHAIR_COLOR, 1.0])
 # Stance, N·m/rad and N·m·s/rad: a coat that pulls at one side of the chest with 20 N turns the
 # person by less than a degree; critically damped with the torso's inertia.
 _STANCE_STIFFNESS, _STANCE_DAMPING = 300.0, 40.0
@@ -62,7 +64,7 @@ class Person:
 
     Attributes:
         model: the person's model instance.
-        capsules: of all bodies, in body frames.
+        capsules: of all bodies, in body frames; those of a wheelchair are fixed in the torso.
         body_indices: of the bodies that have capsules, by name.
         joint_points: body index and point in the body's frame (3,), m, of shoulder, elbow, hand,
             left then right; `joint_positions` evaluates them.
@@ -126,6 +128,7 @@ def add_person(
     joints: JointParameters,
     position: FloatArray | None = None,
     turns: bool = False,
+    chair: Wheelchair | None = None,
 ) -> Person:
     """Adds a person who stands or sits at `position` (2,), m, and faces +x.
 
@@ -140,6 +143,7 @@ def add_person(
         joints: stiffness, damping and limits, by side.
         position: of the torso on the floor; the origin when None.
         turns: whether the torso turns about the vertical; else it is welded to the world.
+        chair: wheelchair of a sitting person, which arms and garment touch; it turns with them.
 
     Raises:
         UserError: an arm is missing, the position is not two finite numbers, or the posture is
@@ -150,7 +154,7 @@ def add_person(
         raise UserError("person", "arms", f"lacks {', '.join(missing)}, expected left and right")
     origin = _origin(position)
     model = plant.AddModelInstance("person")
-    capsules = body_capsules(measures, posture)
+    capsules = seated_capsules(measures, posture, chair)
     torso = _add_torso(plant, model, origin, turns)
     bodies: dict[str, RigidBody] = {"torso": torso}
     points: list[tuple[int, FloatArray]] = []
@@ -327,7 +331,8 @@ def _limb(mass: float, radii: tuple[float, float], length: float) -> SpatialIner
 
 def _register(plant: MultibodyPlant, body: RigidBody, capsule: Capsule, name: str) -> None:
     shape, X_BG = limb_shape(capsule.a_B, capsule.b_B, capsule.radii)
-    plant.RegisterVisualGeometry(body, X_BG, shape, name, _SKIN)
+    color = _CHAIR if capsule.part == CHAIR else _SKIN
+    plant.RegisterVisualGeometry(body, X_BG, shape, name, color)
 
 
 def joint_positions(plant: MultibodyPlant, context: Context, person: Person) -> FloatArray:

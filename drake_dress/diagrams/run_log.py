@@ -11,6 +11,7 @@ from drake_dress.diagrams.setup import Setup
 from drake_dress.diagrams.station import Station
 from drake_dress.file_output import RUN_FILES
 from drake_dress.models.human.body import capsule_arrays
+from drake_dress.models.human.shape import CHAIR
 from drake_dress.report.log_layout import LogContent
 from drake_dress.report.log_writer import RunLogWriter
 
@@ -34,6 +35,7 @@ def open_run_log(out: Path, setup: Setup, station: Station, forecast: bool = Fal
             seed=scenario.seed,
             radius=person.radius,
             capsule_radius=capsule_arrays(person.capsules)[2],
+            of_chair=[c.part == CHAIR for c in person.capsules],
             estimate_garment=garments.belief,
             bases=arm_bases(station.robots),
             estimated=station.in_real_time,

@@ -17,6 +17,7 @@ from drake_dress.diagrams.sections.effects import effects
 from drake_dress.diagrams.sections.person import (
     arms,
     behaviour,
+    chair,
     joints,
     measures,
     phenotype,
@@ -31,6 +32,7 @@ from drake_dress.models.control.costs import GarmentCost
 from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.human.wheelchair import room_of_arms
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,7 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
 
     Raises:
         UserError: the garment cannot be used, or hangs outside the grippers' limits at the start;
+            the wheelchair does not fit the person, or an arm at rest is inside it;
             the plant's integrator is missing or has no such effects; or the predictor's weights
             cannot be used.
     """
@@ -106,6 +109,7 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
     belief = build_garment(scenario.garment, scenario.controller.spacing, source.parent)
     check_opening(plant, scenario.station.side, str(source))
     station = station_parameters(scenario, plant)
+    _check_chair(str(source), station)
     check_integrator(str(source), station.integrator, station.effects)
     limits = safety_limits(scenario.safety)
     broken = limits.broken_at(start_grippers(station))
@@ -113,6 +117,28 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
         raise UserError(str(source), "safety", f"{broken} at the start")
     garments = Garments(plant, belief)
     return Setup(scenario, source, garments, station, limits, rates(scenario), foreseen)
+
+
+def _check_chair(source: str, p: StationParameters) -> None:
+    """Checks that the person fits into the wheelchair, if there is one.
+
+    Raises:
+        UserError: the chair does not fit, or an arm at rest is inside it.
+    """
+    if p.chair is None:
+        return
+    try:
+        room = room_of_arms(p.chair, p.measures, p.arms)
+    except UserError as error:
+        raise UserError(source, f"{error.source}.{error.key}", error.message) from error
+    for side, gap in room.items():
+        if gap < 0.0:
+            raise UserError(
+                source,
+                f"person.{side}_arm",
+                f"is {-1e3 * gap:.0f} mm inside the wheelchair, expected a pose outside of it "
+                "(abduction_deg leads the arm past armrest and push handle)",
+            )
 
 
 def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParameters:
@@ -135,6 +161,7 @@ def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParamete
         posture=posture(person),
         arms=arms(person),
         joints=joints(person),
+        chair=chair(person),
         behaviour=behaviour(person.behaviour, scenario.seed),
         gripper_max_speed=station.gripper.max_speed,
         gripper_max_acceleration=station.gripper.max_acceleration,

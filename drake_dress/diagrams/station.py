@@ -103,6 +103,7 @@ from drake_dress.models.human.body import (
 from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.skin.person_skin import PersonSkin, person_skin
 from drake_dress.models.human.skin.phenotype import Phenotype
+from drake_dress.models.human.wheelchair import Wheelchair
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.log_writer import RunLogWriter
 from drake_dress.systems.arm_measurement import ArmMeasurement
@@ -152,6 +153,7 @@ class StationParameters:
     posture: Posture
     arms: dict[Side, ArmPose]
     joints: JointParameters
+    chair: Wheelchair | None = None
     behaviour: Behaviour = field(default_factory=Behaviour)
     gripper_max_speed: float
     gripper_max_acceleration: float
@@ -264,7 +266,9 @@ def make_simulated_station(
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.body_time_step)
     body = body_with_effects(p.measures, p.effects)
-    person = add_person(plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
+    person = add_person(
+        plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns, chair=p.chair
+    )
     robots, arms = None, None
     if p.placement is not None:
         robots = robots_at_start(p, p.placement, body, person)

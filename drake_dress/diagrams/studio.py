@@ -73,7 +73,10 @@ class Studio:
         p = self._parameters
         inner = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(inner, p.body_time_step)
-        person = add_person(plant, self._body, p.posture, p.arms, p.joints, turns=p.behaviour.turns)
+        turns = p.behaviour.turns
+        person = add_person(
+            plant, self._body, p.posture, p.arms, p.joints, turns=turns, chair=p.chair
+        )
         if p.placement is not None:
             add_arms(plant, {side: p.placement.base(side) for side in SIDES})
         plant.Finalize()

@@ -12,7 +12,7 @@ from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.integrator import check_explained
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.sections.effects import effects
-from drake_dress.diagrams.sections.person import arms, measures, posture
+from drake_dress.diagrams.sections.person import arms, chair, measures, posture
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.cloth.contact.obstacles import Obstacles
 from drake_dress.models.cloth.implicit.implicit_cloth import ImplicitSettings
@@ -29,9 +29,9 @@ from drake_dress.models.human.body import (
     BodyMeasures,
     Posture,
     arm_points,
-    body_capsules,
     capsule_arrays,
 )
+from drake_dress.models.human.wheelchair import Wheelchair, seated_capsules
 from drake_dress.models.sides import SIDES, Side
 
 # Distance to the fixed point at which Projective Dynamics stops, m.
@@ -67,6 +67,7 @@ class SimulatedLab:
         numerics: numerical settings of its simulation.
         measures, posture, arms: sizes, posture and arm poses of the person.
         effects: effects that the scenario switches on.
+        chair: wheelchair that the person sits in, if any.
     """
 
     garment: GarmentMesh
@@ -76,6 +77,7 @@ class SimulatedLab:
     posture: Posture
     arms: dict[Side, ArmPose]
     effects: tuple[Effect, ...] = ()
+    chair: Wheelchair | None = None
 
     @staticmethod
     def of(scenario: Scenario, base: Path, numerics: Numerics | None = None) -> SimulatedLab:
@@ -102,6 +104,7 @@ class SimulatedLab:
             posture(scenario.person),
             arms(scenario.person),
             effects(scenario.effects),
+            chair(scenario.person),
         )
 
     @property
@@ -151,7 +154,7 @@ class SimulatedLab:
     def person(self, further: Sequence[Effect]) -> PersonShape:
         """Returns the person with the lab's effects and further ones."""
         sizes = body_with_effects(self.measures, self.with_effects(further))
-        return PersonShape(sizes, self.posture, self.arms)
+        return PersonShape(sizes, self.posture, self.arms, self.chair)
 
 
 class PersonShape:
@@ -164,8 +167,14 @@ class PersonShape:
     LIMB_NAMES = tuple(f"{side}_{part}" for side in SIDES for part in ("upper_arm", "forearm"))
     LIMBS = len(LIMB_NAMES)
 
-    def __init__(self, sizes: BodyMeasures, stance: Posture, arms: dict[Side, ArmPose]) -> None:
-        capsules = body_capsules(sizes, stance)
+    def __init__(
+        self,
+        sizes: BodyMeasures,
+        stance: Posture,
+        arms: dict[Side, ArmPose],
+        chair: Wheelchair | None = None,
+    ) -> None:
+        capsules = seated_capsules(sizes, stance, chair)
         names = self.LIMB_NAMES
         self.limb = np.array([names.index(c.body) if c.body in names else -1 for c in capsules])
         self.posed = np.concatenate([arm_points(sizes, stance, side, arms[side]) for side in SIDES])

@@ -30,6 +30,7 @@ class ArmMeasures:
         apart: (T,) distance between the arms' capsules, m.
         to_person: (T,2) distance of an arm without its last link and hand to the person's
             capsules, m.
+        to_chair: (T,2) likewise to the person's wheelchair; infinite without one.
     """
 
     speed_share: FloatArray
@@ -38,6 +39,7 @@ class ArmMeasures:
     off: FloatArray
     apart: FloatArray
     to_person: FloatArray
+    to_chair: FloatArray
 
     @property
     def kept(self) -> BoolArray:
@@ -88,7 +90,7 @@ def measure_arms(log: RunLog) -> ArmMeasures | None:
     if "/arm/left/base" not in log.file:
         return None
     count = len(log)
-    speed, torque, margin, off, near = np.full((5, count, 2), np.nan)
+    speed, torque, margin, off, near, chair = np.full((6, count, 2), np.nan)
     apart = np.full(count, np.nan)
     first, second, radius = log.capsules
     arms = [panda(np.asarray(log.file[f"/arm/{side}/base"])) for side in SIDES]
@@ -99,7 +101,10 @@ def measure_arms(log: RunLog) -> ArmMeasures | None:
     }
     all_of = np.arange(len(SHAPE.link))
     both = _pairs(all_of, all_of)
-    far = _pairs(np.flatnonzero(SHAPE.link <= arms[0].count - _NEAR_LINKS), np.arange(len(radius)))
+    farther = np.flatnonzero(SHAPE.link <= arms[0].count - _NEAR_LINKS)
+    of_person, of_chair = (
+        _pairs(farther, np.flatnonzero(which)) for which in (~log.of_chair, log.of_chair)
+    )
     for k, side in enumerate(SIDES):
         least, most, fastest, strongest = arm_extremes(log, side)
         speed[:, k] = (fastest / LIMITS.speed).max(axis=1)
@@ -113,9 +118,10 @@ def measure_arms(log: RunLog) -> ArmMeasures | None:
             off[i, k] = np.linalg.norm(links[-1, :3, 3] - asked)
             placed.append(SHAPE.placed(links))
             person = Capsules(first[i], second[i], radius)
-            near[i, k] = clearance(placed[k], person, far).distance.min(initial=np.inf)
+            near[i, k] = clearance(placed[k], person, of_person).distance.min(initial=np.inf)
+            chair[i, k] = clearance(placed[k], person, of_chair).distance.min(initial=np.inf)
         apart[i] = clearance(placed[0], placed[1], both).distance.min()
-    return ArmMeasures(speed, torque, margin, off, apart, near)
+    return ArmMeasures(speed, torque, margin, off, apart, near, chair)
 
 
 def _pairs(first: IndexArray, second: IndexArray) -> IndexArray:

@@ -16,7 +16,7 @@ import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.hdf5_state import Hdf5State, look_at
-from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log_schema import COMPLETE, LOOPS, check_log
 
@@ -236,6 +236,14 @@ class RunLog:
         first, second = [0, 1, 3, 4], [1, 2, 4, 5]
         radii = np.column_stack([self.joint_radius[first], self.joint_radius[second]])
         return self.joint_position[:, first], self.joint_position[:, second], radii
+
+    @cached_property
+    def of_chair(self) -> BoolArray:
+        """(c,) whether each capsule is of the person's wheelchair."""
+        name = "/human/capsule_of_chair"
+        if name in self.file:
+            return np.asarray(self.file[name]).astype(bool)
+        return np.zeros(len(self.capsules[2]), dtype=bool)
 
     @cached_property
     def intent(self) -> IndexArray | None:

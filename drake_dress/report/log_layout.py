@@ -43,6 +43,7 @@ class LogContent:
         joint_names: Names of these six joints.
         capsule_radius: (c,2) radii of the person's capsules at both ends, m, or (c,); None: no
             capsules are logged.
+        of_chair: (c,) whether each capsule is of the person's wheelchair; None: there is none.
         estimate_garment: The controller's garment; None: its positions are not logged.
         bases: X_WB (4,4) of each arm, if samples have arms.
         estimated: Whether garment and person are estimates because the truth is not known; contact
@@ -57,6 +58,7 @@ class LogContent:
     radius: npt.ArrayLike
     joint_names: Sequence[str] = JOINT_NAMES
     capsule_radius: npt.ArrayLike | None = None
+    of_chair: npt.ArrayLike | None = None
     estimate_garment: GarmentMesh | None = None
     bases: Mapping[Side, npt.ArrayLike] | None = None
     estimated: bool = False
@@ -87,6 +89,9 @@ def begin_log(file: h5py.File, content: LogContent) -> dict[str, h5py.Dataset]:
         _add_estimated_garment(layout, content.estimate_garment)
     if content.capsule_radius is not None:
         _add_capsules(layout, content.capsule_radius)
+        if content.of_chair is not None and np.any(content.of_chair):
+            of_chair = np.asarray(content.of_chair, dtype=np.int8)
+            layout.constant("/human/capsule_of_chair", of_chair)
     return layout.series
 
 

@@ -62,6 +62,7 @@ _OPTIONAL: dict[str, tuple[Any, ...]] = {
     "/human/capsule_b": ("T", "c", 3),
     "/human/capsule_radius": ("c",),
     "/human/capsule_end_radius": ("c",),
+    "/human/capsule_of_chair": ("c",),
     "/human/intent": ("T", 2),
     "/forecast/human/joint_position": ("T", 6, 3),
     "/forecast/human/radius": ("T", 6),

@@ -20,10 +20,11 @@ from drake_dress.report.arms import arm_poses
 from drake_dress.report.log import RunLog
 from drake_dress.report.person_skin import logged_skin
 from drake_dress.report.scene import DressingScene, show_skin
-from drake_dress.report.shapes import limb_pose, limb_shape
+from drake_dress.report.shapes import CHAIR_COLOR, limb_pose, limb_shape
 from drake_dress.report.web_page import open_page
 
 _SKIN = Rgba(0.87, 0.70, 0.58, 1.0)
+_CHAIR = Rgba(*CHAIR_COLOR, 1.0)
 _ARM = Rgba(0.90, 0.91, 0.92, 1.0)
 _POLL_PERIOD = 0.03  # s
 _TIME_SLIDER, _PLAY_BUTTON, _STOP_BUTTON = "Time (s)", "Play / pause", "Stop"
@@ -126,7 +127,8 @@ class MeshcatReplay:
         a, b, radius = self._log.capsules
         for k, (r_a, r_b) in enumerate(radius):
             shape, _ = limb_shape(a[0, k], b[0, k], (float(r_a), float(r_b)))
-            self._meshcat.SetObject(f"dressing/person/{k}", shape, _SKIN)
+            color = _CHAIR if self._log.of_chair[k] else _SKIN
+            self._meshcat.SetObject(f"dressing/person/{k}", shape, color)
         poses = arm_poses(self._log, np.array([0]))[0]
         for arm, base in enumerate(poses[:, 0]):
             self._add_stand(f"dressing/arms/{arm}/stand", base)

@@ -90,6 +90,7 @@ def _page(log: RunLog, fps: float) -> bytes:
         "frames": len(frames),
         "nodes": position.shape[1],
         "arms": arms.shape[1],
+        "ofChair": log.of_chair.tolist(),
         "low": low.tolist(),
         "step": step,
         "time": [round(float(t), 4) for t in log.time[frames]],

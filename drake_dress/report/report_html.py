@@ -19,7 +19,7 @@ from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, measure
 from drake_dress.report.page import html_page
 from drake_dress.report.person_skin import LoggedSkin, logged_skin
-from drake_dress.report.stills import CameraPose, Limbs, Surface, render_still
+from drake_dress.report.stills import CameraPose, Limbs, Seated, Surface, render_still
 from drake_dress.report.summary import SuccessRules, read_summary
 
 _STILL_SIZE = (560, 440)
@@ -322,12 +322,14 @@ def _pictures(log: RunLog, m: Measures) -> str:
     return f'<div class="pictures">{"".join(figures)}</div>{note}'
 
 
-def _person(log: RunLog, skin: LoggedSkin | None, i: int) -> Limbs | Surface:
+def _person(log: RunLog, skin: LoggedSkin | None, i: int) -> Limbs | Surface | Seated:
     """Returns the person at sample `i`: the skin where it is known, otherwise the limbs."""
-    if skin is not None and skin.is_known(i):
-        return Surface(skin.vertices(i), skin.faces)
     a, b, radius = log.capsules
-    return a[i], b[i], radius
+    own, chair = ~log.of_chair, log.of_chair
+    body: Limbs | Surface = (a[i, own], b[i, own], radius[own])
+    if skin is not None and skin.is_known(i):
+        body = Surface(skin.vertices(i), skin.faces)
+    return Seated(body, (a[i, chair], b[i, chair], radius[chair])) if chair.any() else body
 
 
 def _png(picture: npt.NDArray[np.uint8]) -> str:

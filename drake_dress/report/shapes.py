@@ -10,6 +10,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.round_cone import surface
 
+# Colour of a wheelchair: red, green, blue.
+CHAIR_COLOR = (0.30, 0.32, 0.36)
 # Length of an axis below which a limb is a sphere, m.
 _POINT = 1e-6
 

@@ -30,7 +30,7 @@ from pydrake.systems.sensors import CameraInfo
 from drake_dress.models.arm.description import link_meshes
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.report.arm_stand import STAND_COLOR, arm_stand
-from drake_dress.report.shapes import limb_shape, mesh_shape
+from drake_dress.report.shapes import CHAIR_COLOR, limb_shape, mesh_shape
 
 _Color = tuple[float, float, float]
 
@@ -65,6 +65,19 @@ Limbs = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
+class Seated:
+    """A person in a wheelchair.
+
+    Attributes:
+        body: the person's limbs, or skin.
+        chair: parts of the wheelchair.
+    """
+
+    body: Limbs | Surface
+    chair: Limbs
+
+
+@dataclass(frozen=True)
 class CameraPose:
     """Position and view of a camera.
 
@@ -82,7 +95,7 @@ class CameraPose:
 def render_still(
     faces: IntArray,
     position: FloatArray,
-    person: Limbs | Surface,
+    person: Limbs | Surface | Seated,
     grippers: FloatArray,
     camera: CameraPose,
     size: tuple[int, int] = (640, 480),
@@ -94,7 +107,7 @@ def render_still(
     Args:
         faces: (F,3) triangles of the garment; their normals point outward.
         position: (n,3) nodes, world, m.
-        person: The person's limbs, or skin.
+        person: The person's limbs, or skin; with a wheelchair, if any.
         grippers: (g,3) positions of the grippers, world, m.
         camera: Camera pose.
         size: Width and height, pixels.
@@ -104,16 +117,19 @@ def render_still(
     with_arms = arms is not None and len(arms) > 0
     scene = _Scene(with_arms)
     scene.add_garment(faces, position)
-    if isinstance(person, Surface):
-        scene.add_surface(person, SKIN_COLOR)
+    body = person.body if isinstance(person, Seated) else person
+    if isinstance(body, Surface):
+        scene.add_surface(body, SKIN_COLOR)
     else:
-        scene.add_capsules(*person, SKIN_COLOR)
+        scene.add_capsules(*body, SKIN_COLOR)
+    if isinstance(person, Seated):
+        scene.add_capsules(*person.chair, CHAIR_COLOR)
     # with arms, the box is only the held cloth between the fingers
     gripper = [_GRIPPER_SIZE * (0.5 if with_arms else 1.0)] * 3
     for p in np.reshape(grippers, (-1, 3)):
         scene.add(Box(*gripper), RigidTransform(p), GRIPPER_COLOR)
     if floor is None:
-        floor = floor_height(position, person)
+        floor = floor_height(position, body)
     if arms is not None:
         scene.add_arms(arms, floor)
     middle = [camera.target[0], camera.target[1], floor - 0.01]

@@ -23,6 +23,7 @@ from drake_dress.models.control.safety import Verdict
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arms import ArmMeasures, measure_arms
+from drake_dress.report.chair import gripper_to_chair
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
 from drake_dress.report.release import Release, ReleaseRules, judge_release
@@ -37,9 +38,11 @@ class SuccessRules:
         max_gripper_force: Limit of the gripper force at every sample, N.
         max_penetration: Limit of the garment's penetration into the person at every sample, m.
         max_edge_strain: Limit of the strain of 99 % of the edges at every sample.
+        min_gripper_to_chair: Least distance of a gripper to the person's wheelchair at every
+            sample, m.
         min_arm_distance: Least distance between the arms, and of the arms without their hands to
-            the person, at every sample, m. Joints must also stay within their limits of position,
-            speed and torque.
+            the person and the wheelchair, at every sample, m. Joints must also stay within their
+            limits of position, speed and torque.
         release: Criteria after the grippers have let go.
     """
 
@@ -47,6 +50,7 @@ class SuccessRules:
     max_gripper_force: float = 40.0
     max_penetration: float = 5e-3
     max_edge_strain: float = 0.10
+    min_gripper_to_chair: float = 0.0
     min_arm_distance: float = 0.05
     release: ReleaseRules = ReleaseRules()
 
@@ -79,7 +83,9 @@ def summarize(
     which the run fell behind the requested rate) and `dropped_messages` (repeated and late messages
     by source). Runs with arms add `max_joint_speed_share`, `max_joint_torque_share` (of the
     limits), `min_joint_margin_rad`, `arm_tracking_mm` (gripper tracking error),
-    `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand).
+    `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand). Runs with a wheelchair
+    add `min_gripper_to_chair_m` and, with arms, `min_arm_to_chair_m`; there `max_penetration_m`
+    holds for person and chair.
 
     Args:
         log: Log of the run.
@@ -91,7 +97,12 @@ def summarize(
     m = measures if measures is not None else measure(log)
     arms = measure_arms(log)
     release = judge_release(log, m, rules.release)
-    reason = _reason(log, m, release, rules) or _arm_reason(log, arms, rules)
+    to_chair = gripper_to_chair(log)
+    reason = (
+        _reason(log, m, release, rules)
+        or _chair_reason(log, to_chair, rules)
+        or _arm_reason(log, arms, rules)
+    )
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
     summary |= _sleeve_figures(log, m, release.held)
     summary["stays_on"] = release.stays_on
@@ -101,6 +112,8 @@ def summarize(
     summary["late_plans"] = _late_plans(log)
     summary["safety_cut_s"] = _safety_cuts(log)
     summary |= _command_figures(log) | _arm_figures(arms)
+    if to_chair is not None:
+        summary["min_gripper_to_chair_m"] = _least(to_chair)
     return summary | {"seed": log.seed, "version": log.version}
 
 
@@ -306,6 +319,19 @@ def _safety_cuts(log: RunLog) -> dict[str, dict[str, float]] | None:
     return cuts
 
 
+def _chair_reason(log: RunLog, to_chair: FloatArray | None, rules: SuccessRules) -> str | None:
+    """Returns a sentence on a gripper that was inside the wheelchair; None if none was."""
+    if to_chair is None:
+        return None
+    for k, side in enumerate(SIDES):
+        distance = np.where(np.isfinite(to_chair[:, k]), to_chair[:, k], np.inf)
+        i = int(np.argmin(distance)) if len(distance) else 0
+        if len(distance) and distance[i] < rules.min_gripper_to_chair:
+            deep = 100.0 * (rules.min_gripper_to_chair - distance[i])
+            return f"{side} gripper inside the wheelchair: {deep:.1f} cm at t = {log.time[i]:.2f} s"
+    return None
+
+
 def _arm_reason(log: RunLog, arms: ArmMeasures | None, rules: SuccessRules) -> str | None:
     """Returns a sentence on the first rule that the arms broke; None if there is none."""
     if arms is None or not len(log):
@@ -317,6 +343,8 @@ def _arm_reason(log: RunLog, arms: ArmMeasures | None, rules: SuccessRules) -> s
         ("arms", arms.apart),
         ("left arm and person", arms.to_person[:, 0]),
         ("right arm and person", arms.to_person[:, 1]),
+        ("left arm and wheelchair", arms.to_chair[:, 0]),
+        ("right arm and wheelchair", arms.to_chair[:, 1]),
     ):
         i = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
         if distance[i] < rules.min_arm_distance:
@@ -328,7 +356,7 @@ def _arm_reason(log: RunLog, arms: ArmMeasures | None, rules: SuccessRules) -> s
 def _arm_figures(arms: ArmMeasures | None) -> dict[str, Any]:
     if arms is None or not len(arms.apart):
         return {}
-    return {
+    figures: dict[str, Any] = {
         "max_joint_speed_share": _largest(arms.speed_share),
         "max_joint_torque_share": _largest(arms.torque_share),
         "min_joint_margin_rad": _number(float(arms.margin.min())),
@@ -339,6 +367,9 @@ def _arm_figures(arms: ArmMeasures | None) -> dict[str, Any]:
         "min_arms_apart_m": _number(float(arms.apart.min())),
         "min_arm_to_person_m": _number(float(arms.to_person.min())),
     }
+    if np.isfinite(arms.to_chair).any():
+        figures["min_arm_to_chair_m"] = _least(arms.to_chair)
+    return figures
 
 
 def _command_figures(log: RunLog) -> dict[str, Any]:
@@ -361,6 +392,11 @@ def _command_figures(log: RunLog) -> dict[str, Any]:
 
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _least(values: FloatArray) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(values.min()) if values.size else None
 
 
 def _largest(values: FloatArray) -> float | None:

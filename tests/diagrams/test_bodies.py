@@ -19,12 +19,14 @@ from drake_dress.diagrams.scenario import (
     resolved_yaml,
 )
 from drake_dress.diagrams.scenario.schema import Measures, SideMeasures, Variation
-from drake_dress.diagrams.sections.person import arm, arms, joints, measures
+from drake_dress.diagrams.sections.person import arm, arms, chair, joints, measures
 from drake_dress.errors import UserError
 from drake_dress.models.human.body import BodyMeasures, body_capsules
 from drake_dress.models.human.girths import girth_of
 from drake_dress.models.human.joints import JointParameters
+from drake_dress.models.human.wheelchair import room_of_arms
 from drake_dress.models.sides import SIDES
+from drake_dress.shipped import shipped_scenario
 
 # Bodies as a parametric model of skin gives them, m.
 SMALL = (
@@ -202,3 +204,27 @@ def test_resolved_scenario_keeps_bodies(tmp_path: Path) -> None:
     again = tmp_path / "again.yaml"
     again.write_text(resolved_yaml(scenario))
     assert load_scenario(again) == scenario
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 99))
+def test_a_drawn_arm_is_outside_of_the_wheelchair(seed: int) -> None:
+    scenario = load_scenario(shipped_scenario("wheelchair"), seed=seed)
+    scenario.variation = Variation(
+        arm_angle_deg=12.0, person_scale=0.05, person_measures=0.03, start_offset=0.03
+    )
+    drawn = apply_variation(scenario).person
+    seat = chair(drawn)
+    assert seat is not None
+    assert min(room_of_arms(seat, measures(drawn), arms(drawn)).values()) >= 0.005
+    scenario.person.chair = None
+    free = apply_variation(scenario).person
+    for led, pose in ((drawn.left_arm, free.left_arm), (drawn.right_arm, free.right_arm)):
+        # led outward only, and only where the chair is
+        assert led.abduction_deg >= pose.abduction_deg
+        assert (led.extension_deg, led.elbow_deg) == (pose.extension_deg, pose.elbow_deg)
+
+
+def test_without_variation_no_arm_is_led_anywhere() -> None:
+    scenario = load_scenario(shipped_scenario("wheelchair"))
+    assert apply_variation(scenario).person.left_arm == scenario.person.left_arm

@@ -18,6 +18,7 @@ from drake_dress.models.human.body import (
     capsule_arrays,
 )
 from drake_dress.models.human.joints import JointParameters
+from drake_dress.models.human.wheelchair import Wheelchair, chair_capsules
 from drake_dress.models.sides import Side
 
 M = BodyMeasures()
@@ -35,11 +36,13 @@ def drawn(
     forces: dict[int, list[float]],
     duration: float,
     body: BodyMeasures | None = None,
+    chair: Wheelchair | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns joints (6,3), m, before and after `forces` (3,), N, acted on some of them."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.004)
-    person = add_person(plant, body or M, posture, arms, JointParameters(2.0, 1.0, 1.5, 0.4))
+    joints = JointParameters(2.0, 1.0, 1.5, 0.4)
+    person = add_person(plant, body or M, posture, arms, joints, chair=chair)
     plant.Finalize()
     diagram = builder.Build()
     simulator = Simulator(diagram)
@@ -87,6 +90,31 @@ def test_an_arm_that_is_drawn_inward_stops_at_the_chest(posture: Posture, side: 
     _, joints = drawn(posture, OPEN, {3 * side + 1: [0.0, 20.0 * inward, 0.0]}, 2.0)
     # it touches, and sinks into the flesh under 20 N and the springs
     assert -0.002 < into_chest(joints, chest(posture)) < 0.01
+
+
+def into_chair(joints: np.ndarray) -> float:
+    """Returns the depth, m, by which arms of `joints` (6,3) enter a wheelchair."""
+    first, second = joints[[0, 1, 3, 4]], joints[[1, 2, 4, 5]]
+    radius = np.array([M.upper_arm_radius, M.forearm_radius] * 2)
+    chair = Capsules(*capsule_arrays(chair_capsules(Wheelchair(), M)))
+    pairs = np.array([[i, j] for i in range(4) for j in range(len(chair.radius))])
+    return -float(clearance(Capsules(first, second, radius), chair, pairs).distance.min())
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_an_arm_that_is_drawn_downward_stops_at_the_armrest(side: int) -> None:
+    chair = Wheelchair()
+    # the upper arms lead forward and outward, the forearms lie above the armrests
+    pose = ArmPose(np.deg2rad(20.0), np.deg2rad(-25.0), 0.0, np.deg2rad(75.0))
+    above: dict[Side, ArmPose] = {"left": pose, "right": pose}
+    _, free = drawn("sitting", above, {}, 0.1, chair=chair)
+    assert into_chair(free) < -0.01
+    inward = 1.0 if side else -1.0
+    force = {3 * side + 2: [0.0, 12.0 * inward, -20.0]}
+    _, through = drawn("sitting", above, force, 2.0)
+    assert into_chair(through) > 0.02
+    _, joints = drawn("sitting", above, force, 2.0, chair=chair)
+    assert -0.002 < into_chair(joints) < 0.01
 
 
 @pytest.mark.parametrize("side", [0, 1])

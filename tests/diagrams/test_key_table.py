@@ -34,6 +34,8 @@ EVERYTHING = f"""
 garment:
   mesh: {{file: a.obj, loops: {{left_cuff: [1, 2, 3]}}, grasp: {{left: [4]}}, leave_out: [Button]}}
 person:
+  posture: sitting
+  chair: {{}}
   body: {{scan: {{file: a.ply, joints: {{left_hand: [0, 0.3, 0.8]}}}}}}
   measures: {{{", ".join(f"{name}: {SIZES[name]}" for name in MEASURED)}}}
   behaviour:

@@ -165,6 +165,16 @@ def check_joints(source: str, person: Person) -> None:
                 )
 
 
+def check_chair(source: str, person: Person) -> None:
+    """Checks that who has a wheelchair sits in it."""
+    if person.chair is not None and person.posture != "sitting":
+        raise UserError(
+            source,
+            "person.chair",
+            f"is given to a {person.posture} person, expected person.posture: sitting",
+        )
+
+
 def check_coat(source: str, coat: Coat) -> None:
     """Checks that the coat's size is in its table."""
     if coat.size is not None:

@@ -16,6 +16,7 @@ from drake_dress.diagrams.scenario.body import fill_in_body
 from drake_dress.diagrams.scenario.checks import (
     check_behaviour,
     check_cameras,
+    check_chair,
     check_coat,
     check_controller,
     check_costs,
@@ -98,6 +99,7 @@ def _checked(
     check_controller(source, scenario.controller)
     check_costs(source, scenario.controller.costs)
     check_joints(source, scenario.person)
+    check_chair(source, scenario.person)
     check_coat(source, scenario.garment.coat)
     check_behaviour(source, scenario.person)
     check_hardware(source, scenario.station)

@@ -16,6 +16,7 @@ from drake_dress.models.garment.rest import RESTS
 from drake_dress.models.human.prediction import PREDICTORS
 from drake_dress.models.human.skin.phenotype import AGE_RANGE, HEIGHT_RANGE, WEIGHT_RANGE
 from drake_dress.models.human.skin.scan import JOINT_NAMES
+from drake_dress.models.human.wheelchair import ARMRESTS
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import KINDS
 
@@ -39,6 +40,7 @@ CHOICES = {
     "person.body.sex": ("female", "male"),
     "person.body.scan.unit": tuple(UNITS),
     "person.body.scan.up": AXES,
+    "person.chair.armrests": ARMRESTS,
     "person.behaviour.kind": ("dummy", "passive", "active"),
     **{
         f"person.behaviour.motions.{motion}.side": ("left", "right", "both")
@@ -369,6 +371,16 @@ _RANGES: dict[str, tuple[float, float]] = {
     "start.distance_behind": (0.1, 2.0),
     "start.height_offset": (-1.0, 1.0),
     "start.lateral_offset": (-1.0, 1.0),
+    "chair.seat_width": (0.15, 0.80),
+    "chair.back_height": (0.10, 0.80),
+    "chair.back_gap": (0.0, 0.20),
+    "chair.handle_height": (0.05, 0.90),
+    "chair.handle_length": (0.0, 0.30),
+    "chair.armrest_height": (0.08, 0.45),
+    "chair.armrest_length": (0.05, 0.60),
+    "chair.armrest_width": (0.02, 0.12),
+    "chair.wheel_diameter": (0.10, 0.80),
+    "chair.wheel_width": (0.02, 0.12),
     "variation.arm_angle_deg": (0.0, 45.0),
     "variation.coat_scale": (0.0, 0.3),
     "variation.coat_measures": (0.0, 0.2),

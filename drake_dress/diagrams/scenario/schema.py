@@ -32,6 +32,7 @@ from drake_dress.models.human import (
     prediction,
     stirring,
     tremor,
+    wheelchair,
 )
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
@@ -521,6 +522,11 @@ class Body:
     scan: BodyScan | None = None
 
 
+@mirror_of(wheelchair.Wheelchair)
+class Chair(Mirror):
+    """The wheelchair that the person sits in, sizes in m; see models/human/wheelchair.py."""
+
+
 @dataclass
 class Person:
     """The person who is dressed.
@@ -537,6 +543,7 @@ class Person:
         left_joints: those of the left arm that differ.
         right_joints: those of the right arm that differ.
         behaviour: the person's own motions.
+        chair: wheelchair of a sitting person; none if empty. `{}` is a chair of the person's size.
     """
 
     posture: str = "standing"
@@ -550,6 +557,7 @@ class Person:
     left_joints: SideJoints = field(default_factory=SideJoints)
     right_joints: SideJoints = field(default_factory=SideJoints)
     behaviour: Behaviour = field(default_factory=Behaviour)
+    chair: Chair | None = None
 
 
 @dataclass

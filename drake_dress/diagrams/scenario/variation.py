@@ -1,6 +1,7 @@
 """Draws the quantities that a scenario's seed varies: pose, coat, person, fabric and start.
 
 Each group of keys has its own generator, so the widths of one group do not change another's draws.
+An arm whose drawn pose would be inside the wheelchair is led outward until it is beside it.
 """
 
 import copy
@@ -19,13 +20,18 @@ from drake_dress.diagrams.scenario.schema import (
     SideMeasures,
     Variation,
 )
-from drake_dress.diagrams.sections.person import measures
+from drake_dress.diagrams.sections.person import arms, chair, measures
 from drake_dress.models.human.skin.drawing import draw_phenotype
+from drake_dress.models.human.wheelchair import room_of_arms
 from drake_dress.models.sides import SIDES
 
 # Added to the seed for the generators of the later groups.
 _COAT, _PERSON, _BODY = 1, 2, 3
 _MASSES = ("upper_arm_mass", "forearm_mass")
+
+# Least distance of a drawn arm from the wheelchair, m; degrees by which it is led outward at once,
+# and to which at most.
+_LEAST_ROOM, _LEAD, _MOST_ABDUCTED = 0.005, 0.5, 90.0
 
 Draw = Callable[[float], float]
 
@@ -55,6 +61,8 @@ def apply_variation(scenario: Scenario) -> Scenario:
         _draw_body(drawn.person, np.random.default_rng((scenario.seed, _BODY)))
     if v.person_scale > 0.0 or v.person_measures > 0.0:
         _vary_person(drawn.person, v, _uniform(scenario.seed, _PERSON))
+    if scenario.variation != Variation():
+        _lead_beside_chair(drawn.person)
     drawn.variation = Variation()
     return drawn
 
@@ -99,6 +107,20 @@ def _vary_person(person: Person, v: Variation, draw: Draw) -> None:
             setattr(person.measures, entry.name, value * whole * own)
         for group in groups:
             setattr(group, entry.name, getattr(group, entry.name) * whole * own)
+
+
+def _lead_beside_chair(person: Person) -> None:
+    """Abducts each arm by as much as it takes to be outside of the wheelchair, if there is one."""
+    seat = chair(person)
+    if seat is None:
+        return
+    body = measures(person)
+    for side, pose in zip(SIDES, (person.left_arm, person.right_arm), strict=True):
+        while (
+            pose.abduction_deg < _MOST_ABDUCTED
+            and room_of_arms(seat, body, arms(person))[side] < _LEAST_ROOM
+        ):
+            pose.abduction_deg += _LEAD
 
 
 def _has(group: SideMeasures, name: str) -> bool:

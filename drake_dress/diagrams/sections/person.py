@@ -19,6 +19,7 @@ from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.muscles import sagged
 from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.human.spasm import SpasmParameters
+from drake_dress.models.human.wheelchair import Wheelchair
 from drake_dress.models.sides import SIDES, Side
 
 
@@ -68,6 +69,12 @@ def arm(values: schema.Arm) -> ArmPose:
             [values.abduction_deg, values.extension_deg, values.rotation_deg, values.elbow_deg]
         )
     )
+
+
+def chair(person: schema.Person) -> Wheelchair | None:
+    """Returns the wheelchair that the person sits in, if any."""
+    found: Wheelchair | None = None if person.chair is None else model_of(person.chair)
+    return found
 
 
 def joints(person: schema.Person) -> JointParameters:

@@ -24,6 +24,8 @@ _BELOW_SHOULDERS = 0.02
 _BREAST, _WAIST, _HIPS = 0.35, 0.62, 0.92
 # Distance from the shoulders' line to the head, m, where it is not given.
 _NECK_LENGTH = 0.12
+# What a capsule is part of.
+PERSON, CHAIR = "person", "chair"
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Capsule:
         a_B, b_B: (3,) ends of its axis, m.
         radius: radius at end a, m.
         end_radius: radius at end b, m; None: the same.
+        part: what it is part of, `PERSON` or `CHAIR`: a chair is fixed in the torso.
     """
 
     body: str
@@ -42,6 +45,7 @@ class Capsule:
     b_B: FloatArray
     radius: float
     end_radius: float | None = None
+    part: str = PERSON
 
     @property
     def radii(self) -> tuple[float, float]:
