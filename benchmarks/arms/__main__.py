@@ -38,6 +38,11 @@ SCENARIOS = (
     "active_standing",
     "gown_front",
     "wheelchair",
+    "stiff_elbow",
+    "stiff_shoulder",
+    "paralysed_arm",
+    "spasm",
+    "limited_range",
     "lab",
 )
 METHODS = ("global", "full")

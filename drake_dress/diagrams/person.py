@@ -149,9 +149,7 @@ def add_person(
         UserError: an arm is missing, the position is not two finite numbers, or the posture is
             unknown.
     """
-    missing = [side for side in SIDES if side not in arms]
-    if missing:
-        raise UserError("person", "arms", f"lacks {', '.join(missing)}, expected left and right")
+    _check_both(arms)
     origin = _origin(position)
     model = plant.AddModelInstance("person")
     capsules = seated_capsules(measures, posture, chair)
@@ -182,6 +180,13 @@ def add_person(
         origin,
         turns,
     )
+
+
+def _check_both(arms: dict[Side, ArmPose]) -> None:
+    """Checks that no arm is missing."""
+    missing = [side for side in SIDES if side not in arms]
+    if missing:
+        raise UserError("person", "arms", f"lacks {', '.join(missing)}, expected left and right")
 
 
 def _origin(position: FloatArray | None) -> FloatArray:

@@ -303,8 +303,7 @@ def make_simulated_station(
     if sight is not None:
         points = person.joint_points
         export_oracles(builder, cloth, plant, points, sight.transfer, p.effects, sight.period)
-        permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
-        builder.ExportOutput(permission.get_output_port(), "permission")
+        _export_permission(builder)
     _export_truth(builder, cloth, plant, intent)
     _export_cameras(builder, plant, scene_graph, person, cloth, p)
     if meshcat is not None:
@@ -312,6 +311,12 @@ def make_simulated_station(
     diagram = builder.Build()
     diagram.set_name("station")
     return SimulatedStation(diagram, person, grippers, robots, plant, scene_graph, cloth)
+
+
+def _export_permission(builder: DiagramBuilder) -> None:
+    """Exports the permission to let go, which is always there in a simulation."""
+    permission = builder.AddNamedSystem("permission", ConstantVectorSource([1.0]))
+    builder.ExportOutput(permission.get_output_port(), "permission")
 
 
 # Output ports of grippers by side and quantity.

@@ -42,6 +42,7 @@ person:
     kind: active
     motions: [{{reach: {{}}}}, {{turn: {{}}}}, {{withdraw: {{}}}}, {{wave: {{amplitude: 0.01}}}}]
     tremor: {{}}
+    spasm: {{}}
 safety: {{workspace: {{low: [-2, -2, 0], high: [2, 2, 3]}}}}
 station: {{cameras: [{{name: front, position: [2, 0, 1], target: [0, 0, 1]}}]}}
 lab: {{faults: [{{}}]}}
