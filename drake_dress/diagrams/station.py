@@ -266,9 +266,7 @@ def make_simulated_station(
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, p.body_time_step)
     body = body_with_effects(p.measures, p.effects)
-    person = add_person(
-        plant, body, p.posture, p.arms, p.joints, turns=p.behaviour.turns, chair=p.chair
-    )
+    person = _add_person(plant, body, p)
     robots, arms = None, None
     if p.placement is not None:
         robots = robots_at_start(p, p.placement, body, person)
@@ -311,6 +309,12 @@ def make_simulated_station(
     diagram = builder.Build()
     diagram.set_name("station")
     return SimulatedStation(diagram, person, grippers, robots, plant, scene_graph, cloth)
+
+
+def _add_person(plant: MultibodyPlant, body: BodyMeasures, p: StationParameters) -> Person:
+    """Adds the person with the true body."""
+    turns = p.behaviour.turns
+    return add_person(plant, body, p.posture, p.arms, p.joints, turns=turns, chair=p.chair)
 
 
 def _export_permission(builder: DiagramBuilder) -> None:
