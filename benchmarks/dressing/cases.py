@@ -24,6 +24,11 @@ PERSONS = {
     "passive_sitting": "passive_sitting.yaml",
     "active": "active_standing.yaml",
     "wheelchair": "wheelchair.yaml",
+    "stiff_elbow": "stiff_elbow.yaml",
+    "stiff_shoulder": "stiff_shoulder.yaml",
+    "paralysed_arm": "paralysed_arm.yaml",
+    "spasm": "spasm.yaml",
+    "limited_range": "limited_range.yaml",
 }
 # Those of the study in docs/dressing.md; others are asked for by name.
 STUDIED = ("dummy", "passive_standing", "passive_sitting", "active")
