@@ -126,7 +126,7 @@ def cut_along(x: FloatArray, faces: IntArray, line: Line) -> tuple[FloatArray, I
         line: on the mesh.
     """
     node = np.where(line.share < _SNAP, line.edges[:, 0], -1)
-    node = np.where(line.share > 1.0 - _SNAP, line.edges[:, 1], node)
+    node = _without_returns(np.where(line.share > 1.0 - _SNAP, line.edges[:, 1], node))
     new = np.flatnonzero(node < 0)
     node[new] = len(x) + np.arange(len(new))
     position = np.concatenate([x, line.points[new]])
@@ -134,6 +134,23 @@ def cut_along(x: FloatArray, faces: IntArray, line: Line) -> tuple[FloatArray, I
         faces = _edge_parted(faces, line.edges[k], int(node[k]))
     loop = node[node != np.roll(node, 1)]
     return position, faces, loop.astype(np.int32)
+
+
+def _without_returns(node: IndexArray) -> IndexArray:
+    """Returns the nodes (k,) of a closed line, -1 for new ones, without ways from a node to itself.
+
+    Of the points on the edges of one node, those at both ends may be moved to it, but not one in
+    between.
+    """
+    node = node.copy()
+    count = len(node)
+    for old in np.unique(node[node >= 0]):
+        at = np.flatnonzero(node == old)
+        gaps = np.diff(np.append(at, at[0] + count))
+        # the longest gap is the rest of the line
+        after = at[(int(np.argmax(gaps)) + 1) % len(at)]
+        node[(after + np.arange(count - int(gaps.max()) + 1)) % count] = old
+    return node
 
 
 def _walk(first: IndexArray, second: IndexArray, start: int) -> list[int]:
