@@ -58,7 +58,9 @@ def arms(person: schema.Person) -> dict[Side, ArmPose]:
         if own.tone < 1.0:
             limb = Arm(measures(person), posture(person), side)
             angles = np.array(angles_of(pose))
-            poses[side] = ArmPose(*sagged(limb, angles, own.stiffness, own.tone, own.limits))
+            poses[side] = ArmPose(
+                *sagged(limb, angles, own.stiffness, own.tone, own.limits).tolist()
+            )
     return poses
 
 
