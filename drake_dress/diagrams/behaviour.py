@@ -9,7 +9,9 @@ The controller receives none of this.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -223,10 +225,7 @@ def _trembling(
 ) -> OutputPort:
     """Returns `force` with the tremor's torques added."""
     assert behaviour.tremor is not None
-    torque = _of_muscles(
-        arms,
-        [tremor_torque(behaviour.tremor, *of_arm) for of_arm in _swinging(plant, person, arms)],
-    )
+    torque = _of_muscles(plant, person, arms, partial(tremor_torque, behaviour.tremor))
     tremor = builder.AddNamedSystem(
         "hand_tremor",
         HandTremor(
@@ -250,13 +249,8 @@ def _stirring(
     grippers_open: OutputPort,
 ) -> OutputPort:
     """Returns `force` with the torques added by which a dressed person stirs."""
-    torque = _of_muscles(
-        arms,
-        [
-            driving_torque(DRIVE, p.amplitude, p.frequency, *of_arm)
-            for of_arm in _swinging(plant, person, arms)
-        ],
-    )
+    driving = partial(driving_torque, DRIVE, p.amplitude, p.frequency)
+    torque = _of_muscles(plant, person, arms, driving)
     stirring = builder.AddNamedSystem(
         "arm_stirring",
         ArmStirring(
@@ -271,9 +265,19 @@ def _stirring(
     return _added(builder, force, stirring.get_output_port())
 
 
-def _of_muscles(arms: Arms, torque: list[FloatArray]) -> FloatArray:
-    """Returns torques of both arms (8,) without those of an arm that has no muscle tone, N·m."""
-    return np.concatenate([own * works for own, works in zip(torque, arms.has_tone, strict=True)])
+def _of_muscles(
+    plant: MultibodyPlant, person: Person, arms: Arms, driving: Callable[..., FloatArray]
+) -> FloatArray:
+    """Returns torques of both arms (8,), N·m; 0 of an arm that has no muscle tone.
+
+    Args:
+        plant: finalized.
+        person: in the plant.
+        arms: of the person.
+        driving: torques (4,) of one arm from what `_swinging` returns of it.
+    """
+    swinging = zip(_swinging(plant, person, arms), arms.has_tone, strict=True)
+    return np.concatenate([driving(*of_arm) * works for of_arm, works in swinging])
 
 
 def _swinging(

@@ -2,6 +2,7 @@ import numpy as np
 
 from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.systems.arm_spasm import ArmSpasm
+from tests.systems.over_time import output_at
 
 INDEX = np.array([1, 2, 3, 4, 6, 7, 8, 9])
 TIMES = np.arange(0.0, 60.0, 0.02)
@@ -9,13 +10,7 @@ TIMES = np.arange(0.0, 60.0, 0.02)
 
 def torque(seed: int, sides: tuple[str, ...]) -> np.ndarray:
     p = SpasmParameters(sides=sides, torque=2.0)  # type: ignore[arg-type]
-    system = ArmSpasm(p, seed, 11, INDEX)
-    context = system.CreateDefaultContext()
-    rows = []
-    for t in TIMES:
-        context.SetTime(t)
-        rows.append(system.get_output_port().Eval(context))
-    return np.array(rows)
+    return output_at(ArmSpasm(p, seed, 11, INDEX), TIMES)
 
 
 def test_only_the_arm_that_has_spasms_is_driven() -> None:

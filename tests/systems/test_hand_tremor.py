@@ -1,19 +1,14 @@
 import numpy as np
 
 from drake_dress.systems.hand_tremor import HandTremor
+from tests.systems.over_time import output_at
 
 TORQUE = np.array([0.0, 0.0, 1.5, 1.5, 0.0, 0.0, 0.5, 0.5])
 INDEX = np.array([1, 2, 3, 4, 6, 7, 8, 9])
 
 
 def torque(seed: int, times: np.ndarray) -> np.ndarray:
-    system = HandTremor(TORQUE, 5.0, seed, 11, INDEX)
-    context = system.CreateDefaultContext()
-    rows = []
-    for t in times:
-        context.SetTime(t)
-        rows.append(system.get_output_port().Eval(context))
-    return np.array(rows)
+    return output_at(HandTremor(TORQUE, 5.0, seed, 11, INDEX), times)
 
 
 TIMES = np.arange(0.0, 20.0, 0.004)

@@ -15,6 +15,7 @@ from drake_dress.diagrams.scenario.schema import (
     Scenario,
     Station,
 )
+from drake_dress.diagrams.sections.person import joints, spasm
 from drake_dress.errors import UserError
 from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
@@ -22,7 +23,6 @@ from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human import motions
 from drake_dress.models.human.arm import JOINT_NAMES
 from drake_dress.models.human.skin.measures import MEASURED
-from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.sides import SIDES
 from drake_dress.models.supervision.injection import sources_of
 
@@ -221,9 +221,8 @@ def check_behaviour(source: str, person: Person) -> None:
             source, key, f"are given to a {behaviour.kind} person, expected kind: active"
         )
     if behaviour.spasm is not None:
-        times = {k: v for k, v in vars(behaviour.spasm).items() if k != "side"}
         try:
-            SpasmParameters(**times)
+            spasm(behaviour.spasm)
         except UserError as error:
             raise UserError(source, f"person.behaviour.spasm.{error.key}", error.message) from error
     names = [entry.name for entry in dataclasses.fields(Motion)]
@@ -252,9 +251,9 @@ def check_behaviour(source: str, person: Person) -> None:
 def _check_tone(source: str, key: str, motion: object, person: Person) -> None:
     """Checks that no arm without muscle tone is to move by itself."""
     moved = getattr(motion, "side", None)  # a turn moves both arms with the body
-    for side, group in zip(SIDES, (person.left_joints, person.right_joints), strict=True):
-        tone = person.joints.tone if group.tone is None else group.tone
-        if tone == 0.0 and moved in (side, "both"):
+    both = joints(person)
+    for side in SIDES:
+        if both.of(side).tone == 0.0 and moved in (side, "both"):
             raise UserError(
                 source,
                 f"{key}.side",
