@@ -116,8 +116,9 @@ def test_an_armrest_that_is_taken_away_leaves_the_rest(armrests: str) -> None:
 )
 def test_no_node_goes_through_the_back(y: float, height: float, rise: float) -> None:
     chair = obstacles(Wheelchair())
-    x = np.array([[-0.30, y, SEAT + height]])
-    motion = np.array([[0.25, 0.0, rise]])
+    x, motion = np.array([[-0.30, y, SEAT + height]]), np.array([[0.25, 0.0, rise]])
+    # `height` is where the path goes through the middle of the back: below the back it is free
+    x[0, 2] -= rise * (chair.a[0, 0] - x[0, 0]) / motion[0, 0]
     found = find_contacts(x, motion, chair, 0.004, 0.02, np.zeros(1, dtype=bool))
     assert len(found.nodes) == 1
 
