@@ -8,6 +8,7 @@ from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Coat,
     Controller,
+    Insertion,
     Measures,
     Motion,
     Person,
@@ -17,6 +18,7 @@ from drake_dress.diagrams.scenario.schema import (
 )
 from drake_dress.diagrams.sections.person import joints, spasm
 from drake_dress.errors import UserError
+from drake_dress.models.control.insertion_search import InsertionParameters
 from drake_dress.models.control.own_costs import registered_costs
 from drake_dress.models.control.task_parameters import LEAST_APPROACHES
 from drake_dress.models.garment.coat import body_of_size
@@ -51,6 +53,21 @@ def check_controller(source: str, controller: Controller) -> None:
             f"is {mpc.delay} s, expected a multiple of time_step, {mpc.time_step} s, "
             "within the horizon",
         )
+    _check_insertion(source, controller.insertion)
+
+
+def _check_insertion(source: str, insertion: Insertion) -> None:
+    """Checks the lengths of the places and ranges of the search for an insertion."""
+    plain = InsertionParameters()
+    for entry in dataclasses.fields(InsertionParameters):
+        value, wanted = getattr(insertion, entry.name), getattr(plain, entry.name)
+        if not isinstance(wanted, tuple):
+            continue
+        words = "front, inward, up in m" if len(wanted) == 3 else "a smallest and a largest value"
+        if len(value) != len(wanted) or (len(wanted) == 2 and value[0] > value[1]):
+            raise UserError(
+                source, f"controller.insertion.{entry.name}", f"is {value}, expected {words}"
+            )
 
 
 def check_safety(source: str, safety: Safety, command_period: float) -> None:

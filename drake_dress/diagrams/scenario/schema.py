@@ -18,7 +18,14 @@ from drake_dress.diagrams.scenario.mirror import Mirror, mirror_of
 from drake_dress.models.arm import resolved_rate
 from drake_dress.models.arm.status_check import JointBounds
 from drake_dress.models.cloth import material
-from drake_dress.models.control import costs, local_model, policy, safety, task_parameters
+from drake_dress.models.control import (
+    costs,
+    insertion_search,
+    local_model,
+    policy,
+    safety,
+    task_parameters,
+)
 from drake_dress.models.control.own_costs import COSTS
 from drake_dress.models.dressing import finish, stages
 from drake_dress.models.effects.effect import Effect
@@ -619,6 +626,11 @@ class Finish(Mirror):
     """Laying the coat and letting it go; see models/dressing/finish.py."""
 
 
+@mirror_of(insertion_search.InsertionParameters)
+class Insertion(Mirror):
+    """Search for a motion that puts the first hand in; see models/control/insertion_search.py."""
+
+
 @mirror_of(task_parameters.TaskParameters, without=("progress_rate", "approach_distance", "stages"))
 class Tasks(Mirror):
     """Targets of the sleeves; see models/control/task_parameters.py."""
@@ -742,6 +754,7 @@ class Controller:
         global_mpc: the global controller.
         tasks: targets of the sleeves.
         stages: thresholds between the stages.
+        insertion: search for the motion that puts the first hand into its sleeve.
         finish: laying the coat on the shoulders and letting it go.
         local: the local controller.
         predictor: how the person's arms are predicted to move.
@@ -758,6 +771,7 @@ class Controller:
     global_mpc: GlobalMpc = field(default_factory=GlobalMpc)
     tasks: Tasks = field(default_factory=Tasks)
     stages: Stages = field(default_factory=Stages)
+    insertion: Insertion = field(default_factory=Insertion)
     finish: Finish = field(default_factory=Finish)
     local: Local = field(default_factory=Local)
     predictor: str = "still"

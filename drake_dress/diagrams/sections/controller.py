@@ -61,6 +61,7 @@ def controller_policy(
         budget=budget,
         weights=model_of(g.weights),
         finish=model_of(c.finish),
+        insertion=model_of(c.insertion),
         tasks=model_of(
             c.tasks,
             progress_rate=g.progress_step / g.time_step,

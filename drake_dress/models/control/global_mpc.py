@@ -41,7 +41,8 @@ class Plan:
         cost: final cost; initial_cost: cost of the initial guess.
         iterations: accepted gradient steps; evaluations: rollouts.
         reason: why the descent stopped: "small_step", "no_descent", "iterations" or "budget";
-            "no_plan" if none was requested, "released" if the grippers have let go.
+            "search" if the plan was found by trying, "no_plan" if none was requested, "released" if
+            the grippers have let go.
         armhole: (N,2,3) predicted armhole centres, m.
         force: (N,2) predicted gripper force, N.
         work: iterations of the linear solver.
@@ -138,8 +139,8 @@ class GlobalController:
         self.max_iterations = max_iterations
         self.frozen_contact = frozen_contact
         self.costs = dressing_costs(weights, garment, costs)
-        self._side = np.repeat([0, 1], garment.held_count)
-        left, right = (np.flatnonzero(self._side == i) for i in (0, 1))
+        self.side_of_held = np.repeat([0, 1], garment.held_count)
+        left, right = (np.flatnonzero(self.side_of_held == i) for i in (0, 1))
         self.grip = Grip(cloth.held.astype(np.int64), (left, right), garment.span)
 
     def solve(
@@ -199,6 +200,11 @@ class GlobalController:
             spending.iterations,
         )
 
+    def follow(self, situation: Situation, velocity: FloatArray) -> Plan:
+        """Returns the plan of given velocities (N,2,3), m/s, which a search has found."""
+        now = self._rollout(situation, velocity)
+        return Plan(velocity, now.cost, now.cost, 0, 1, "search", now.armhole, now.force)
+
     def _begun(
         self, situation: Situation, velocity: FloatArray, fastest: FloatArray, spending: Spending
     ) -> _Search:
@@ -248,7 +254,7 @@ class GlobalController:
         cost = float(self.weights.speed * h * h * np.sum(velocity**2))
         tapes, steps = [], []
         for j in range(n):
-            motion = h * velocity[j][self._side]
+            motion = h * velocity[j][self.side_of_held]
             x, v, reaction, tape = self.cloth.step(x, v, motion, situation.obstacles[j])
             tapes.append(tape)
             step = PlannedStep(

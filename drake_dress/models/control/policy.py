@@ -11,9 +11,15 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.control.budget import Budget
+from drake_dress.models.control.budget import Budget, Spending
 from drake_dress.models.control.costs import GarmentCost, Weights
 from drake_dress.models.control.global_mpc import GlobalController, Plan
+from drake_dress.models.control.insertion_search import (
+    InsertionParameters,
+    InsertionSearch,
+    Scene,
+    SearchState,
+)
 from drake_dress.models.control.laying import (
     CollarPosition,
     GrippersOverShoulders,
@@ -59,6 +65,7 @@ class PolicyParameters:
             controller works alone.
         budget: limits of a solve.
         finish: settings of laying the coat and letting it go.
+        insertion: settings of the search for motions that put a hand through an armhole.
     """
 
     time_step: float = 0.2
@@ -73,6 +80,7 @@ class PolicyParameters:
     plans: bool = True
     budget: Budget = Budget(iterations=3200)
     finish: FinishParameters = FinishParameters()
+    insertion: InsertionParameters = InsertionParameters()
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,7 @@ class PolicyState(Immutable):
     stages: StageState
     velocity: FloatArray
     finish: FinishState = FinishState()
+    search: SearchState = SearchState()
 
     @property
     def shown(self) -> tuple[int, int]:
@@ -164,6 +173,20 @@ class DressingPolicy:
                 *costs,
             ),
         )
+        tried = parameters.insertion
+        self.search = InsertionSearch(
+            ExplicitBiasCloth(
+                elements,
+                replace(material, stretch_stiffness=tried.stretch_stiffness),
+                parameters.time_step / tried.substeps,
+                mesh.held,
+                settings=ExplicitSettings(tolerance=1e-2, iterations=tried.iterations),
+            ),
+            self.controller.grip,
+            self.planner,
+            parameters.max_speed,
+            tried,
+        )
 
     def initial_state(self) -> PolicyState:
         """Returns the state before the first decision: no sleeve is on, and nothing moves."""
@@ -218,7 +241,7 @@ class DressingPolicy:
             return state, Decision(
                 self._moving(x, 0.0 * state.velocity, "no_plan"), assignment, target
             )
-        plan = self._planned(state, x, v, joints, targets, assignment, elapsed_steps, radius)
+        state, plan = self._planned(state, x, v, joints, targets, assignment, elapsed_steps, radius)
         laid = finish.phase == Phase.LAID
         return replace(state, velocity=plan.velocity), Decision(plan, assignment, target, laid)
 
@@ -259,7 +282,7 @@ class DressingPolicy:
         assignment: Assignment,
         elapsed_steps: float,
         radius: FloatArray | None,
-    ) -> Plan:
+    ) -> tuple[PolicyState, Plan]:
         """Returns the plan of the global controller; arguments as of `decide`."""
         p, lays = self.parameters, state.finish.phase != Phase.DRESSING
         obstacles = person_obstacles(self.person, joints, p.time_step)
@@ -275,13 +298,38 @@ class DressingPolicy:
         ):
             max_speed = p.tasks.settling_speed
         leftward = headings(joints[1:]).leftward
-        return self.controller.solve(
-            Situation(x, v, targets, obstacles, leftward, away, laying),
-            later(state.velocity, elapsed_steps),
-            p.committed_steps,
-            p.budget,
-            max_speed,
-        )
+        situation = Situation(x, v, targets, obstacles, leftward, away, laying)
+        guess = later(state.velocity, elapsed_steps)
+        state, side = self._entering(state, assignment)
+        if side is None:
+            plan = self.controller.solve(situation, guess, p.committed_steps, p.budget, max_speed)
+            return state, plan
+        first, to = p.committed_steps, self.planner.toward(joints[-1])
+        person = obstacles if away is None else away
+        spending = Spending(Budget(iterations=p.insertion.budget))
+        scene = Scene(x, v, joints[-1], obstacles, person[-1], to, side, spending)
+        search, velocity = self.search.advance(state.search, scene, guess[:first])
+        moves = np.zeros_like(guess)
+        moves[:first] = guess[:first]
+        rest = velocity[: len(moves) - first]
+        moves[first : first + len(rest)] = rest
+        return replace(state, search=search), self.controller.follow(situation, moves)
+
+    def _entering(
+        self, state: PolicyState, assignment: Assignment
+    ) -> tuple[PolicyState, int | None]:
+        """Returns the state, and the side of the hand for which to search; None for no search.
+
+        In real time there is no time to try motions all the way.
+        """
+        search, first = self.search, state.stages.first
+        misses = sum(state.stages.attempts)
+        if first < 0 or self.parameters.budget.seconds is not None:
+            misses = -1
+        if any(fact.linked for fact in assignment.facts):
+            misses = -1
+        begun, side = search.begun(state.search, first, self.planner.are_alike, misses)
+        return replace(state, search=begun), side
 
     def _moving(self, x: FloatArray, velocity: FloatArray, reason: str) -> Plan:
         """Returns a plan of given velocities (N,2,3), m/s, in which the sleeves stay in place."""

@@ -140,6 +140,11 @@ class TaskPlanner:
             left, right = (room_for_second(arms, i, self._reach, from_front) for i in (0, 1))
             self._rooms = (left, right)
 
+    @property
+    def are_alike(self) -> bool:
+        """Whether both arms can do the same, so that either may go first."""
+        return self._rooms == (0.0, 0.0) and self.parameters.stages.first == "auto"
+
     def sleeves(self, x: FloatArray) -> tuple[SleeveState, SleeveState]:
         """Returns the states of left and right sleeve of the garment at `x` (n,3), m."""
         return (

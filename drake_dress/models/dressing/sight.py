@@ -57,6 +57,26 @@ def free_sight(
     return 1.0 - float(barred.mean())
 
 
+def is_barred(x: FloatArray, faces: IntArray, eye: FloatArray, target: FloatArray) -> bool:
+    """Returns whether the segment from `eye` (3,) to `target` (3,), m, meets the garment.
+
+    Args:
+        x: (n,3) nodes of the garment, m.
+        faces: (F,3) its triangles.
+        eye: (3,) m.
+        target: (3,) m.
+    """
+    barred = np.zeros(1, dtype=np.bool_)
+    _find_barred(
+        np.ascontiguousarray(x),
+        np.ascontiguousarray(faces),
+        np.ascontiguousarray(eye, dtype=np.float64),
+        np.ascontiguousarray(target[None], dtype=np.float64),
+        barred,
+    )
+    return bool(barred[0])
+
+
 def distance_to_opening(rim: FloatArray, point: FloatArray) -> float:
     """Returns how far a point is from the fan that spans an opening, m.
 

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drake_dress.models.dressing.sight import (
     distance_to_opening,
     free_sight,
+    is_barred,
     move_into_sight,
 )
 
@@ -28,6 +29,19 @@ def test_an_opening_before_the_curtain_is_seen() -> None:
 
 def test_an_opening_behind_the_curtain_is_not() -> None:
     assert free_sight(X, FACES, LOOP, np.array([0.0, 0.0, 2.0])) == 0.0
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-1.0, 3.0), st.floats(-1.0, 3.0))
+def test_a_segment_is_barred_where_it_goes_through_the_curtain(
+    x: float, y: float, low: float, high: float
+) -> None:
+    through = (low - 1.0) * (high - 1.0) < 0.0 and max(abs(x), abs(y)) < 2.0
+    near = min(abs(low - 1.0), abs(high - 1.0)) < 1e-6 or abs(max(abs(x), abs(y)) - 2.0) < 1e-6
+    # on the line that both triangles share, neither may count
+    assume(not near and abs(x - y) > 1e-6)
+    for ends in ((low, high), (high, low)):
+        eye, target = (np.array([x, y, z]) for z in ends)
+        assert is_barred(X, FACES, eye, target) == through
 
 
 def test_half_a_curtain_hides_its_half() -> None:
