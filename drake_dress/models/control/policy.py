@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.elements import Elements, make_elements
 from drake_dress.models.cloth.explicit.explicit_bias import ExplicitBiasCloth, ExplicitSettings
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget, Spending
@@ -173,20 +173,19 @@ class DressingPolicy:
                 *costs,
             ),
         )
-        tried = parameters.insertion
-        self.search = InsertionSearch(
-            ExplicitBiasCloth(
-                elements,
-                replace(material, stretch_stiffness=tried.stretch_stiffness),
-                parameters.time_step / tried.substeps,
-                mesh.held,
-                settings=ExplicitSettings(tolerance=1e-2, iterations=tried.iterations),
-            ),
-            self.controller.grip,
-            self.planner,
-            parameters.max_speed,
-            tried,
+        self.search = self._searching(elements, material)
+
+    def _searching(self, elements: Elements, material: Material) -> InsertionSearch:
+        """Returns the search for the motion that puts the first hand in, with its own garment."""
+        p = self.parameters
+        cloth = ExplicitBiasCloth(
+            elements,
+            replace(material, stretch_stiffness=p.insertion.stretch_stiffness),
+            p.time_step / p.insertion.substeps,
+            self.mesh.held,
+            settings=ExplicitSettings(tolerance=1e-2, iterations=p.insertion.iterations),
         )
+        return InsertionSearch(cloth, self.controller.grip, self.planner, p.max_speed, p.insertion)
 
     def initial_state(self) -> PolicyState:
         """Returns the state before the first decision: no sleeve is on, and nothing moves."""
