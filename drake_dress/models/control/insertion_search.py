@@ -351,16 +351,17 @@ class InsertionSearch:
         scene: Scene,
     ) -> FloatArray | None:
         """Returns places (m,2,3) around the best ones or anew; None if none obeys the limits."""
-        p = self.parameters
-        spread = p.fine if cost < 0.0 else p.spread
+        p, hits = self.parameters, cost < 0.0
+        spread = p.fine if hits else p.spread
+        again = p.again_near if self._is_near(scene) else p.again
+        passed = self._passed(scene)
         for _ in range(_MOST_DRAWS):
-            again = p.again_near if self._is_near(scene) else p.again
-            if best is not None and (cost < 0.0 or rng.random() < again):
+            if best is not None and (hits or rng.random() < again):
                 places = best + spread * rng.standard_normal(best.shape)
             else:
-                places = self._anew(rng, scene)
                 # a coat that is beside the hand already need not go behind it again
-                places = places[int(rng.integers(self._passed(scene) + 1)) :]
+                places = self._anew(rng, scene)
+                places = places[int(rng.integers(passed + 1)) :]
             if self._is_allowed(places, now, scene):
                 return places
         return None

@@ -321,13 +321,11 @@ class DressingPolicy:
 
         In real time there is no time to try motions all the way.
         """
-        search, first = self.search, state.stages.first
-        misses = sum(state.stages.attempts)
-        if first < 0 or self.parameters.budget.seconds is not None:
-            misses = -1
-        if any(fact.linked for fact in assignment.facts):
-            misses = -1
-        begun, side = search.begun(state.search, first, self.planner.are_alike, misses)
+        first, misses = state.stages.first, sum(state.stages.attempts)
+        in_real_time = self.parameters.budget.seconds is not None
+        if first < 0 or in_real_time or any(fact.linked for fact in assignment.facts):
+            misses = -1  # too few for a search
+        begun, side = self.search.begun(state.search, first, self.planner.are_alike, misses)
         return replace(state, search=begun), side
 
     def _moving(self, x: FloatArray, velocity: FloatArray, reason: str) -> Plan:

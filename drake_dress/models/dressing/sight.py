@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from trimesh.triangles import closest_point
 
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 
 # Candidate moves of an opening, m: none, and along the 26 vectors from the centre of a cube to its
 # corners, edges and faces.
@@ -46,15 +46,7 @@ def free_sight(
     center = rim.mean(axis=0)
     chosen = rim[np.linspace(0, len(rim), _RIM_POINTS, endpoint=False).astype(np.intp)]
     targets = np.concatenate([center[None], 0.5 * (center + chosen)])
-    barred = np.zeros(len(targets), dtype=np.bool_)
-    _find_barred(
-        np.ascontiguousarray(x),
-        np.ascontiguousarray(faces),
-        np.ascontiguousarray(eye, dtype=np.float64),
-        targets,
-        barred,
-    )
-    return 1.0 - float(barred.mean())
+    return 1.0 - float(_barred(x, faces, eye, targets).mean())
 
 
 def is_barred(x: FloatArray, faces: IntArray, eye: FloatArray, target: FloatArray) -> bool:
@@ -66,15 +58,20 @@ def is_barred(x: FloatArray, faces: IntArray, eye: FloatArray, target: FloatArra
         eye: (3,) m.
         target: (3,) m.
     """
-    barred = np.zeros(1, dtype=np.bool_)
+    return bool(_barred(x, faces, eye, target[None])[0])
+
+
+def _barred(x: FloatArray, faces: IntArray, eye: FloatArray, targets: FloatArray) -> BoolArray:
+    """Returns which of the segments from `eye` (3,) to `targets` (t,3), m, meet the garment."""
+    barred = np.zeros(len(targets), dtype=np.bool_)
     _find_barred(
         np.ascontiguousarray(x),
         np.ascontiguousarray(faces),
         np.ascontiguousarray(eye, dtype=np.float64),
-        np.ascontiguousarray(target[None], dtype=np.float64),
+        np.ascontiguousarray(targets, dtype=np.float64),
         barred,
     )
-    return bool(barred[0])
+    return barred
 
 
 def distance_to_opening(rim: FloatArray, point: FloatArray) -> float:
