@@ -13,26 +13,18 @@ from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.material import Material
 from drake_dress.models.control.budget import Budget, Spending
 from drake_dress.models.control.insertion_search import InsertionParameters, Scene, SearchState
-from drake_dress.models.control.person_model import PersonModel, person_obstacles
+from drake_dress.models.control.person_model import person_obstacles
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.body import (
     ArmPose,
-    BodyMeasures,
-    arm_points,
-    body_capsules,
-    shoulder_joint,
 )
 from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
+from tests.plain_person import plain_joints, plain_person
 
-M = BodyMeasures()
-PERSON = PersonModel(
-    body_capsules(M, "standing"),
-    np.stack([shoulder_joint(M, "standing", side) for side in SIDES]),
-    (M.upper_arm_radius, M.forearm_radius, M.hand_radius),
-)
-JOINTS = np.vstack([arm_points(M, "standing", side, ArmPose(0.3, 0.8, 0.0, 0.2)) for side in SIDES])
+PERSON = plain_person("standing")
+JOINTS = plain_joints("standing", ArmPose(0.3, 0.8, 0.0, 0.2))
 BEHIND = np.array([-0.33, 0.0, 0.15])
 STEP = 0.2
 

@@ -9,25 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
+from drake_dress.models.control.person_model import kept_away, person_obstacles
 from drake_dress.models.human.body import (
     ArmPose,
-    BodyMeasures,
-    arm_points,
     body_capsules,
-    shoulder_joint,
 )
-from drake_dress.models.sides import SIDES
+from tests.plain_person import M, plain_joints, plain_person
 
-M = BodyMeasures()
 POSE = ArmPose(0.25, 0.8, 0.0, 0.2)
 HORIZON = 3
 STEP = 0.1
-PERSON = PersonModel(
-    body_capsules(M, "sitting"),
-    np.stack([shoulder_joint(M, "sitting", side) for side in SIDES]),
-    (M.upper_arm_radius, M.forearm_radius, M.hand_radius),
-)
+PERSON = plain_person("sitting")
 
 
 def frame(yaw: float, place: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
@@ -36,8 +28,7 @@ def frame(yaw: float, place: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarr
 
 
 def joints(yaw: float = 0.0, place: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
-    where = frame(yaw, place)
-    return np.vstack([arm_points(M, "sitting", side, POSE, where) for side in SIDES])
+    return plain_joints("sitting", POSE, frame(yaw, place))
 
 
 def test_person_who_faces_forward_is_where_the_capsules_say() -> None:

@@ -8,26 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drake_dress.models.cloth.material import Material
-from drake_dress.models.control.person_model import PersonModel
 from drake_dress.models.control.policy import DressingPolicy, PolicyParameters, later
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.body import (
     ArmPose,
-    BodyMeasures,
-    arm_points,
-    body_capsules,
-    shoulder_joint,
 )
-from drake_dress.models.sides import SIDES
+from tests.plain_person import plain_joints, plain_person
 
-M = BodyMeasures()
-PERSON = PersonModel(
-    body_capsules(M, "standing"),
-    np.stack([shoulder_joint(M, "standing", side) for side in SIDES]),
-    (M.upper_arm_radius, M.forearm_radius, M.hand_radius),
-)
+PERSON = plain_person("standing")
 POSE = ArmPose(0.25, 0.8, 0.0, 0.2)
-JOINTS = np.vstack([arm_points(M, "standing", side, POSE) for side in SIDES])
+JOINTS = plain_joints("standing", POSE)
 
 
 @given(st.integers(1, 8), st.floats(0.0, 12.0), st.integers(0, 2**32 - 1))
