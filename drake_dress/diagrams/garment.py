@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import OrderedDict
+from dataclasses import replace
 from pathlib import Path
 
 from drake_dress.diagrams.scenario import schema
@@ -12,6 +13,7 @@ from drake_dress.diagrams.shown_when_slow import ShownWhenSlow
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import make_coat
 from drake_dress.models.garment.front import Opening, front_of
+from drake_dress.models.garment.hold import held_at_edges
 from drake_dress.models.garment.load import Progress, WholeGarment, read_garment
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.garment.mesh_options import MeshOptions
@@ -39,8 +41,21 @@ def build_garment(garment: schema.Garment, spacing: float, base: Path) -> Garmen
             whole, is_new = _read_once(base / garment.mesh.file, garment.mesh, progress)
             mesh = whole.at_spacing(spacing, progress)
         _tell_notes(garment.mesh.file, whole, is_new)
+    else:
+        mesh = make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
+    return as_held(mesh, garment)
+
+
+def as_held(mesh: GarmentMesh, garment: schema.Garment) -> GarmentMesh:
+    """Returns a garment, built with its own default grasp, held where the scenario says.
+
+    Raises:
+        UserError: it cannot be held there.
+    """
+    if garment.hold == "shoulders":
         return mesh
-    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat")
+    source = "garment.coat" if garment.mesh is None else garment.mesh.file
+    return held_at_edges(mesh, garment.hold_depth, source)
 
 
 def read_whole(mesh: schema.Mesh, base: Path) -> WholeGarment:
@@ -87,7 +102,10 @@ def build_garment_like(
         mesh = build_garment(nominal, spacing, base)
         return mesh.scaled(garment.mesh.scale / nominal.mesh.scale)
     like = coat_parameters(nominal.coat)
-    return make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
+    mesh = make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
+    if garment.hold == "shoulders":
+        return mesh
+    return replace(mesh, grasp=build_garment(nominal, spacing, base).grasp)
 
 
 def check_opening(mesh: GarmentMesh, side: str, source: str) -> None:

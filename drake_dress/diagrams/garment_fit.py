@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from drake_dress.diagrams.garment import build_garment, read_whole
+from drake_dress.diagrams.garment import as_held, build_garment, read_whole
 from drake_dress.diagrams.scenario import schema
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
 from drake_dress.diagrams.scenario.ranges import range_of
@@ -61,7 +61,7 @@ def judged(
     fine, coarse = spacings
     simple = build_garment(garment, coarse, base)
     if garment.mesh is not None:
-        mesh = read_whole(garment.mesh, base).mesh()
+        mesh = as_held(read_whole(garment.mesh, base).mesh(), garment)
     else:
         mesh = build_garment(garment, fine, base)
     sizes = garment_sizes(mesh, simple)

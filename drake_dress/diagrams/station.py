@@ -583,9 +583,14 @@ def _with_effects(p: StationParameters, make: MakeIntegrator) -> GarmentWithEffe
 
 
 def settled(p: StationParameters, hung: FloatArray) -> FloatArray:
-    """Returns the garment (n,3), m, after it has hung from resting grippers for a while."""
+    """Returns the garment (n,3), m, after it has hung from resting grippers for a while.
+
+    Layers that would cross are kept apart already here: panels that hang through each other at the
+    start stay hooked.
+    """
     settings = ImplicitSettings(buckling_wavelength=p.buckling_wavelength)
-    cloth = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings, _SETTLING_DAMPING))
+    plain = _with_effects(p, Scheme(p.mesh.held, p.time_step, settings, _SETTLING_DAMPING))
+    cloth: Integrator = LayeredCloth(plain) if p.self_collision else plain
     state = ClothState.at_rest(hung)
     still = np.zeros((len(p.mesh.held), 3))
     for _ in range(int(_SETTLING_TIME / p.time_step)):

@@ -8,6 +8,7 @@ from drake_dress.diagrams.scenario.ranges import SOURCES
 from drake_dress.diagrams.scenario.schema import (
     Coat,
     Controller,
+    Garment,
     Insertion,
     Measures,
     Motion,
@@ -199,6 +200,24 @@ def check_coat(source: str, coat: Coat) -> None:
             body_of_size(coat.size_table, coat.size)
         except UserError as error:
             raise UserError(source, f"garment.coat.{error.key}", error.message) from error
+
+
+def check_hold(source: str, garment: Garment) -> None:
+    """Checks that nothing else says where a garment that is held at its edges is held."""
+    if garment.hold == "shoulders":
+        return
+    given = None
+    if garment.mesh is not None and garment.mesh.grasp:
+        given = "mesh.grasp"
+    elif garment.mesh is None and garment.coat.grasp != Coat.grasp:
+        given = "coat.grasp"
+    if given is not None:
+        raise UserError(
+            source,
+            "garment.hold",
+            f"is {garment.hold}, but garment.{given} also says where the garment is held; "
+            "expected one of them",
+        )
 
 
 def check_drawn_body(source: str, scenario: Scenario) -> None:

@@ -22,6 +22,7 @@ from drake_dress.diagrams.scenario.checks import (
     check_costs,
     check_drawn_body,
     check_hardware,
+    check_hold,
     check_joints,
     check_safety,
 )
@@ -101,6 +102,7 @@ def _checked(
     check_joints(source, scenario.person)
     check_chair(source, scenario.person)
     check_coat(source, scenario.garment.coat)
+    check_hold(source, scenario.garment)
     check_behaviour(source, scenario.person)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)

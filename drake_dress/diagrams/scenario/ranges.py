@@ -9,6 +9,7 @@ from drake_dress.models.dressing.stages import FIRST
 from drake_dress.models.effects.registry import EFFECTS
 from drake_dress.models.garment.axes import AXES
 from drake_dress.models.garment.coat import COATS, COLLARS, OPENINGS, SIZE_TABLES
+from drake_dress.models.garment.hold import HOLDS
 from drake_dress.models.garment.life_size import AUTO, UNITS
 from drake_dress.models.garment.mesh import LOOP_NAMES
 from drake_dress.models.garment.mesh_options import FRONTS, SCALE_RANGE, WELD_RANGE
@@ -31,6 +32,7 @@ CHOICES = {
     "garment.coat.collar": COLLARS,
     "garment.coat.opens": OPENINGS,
     "garment.coat.grasp": ("patch", "seam"),
+    "garment.hold": HOLDS,
     "garment.mesh.unit": (*UNITS, AUTO),
     "garment.mesh.up": AXES,
     "garment.mesh.facing": AXES,
@@ -65,6 +67,7 @@ CHOICES = {
 _RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63 - 1),
     "duration": (0.1, 86400.0),
+    "garment.hold_depth": (0.0, 1.5),
     "arms.distance_behind": (-5.0, 5.0),
     "arms.spread": (0.0, 5.0),
     "arms.height_offset": (-2.0, 2.0),
@@ -208,6 +211,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "global_mpc.budget": (1, 10**9),
     "global_mpc.delay_share": (0.05, 1.0),
     "global_mpc.spread_share": (0.0, 3.0),
+    "global_mpc.span_share": (0.1, 1.1),
     "global_mpc.inner_iterations": (1, 1000),
     "global_mpc.max_speed": (0.001, 1.0),
     "global_mpc.progress_step": (0.001, 1.0),
@@ -283,6 +287,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "finish.max_speed": (0.005, 1.0),
     "finish.away_speed": (0.01, 1.0),
     "finish.away_distance": (0.0, 1.0),
+    "finish.front_distance": (0.0, 1.0),
     "finish.watch_time": (0.0, 600.0),
     # shares, m and s, each much wider than the useful range
     **{

@@ -184,10 +184,17 @@ class Garment:
     Attributes:
         coat: parametric coat.
         mesh: garment from a file; it replaces the coat. A scenario file gives one of both.
+        hold: where the grippers hold it. `shoulders`: as `coat.grasp` or `mesh.grasp` say. `edges`:
+            at both edges of its opening, which they spread, as people hold a coat for others. The
+            armholes then lie open before the person, however wide the panels between are.
+        hold_depth: with `edges`, depth of the held points below the shoulder tips, as a share of
+            the armholes' height.
     """
 
     coat: Coat = field(default_factory=Coat)
     mesh: Mesh | None = None
+    hold: str = "shoulders"
+    hold_depth: float = 0.4
 
 
 @dataclass
@@ -664,6 +671,8 @@ class GlobalMpc:
         spread_share: share of the radius about a predicted joint, in which it is with probability
             0.9, by which the grippers keep further away from that limb. It acts only if the
             predictor tells radii.
+        span_share: share of the way between both grasps over the cloth that the grippers may be
+            apart. They may also be as far apart as the grasps are at rest.
         force_limit: old name of `safety.force_limit`, N. Deprecated.
     """
 
@@ -681,6 +690,7 @@ class GlobalMpc:
     approach_distance: float = _POLICY.tasks.approach_distance
     waiting_progress: float = _POLICY.tasks.stages.waiting_progress
     spread_share: float = _POLICY.spread_share
+    span_share: float = _POLICY.span_share
     force_limit: float | None = None
 
 

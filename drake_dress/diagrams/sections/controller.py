@@ -58,6 +58,7 @@ def controller_policy(
         max_speed=g.max_speed,
         plans=c.method != "local",
         spread_share=g.spread_share,
+        span_share=g.span_share,
         budget=budget,
         weights=model_of(g.weights),
         finish=model_of(c.finish),

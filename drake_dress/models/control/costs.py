@@ -94,16 +94,20 @@ class Grip:
     Attributes:
         nodes: (k,) held nodes of the garment: left, then right gripper.
         of_side: indices into `nodes`, for the left and for the right gripper.
-        span: distance between the grippers at rest, m.
+        span: largest distance between the grippers at which the garment is taut, m.
     """
 
     nodes: IndexArray
     of_side: tuple[IndexArray, IndexArray]
     span: float
 
+    def centers(self, x: FloatArray) -> FloatArray:
+        """Returns the centres (2,3) of left and right grasp of nodes `x` (n,3), m."""
+        return np.stack([x[self.nodes[of]].mean(axis=0) for of in self.of_side])
+
     def left_from_right(self, x: FloatArray) -> FloatArray:
         """Returns the vector (3,) from the right to the left grasp of nodes `x` (n,3), m."""
-        left, right = (x[self.nodes[of]].mean(axis=0) for of in self.of_side)
+        left, right = self.centers(x)
         between: FloatArray = left - right
         return between
 

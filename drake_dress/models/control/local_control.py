@@ -27,7 +27,7 @@ from drake_dress.models.control.solution import Solution
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts, Task
-from drake_dress.models.garment.geodesics import Reach, reach
+from drake_dress.models.garment.geodesics import Reach
 from drake_dress.models.immutable import Immutable
 
 Solver = Callable[[LocalProblem, Solution | None], Solution]
@@ -167,7 +167,7 @@ class LocalController:
     reach: Reach = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "reach", reach(self.planner.mesh))
+        object.__setattr__(self, "reach", self.planner.reach)
 
     def resting(self, time: float) -> LocalPlan:
         """Returns a plan without motion."""

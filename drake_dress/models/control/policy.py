@@ -22,9 +22,8 @@ from drake_dress.models.control.insertion_search import (
 )
 from drake_dress.models.control.laying import (
     CollarPosition,
-    GrippersOverShoulders,
-    collar_target,
-    laying_target,
+    GrippersAsWorn,
+    WornCoat,
     way_back,
 )
 from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
@@ -61,6 +60,8 @@ class PolicyParameters:
         tasks: settings of the sleeve targets.
         spread_share: share of the predicted joints' 90 % radii by which the grippers keep further
             away from the person.
+        span_share: share of the way between the grasps over the cloth that the grippers may be
+            apart. They may also be as far apart as the grasps are at rest.
         plans: whether to plan with the garment model. If not, plans are to rest, and the local
             controller works alone.
         budget: limits of a solve.
@@ -77,6 +78,7 @@ class PolicyParameters:
     weights: Weights = field(default_factory=Weights)
     tasks: TaskParameters = field(default_factory=TaskParameters)
     spread_share: float = 0.5
+    span_share: float = 0.95
     plans: bool = True
     budget: Budget = Budget(iterations=3200)
     finish: FinishParameters = FinishParameters()
@@ -144,16 +146,21 @@ class DressingPolicy:
             settings=ExplicitSettings(tolerance=1e-2, iterations=parameters.inner_iterations),
         )
         self.planner = TaskPlanner(mesh, parameters.tasks, from_front, person.arms)
-        self._collar = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
+        collar = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
         # a garment without a neck's edge, or a plan to rest, cannot be laid
-        lays = parameters.finish.release and parameters.plans and self._collar is not None
+        lays = parameters.finish.release and parameters.plans and collar is not None
         self.finish = replace(parameters.finish, release=lays)
-        self._margin = material.margin
         held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
         left, right = (x.mean(axis=0) for x in held)
+        self._worn = None
+        if collar is not None:
+            grippers = np.stack([left, right]) - collar.at(mesh.rest_position)
+            height = parameters.finish.gripper_height
+            self._worn = WornCoat(collar, grippers, material.margin, height)
         # (k,3) positions of the held nodes relative to left and right gripper, m
         self.held_offsets = (held[0] - left, held[1] - right)
-        span = float(np.linalg.norm(left - right))
+        over_cloth = parameters.span_share * self.planner.reach.between_grippers
+        span = max(float(np.linalg.norm(left - right)), over_cloth)
         self.controller = GlobalController(
             cloth,
             HeldGarment(
@@ -168,8 +175,8 @@ class DressingPolicy:
             parameters.max_speed,
             parameters.max_iterations,
             costs=(
-                CollarPosition(parameters.weights.collar, self._collar),
-                GrippersOverShoulders(parameters.weights.collar),
+                CollarPosition(parameters.weights.collar, collar),
+                GrippersAsWorn(parameters.weights.collar),
                 *costs,
             ),
         )
@@ -231,6 +238,8 @@ class DressingPolicy:
             back = way_back(
                 self.finish,
                 self.planner.toward(joints[0]),
+                self.controller.grip.centers(x),
+                joints[0],
                 len(joints) - 1,
                 time - finish.since,
                 p.time_step,
@@ -255,10 +264,10 @@ class DressingPolicy:
         time: float,
     ) -> FinishState:
         """Returns how far the coat is laid and let go."""
-        if self._collar is None:
+        if self._worn is None:
             return state.finish
-        toward, collar = self.planner.toward, self._collar.at(x)
-        place = collar_target(self.person, self._collar, self._margin, joints, toward)
+        toward, collar = self.planner.toward, self._worn.collar.at(x)
+        place = self._worn.collar_target(self.person, joints, toward)
         ends = nape(joints, self.person.shoulder_radius, self.person.neck_radius, toward(joints))
         return advance_finish(
             state.finish,
@@ -287,11 +296,9 @@ class DressingPolicy:
         obstacles = person_obstacles(self.person, joints, p.time_step)
         away = None if radius is None else kept_away(obstacles, radius, p.spread_share)
         laying, max_speed = None, p.max_speed
-        if lays and self._collar is not None:
-            height, max_speed = self.finish.gripper_height, self.finish.max_speed
-            laying = laying_target(
-                self.person, self._collar, self._margin, height, joints[1:], self.planner.toward
-            )
+        if lays and self._worn is not None:
+            max_speed = self.finish.max_speed
+            laying = self._worn.target(self.person, joints[1:], self.planner.toward)
         elif all(
             fact.linked and fact.s >= p.tasks.stages.creeping_progress for fact in assignment.facts
         ):

@@ -39,10 +39,12 @@ class LayingTarget:
 
     Attributes:
         collar: (N,3) of the middle of the collar's back, m.
+        between: (N,3) from the right to the left gripper, m.
         height: (N,) of the middle between the grippers, m.
     """
 
     collar: FloatArray
+    between: FloatArray
     height: FloatArray
 
 
@@ -79,7 +81,7 @@ class HeldGarment:
         held_count: number of nodes held by left and by right gripper.
         armholes: loop nodes of left and right armhole.
         signs: orientation signs of the loops (see `loop_orientation`).
-        span: distance between the grippers at rest, m.
+        span: largest distance between the grippers, m.
         entry: where arms enter the garment.
     """
 

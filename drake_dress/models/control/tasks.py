@@ -38,6 +38,7 @@ from drake_dress.models.dressing.stages import (
     swings,
     withdraws,
 )
+from drake_dress.models.garment.geodesics import Reach, reach
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.ability import are_alike, room_for_second
 from drake_dress.models.human.arm import Arms
@@ -139,6 +140,11 @@ class TaskPlanner:
         if arms is not None and not are_alike(arms):
             left, right = (room_for_second(arms, i, self._reach, from_front) for i in (0, 1))
             self._rooms = (left, right)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Largest distances between armholes and grippers of the garment."""
+        return reach(self.mesh)
 
     @property
     def are_alike(self) -> bool:

@@ -44,11 +44,13 @@ class FinishParameters:
             meanwhile.
         lost_progress: progress s of a sleeve below which it counts as lost. The centre of an
             armhole sinks from 1.95 to 1.8 as the coat is laid.
-        gripper_height: height of the grippers above the skin of the shoulders while the coat is
-            laid, m. The robot's hands keep 3 cm.
+        gripper_height: least distance of the grippers from the skin while the coat is laid, m. The
+            robot's hands keep 3 cm.
         max_speed: greatest speed of a gripper while the coat is laid, m/s.
         away_speed: speed at which the grippers move away, m/s.
-        away_distance: distance that they move backward and upward, m.
+        away_distance: distance that they move, m.
+        front_distance: distance in front of the shoulders from which on they move away to the
+            front rather than backward and upward, m.
         watch_time: time from the release to the end of a run, s.
     """
 
@@ -63,6 +65,7 @@ class FinishParameters:
     max_speed: float = 0.06
     away_speed: float = 0.1
     away_distance: float = 0.25
+    front_distance: float = 0.05
     watch_time: float = 3.0
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
@@ -39,14 +39,19 @@ def front_of(mesh: GarmentMesh) -> Opening:
     rim = rim_of(mesh)
     if rim is None:
         return "closed"
-    left, right = (_way_to(mesh, mesh.loops[f"{side}_armhole"]) for side in SIDES)
-    is_left = (left < right)[rim]
+    is_left = left_half(mesh)[rim]
     changes = np.flatnonzero(is_left != np.roll(is_left, -1))
     if len(changes) == 0:
         return "closed"
     # the lowest change of sides is at the hem, opposite to the opening
     at = changes[np.argmin(mesh.rest_position[rim[changes], 2])]
     return "front" if is_left[at] else "back"
+
+
+def left_half(mesh: GarmentMesh) -> BoolArray:
+    """Returns (n,) which nodes are nearer to the left armhole than to the right, on the cloth."""
+    left, right = (_way_to(mesh, mesh.loops[f"{side}_armhole"]) for side in SIDES)
+    return np.asarray(left < right)
 
 
 def rim_of(mesh: GarmentMesh) -> IntArray | None:

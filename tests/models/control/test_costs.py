@@ -24,7 +24,7 @@ from drake_dress.models.control.costs import (
     Weights,
     dressing_costs,
 )
-from drake_dress.models.control.laying import CollarPosition, GrippersOverShoulders
+from drake_dress.models.control.laying import CollarPosition, GrippersAsWorn
 from drake_dress.models.control.situation import HeldGarment, LayingTarget, Situation, SleeveTarget
 from drake_dress.models.dressing.sleeve import find_entry, loop_orientation, sleeve_state
 from drake_dress.models.garment.coat import CoatParameters, make_coat
@@ -94,7 +94,11 @@ def drawn(seed: int) -> PlannedStep:
         (targets[0], targets[1]),
         [ball],
         left[None],
-        laying=LayingTarget(x[:1] + rng.normal(0.0, 0.1, (1, 3)), rng.normal(0.0, 0.1, 1)),
+        laying=LayingTarget(
+            x[:1] + rng.normal(0.0, 0.1, (1, 3)),
+            rng.normal(0.0, 0.1, (1, 3)),
+            rng.normal(0.0, 0.1, 1),
+        ),
     )
     return step_at(x, rng.normal(0.0, 5.0, (len(HELD), 3)), situation)
 
@@ -110,7 +114,7 @@ ALL = [
     *(pytest.param(alone(c, True), id=type(c).__name__) for c in COSTS.of_sleeves),
     *(pytest.param(alone(c, False), id=type(c).__name__) for c in COSTS.of_garment),
     pytest.param(alone(CollarPosition(2.0, NAPE), False), id="CollarPosition"),
-    pytest.param(alone(GrippersOverShoulders(2.0), False), id="GrippersOverShoulders"),
+    pytest.param(alone(GrippersAsWorn(2.0), False), id="GrippersAsWorn"),
     pytest.param(alone(_Lift(), False), id="own"),
 ]
 
