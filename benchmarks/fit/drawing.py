@@ -109,6 +109,7 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
         f"garment.coat={json.dumps(keys)}",
         f"person.body={json.dumps(body)}",
         f"variation={VARIATIONS[case.variation]}",
+        "garment.hold=edges",
         *overrides,
     ]
 

@@ -44,7 +44,8 @@ the filter, and n·v falls to 0 by max_braking dt a step.
     no permission from the station                  the same
 
 A latched stop ends by itself once the force on both grippers is under the soft limit. Until then
-the gripper that is pulled yields, so that the stop ends and no person remains held fast. No manual
+grippers that are pulled yield, so that the stop ends and no person remains held fast: both, since
+the one with the larger force may have the person in its way. No manual
 reset is needed: the only fault was the force, and it is measured to be gone. Yielding under the
 hard limit has the lowest priority in the order above, so it does not leave the workspace.
 
@@ -75,6 +76,9 @@ _ABSURD = 10.0
 _RETURN_TIME = 0.1
 # Tolerance of time stamps, s: rounding of clocks that count periods.
 _CLOCK_ROUNDING = 1e-6
+# While stopped, a gripper yields from this share of the soft limit on: its pull may be what the
+# other one feels, which cannot yield itself where the person is in its way.
+_SHARED = 0.5
 # Larger values are over any limit; they are clipped, so that their squares do not overflow.
 _LARGEST = 1e6
 # Limits of the force, the person, both distances, six walls, the lead.
@@ -417,7 +421,8 @@ def _govern(  # type: ignore[no-untyped-def]
         reach = _time_to_rest(last[i], limits, dt)
         # the first two rows are balls, written by `_governed`
         spaces, count = sets[2:], 0
-        pulled = seen[i] and size[i] > limits.soft_force
+        enough = limits.soft_force * (_SHARED if stopped else 1.0)
+        pulled = seen[i] and size[i] > enough
         relaxing = stopped and size[i] < limits.hard_force
         if pulled and not relaxing:
             _limit_force(force[i], size[i], wanted, limits, stopped, spaces[count])

@@ -190,6 +190,27 @@ def test_lasting_force_stops_both_until_it_is_under_the_soft_limit() -> None:
     assert arms.verdicts == (Verdict.NONE, Verdict.NONE)
 
 
+def test_a_stop_ends_though_the_person_is_in_the_way_of_the_gripper_that_is_pulled() -> None:
+    limits = replace(LIMITS, person_distance=0.03)
+    arms, soft = Arms(limits), limits.soft_force
+    wall = float(START[:, 0].max()) + limits.person_distance
+
+    def feels() -> np.ndarray:
+        # the pull of the left gripper is what the right one feels, beside a weight
+        tension = soft - 0.5 + 300.0 * (arms.state.position[0, 0] - START[0, 0])
+        return np.stack([-tension * X, (tension + 1.5) * X])
+
+    hard = np.stack([0.0 * X, (limits.hard_force + 1.0) * X])
+    arms.ask(NOTHING, hard, duration=1.2 * limits.stop_time, wall=wall)
+    assert Verdict.STOPPED in arms.verdicts[0]
+    for _ in range(300):
+        arms.ask(NOTHING, feels(), wall=wall)
+    assert Verdict.STOPPED not in arms.verdicts[0]
+    assert arms.state.position[1, 0] == pytest.approx(START[1, 0], abs=1e-3)
+    # it gave way as far as needed
+    assert 0.5 * soft < np.linalg.norm(feels()[1]) < soft
+
+
 def test_gripper_that_gives_way_while_stopped_does_not_leave_the_workspace() -> None:
     # a weight over the soft limit would draw it down for ever
     box = START.mean(axis=0) + np.array([[-0.1, -0.5, -0.1], [0.1, 0.5, 0.1]])

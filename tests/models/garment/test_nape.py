@@ -34,6 +34,21 @@ def test_it_is_the_middle_of_the_collars_edge(
     assert found.height == pytest.approx(height - 0.015, abs=0.02)
 
 
+@pytest.mark.parametrize("spacing", [0.02, 0.05])
+def test_that_of_a_hood_is_where_it_begins_and_not_its_edge(spacing: float) -> None:
+    mesh = make_coat(COATS["raincoat"], spacing)
+    found = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
+    assert found is not None
+    assert found.height == 0.0
+    x, hood = mesh.rest_position, mesh.region == 3
+    point = found.at(x)
+    back = np.abs(x[:, 1]) < 1e-9
+    seam = x[back & hood & (x[:, 0] < 0.0), 2].min()
+    assert point[2] == pytest.approx(seam, abs=1.2 * spacing)
+    assert abs(point[1]) < 1e-9
+    assert point[0] < 0.0
+
+
 def test_it_moves_with_the_garment() -> None:
     mesh = make_coat(COATS["jacket"], 0.03)
     found = find_nape(mesh.rest_position, mesh.faces, mesh.loops)
