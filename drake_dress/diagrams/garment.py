@@ -105,7 +105,8 @@ def build_garment_like(
     mesh = make_coat(coat_parameters(garment.coat), spacing, source="garment.coat", like=like)
     if garment.hold == "shoulders":
         return mesh
-    return replace(mesh, grasp=build_garment(nominal, spacing, base).grasp)
+    like_it = build_garment(nominal, spacing, base)
+    return replace(mesh, grasp=like_it.grasp, hold=like_it.hold)
 
 
 def check_opening(mesh: GarmentMesh, side: str, source: str) -> None:

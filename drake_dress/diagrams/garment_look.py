@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from drake_dress.diagrams.garment import read_whole
+from drake_dress.diagrams.garment import as_held, read_whole
 from drake_dress.diagrams.garment_fit import Judged, advice_on, judged
 from drake_dress.diagrams.scenario import (
     Scenario,
@@ -18,9 +18,11 @@ from drake_dress.diagrams.scenario import (
     load_scenario,
     resolved_yaml,
 )
-from drake_dress.diagrams.scenario.schema import Garment, Mesh
+from drake_dress.diagrams.scenario.schema import Coat, Mesh
 from drake_dress.diagrams.sections.person import measures
 from drake_dress.file_output import GARMENT_FILES, claimed, write_text
+from drake_dress.models.garment.front import front_of
+from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import BodyMeasures
 from drake_dress.report.garment_look import GarmentLook, garment_json
 from drake_dress.shipped import scenario_file
@@ -38,11 +40,22 @@ class Subject:
         given: its file or scenario, as named by the user.
         scenario: that contains it; a variation is not drawn yet.
         base: directory that a mesh file's name is relative to.
+        picks_hold: whether the look says where to hold the garment: a file that is open is held at
+            the edges of its opening, unless the user wants something else.
     """
 
     given: str
     scenario: Scenario
     base: Path
+    picks_hold: bool = False
+
+    def held(self, mesh: GarmentMesh) -> tuple[Subject, GarmentMesh]:
+        """Returns the subject and its mesh as it is best held."""
+        if not self.picks_hold or front_of(mesh) == "closed":
+            return self, mesh
+        garment = replace(self.scenario.garment, hold="edges")
+        scenario = replace(self.scenario, garment=garment)
+        return replace(self, scenario=scenario), as_held(mesh, garment)
 
 
 def garment_source(given: str) -> tuple[Path, bool]:
@@ -72,6 +85,7 @@ def subject_of(
     """
     source, is_mesh = garment_source(given)
     base = source.parent
+    said = [text.partition("=")[0] for text in overrides]
     if is_mesh:
         # a quoted text, as its name may contain anything
         overrides = [f"garment.mesh.file={json.dumps(str(source))}", *overrides]
@@ -79,7 +93,10 @@ def subject_of(
     scenario = load_scenario(source, overrides, seed)
     if person is not None:
         scenario = replace(scenario, person=load_scenario(person).person)
-    return Subject(given, scenario, base)
+    picks = is_mesh and not any(
+        key == "garment.hold" or key.startswith("garment.mesh.grasp") for key in said
+    )
+    return Subject(given, scenario, base, picks)
 
 
 def look_at(subject: Subject, out: Path) -> GarmentLook:
@@ -98,9 +115,10 @@ def look_at(subject: Subject, out: Path) -> GarmentLook:
     found: Judged = judged(garment, drawn.person, spacings, subject.base)
     body: BodyMeasures = measures(drawn.person)
     mended = () if garment.mesh is None else read_whole(garment.mesh, subject.base).notes
+    subject, mesh = subject.held(found.mesh)
     return GarmentLook(
         name=subject.given,
-        mesh=found.mesh,
+        mesh=mesh,
         sizes=found.sizes,
         body=body,
         girths=found.girths,
@@ -150,7 +168,7 @@ def _scenario_text(subject: Subject, out: Path) -> str:
         folder = os.path.relpath(os.path.realpath(file.parent), os.path.realpath(out))
         moved = replace(mesh, file=os.path.join(folder, file.name))
         # the mesh replaces the coat
-        scenario = replace(scenario, garment=Garment(mesh=moved))
+        scenario = replace(scenario, garment=replace(scenario.garment, coat=Coat(), mesh=moved))
     content, default = (_plain(each) for each in (scenario, checked_scenario(Scenario())))
     default["garment"]["mesh"] = vars(Mesh())
     name = " ".join(Path(subject.given).name.split())

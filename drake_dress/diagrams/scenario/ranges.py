@@ -334,6 +334,8 @@ _RANGES: dict[str, tuple[float, float]] = {
                 "swing_reach",
                 "swing_outward",
                 "passing_outward",
+                "edge_outward",
+                "edge_back",
                 "passing_behind",
                 "passing_from",
                 "passing_beside",
@@ -341,6 +343,7 @@ _RANGES: dict[str, tuple[float, float]] = {
                 "longest_reach",
                 "funnel_wide",
                 "funnel_narrow",
+                "funnel_radius",
                 "funnel_distance",
                 "aside_free",
                 "overshoot",
@@ -366,7 +369,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     },
     **{
         f"{group}.{name}": bounds
-        for group in ("approaches", "tethered_approaches", "led_approach")
+        for group in ("approaches", "tethered_approaches", "edge_approaches", "led_approach")
         for name, bounds in {
             "share": (0.0, 1.0),
             "orientation": (0.0, 1.0),

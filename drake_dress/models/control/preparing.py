@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +11,18 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.control.task_parameters import Approach, TaskParameters
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts
+from drake_dress.models.garment.mesh import Hold
 from drake_dress.models.human.heading import Heading
 
 
 def choose_approach(
-    p: TaskParameters, forearm: FloatArray, to: Heading, side: int, attempts: int, tethered: bool
+    p: TaskParameters,
+    forearm: FloatArray,
+    to: Heading,
+    side: int,
+    attempts: int,
+    tethered: bool,
+    hold: Hold = "shoulders",
 ) -> Approach:
     """Returns the approach to a hand after `attempts` misses, for the current `forearm` (3,).
 
@@ -24,16 +32,23 @@ def choose_approach(
     pushes it further inward each time, in the end behind the back. The first sleeve therefore
     approaches an adducted arm along the forearm in every second attempt after `led_after` misses.
     """
+    level = float(np.hypot(forearm[0], forearm[1]))
+    if hold == "edges":
+        last = len(p.edge_approaches) - 1
+        return _in_turn(p.edge_approaches, last if level <= p.steep else 0, attempts)
     if tethered:
         return p.tethered_approaches[attempts % len(p.tethered_approaches)]
     led = opening(forearm, to, side) < p.led_inward
     if led and attempts >= p.led_after and (attempts - p.led_after) % 2 == 0:
         return p.led_approach
-    level = float(np.hypot(forearm[0], forearm[1]))
     best = 1 if level >= p.flat else 2 if level <= p.steep else 0
-    turn = attempts % len(p.approaches)
-    # the best approach comes first, the others keep their order
-    return p.approaches[best if turn == 0 else turn - 1 if turn <= best else turn]
+    return _in_turn(p.approaches, best, attempts)
+
+
+def _in_turn(ways: Sequence[Approach], best: int, attempts: int) -> Approach:
+    """Returns the way of an attempt: the best one comes first, the others keep their order."""
+    turn = attempts % len(ways)
+    return ways[best if turn == 0 else turn - 1 if turn <= best else turn]
 
 
 def opening(forearm: FloatArray, to: Heading, side: int) -> float:
@@ -70,6 +85,8 @@ class Preparation:
         attempts: how often the sleeve has missed the hand.
         outlook: place relative to the hand at which the hand sees the armhole, (3,) m.
         retreat: whether the sleeve stays away from the hand.
+        hold: where the garment is held.
+        radius: of the armhole at rest, m.
     """
 
     parameters: TaskParameters
@@ -80,6 +97,8 @@ class Preparation:
     attempts: int
     outlook: FloatArray | None
     retreat: bool = False
+    hold: Hold = "shoulders"
+    radius: float = 0.0
 
     def places(
         self, hand: FloatArray, forearm: FloatArray, to: Heading, sleeve: SleeveState
@@ -109,7 +128,9 @@ class Preparation:
         facing = self._facing(beside)
         inside = facing * _ramp(depth, -0.02, 0.02)
         # the opening is aligned first and drawn over the hand only then
-        ahead = np.where(depth < 0.0, _ramp(beside, p.funnel_wide, p.funnel_narrow), 1.0)
+        more = max(0.0, self.radius - p.funnel_radius)
+        aligned = _ramp(beside - more, p.funnel_wide, p.funnel_narrow)
+        ahead = np.where(depth < 0.0, aligned, 1.0)
         if self._seeks_sight:
             onward = (1.0 - inside) * sleeve.v_c + inside * forearm
             onward = ahead * p.overshoot * onward - (1.0 - ahead) * p.funnel_distance * sleeve.v_c
@@ -145,10 +166,34 @@ class Preparation:
             to: heading of the person.
         """
         p, inward = self.parameters, to.inward(self.side)
-        outward = np.einsum("ij,ij->i", offset, inward)[:, None]
+        outward = _along(offset, inward)
+        if self.hold == "edges":
+            return self._behind_first(offset, outward, back, to)
         passing = _ramp(outward, p.passing_from, p.passing_beside)
         beside = -p.passing_outward * inward - p.passing_behind * to.front
         way: FloatArray = (1.0 - passing) * back + passing * beside
+        return way
+
+    def _behind_first(
+        self, offset: FloatArray, outward: FloatArray, back: FloatArray, to: Heading
+    ) -> FloatArray:
+        """Returns places (N,3), m, of the armhole of a garment that is held at its edges.
+
+        In front of the hand it moves straight back, on the side where it is, and only behind the
+        hand across to it. No panel has to be led around the hand.
+
+        Args:
+            offset: as of `_around`.
+            outward: (N,1) distance of the armhole outward of the hand, m.
+            back: as of `_around`.
+            to: heading of the person.
+        """
+        p, inward = self.parameters, to.inward(self.side)
+        ahead = -_along(offset, to.front)
+        straight = -p.edge_back * to.front - outward * inward
+        across = back + (-_along(back, inward) - p.edge_outward) * inward
+        first = _ramp(ahead, -0.75 * p.edge_back, -0.25 * p.edge_back)
+        way: FloatArray = first * straight + (1.0 - first) * across
         return way
 
     @property
@@ -181,6 +226,12 @@ class Preparation:
         wait = p.approach_slope * np.maximum(0.0, error - 2.0 * p.aside_free)
         place: FloatArray = outside - np.minimum(wait, p.behind_distance) * to.front
         return place
+
+
+def _along(vectors: FloatArray, direction: FloatArray) -> FloatArray:
+    """Returns the components (N,1) of vectors (N,3) along unit vectors (N,3)."""
+    along: FloatArray = np.einsum("ij,ij->i", vectors, direction)[:, None]
+    return along
 
 
 def _ramp(value: float | FloatArray, zero: float, one: float) -> FloatArray:

@@ -11,7 +11,7 @@ from drake_dress.models.dressing.stages import StageParameters
 from drake_dress.models.human.heading import Heading
 
 # Least number of approaches: the best one for the first hand depends on the forearm.
-LEAST_APPROACHES = {"approaches": 3, "tethered_approaches": 1}
+LEAST_APPROACHES = {"approaches": 3, "tethered_approaches": 1, "edge_approaches": 1}
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,9 @@ class TaskParameters:
             used, in turn. The first attempt uses the first, but the second for a flat forearm and
             the third for a steep one.
         tethered_approaches: the same while the other sleeve is on, starting with the first.
+        edge_approaches: ways to approach a hand with a garment that is held at the edges of its
+            opening, in turn: mostly from behind, along the forearm. A steep forearm begins with the
+            last one.
         led_inward: inward component of the forearm's direction, from hand to elbow, below which the
             hand counts as pulled inward.
         led_after: number of misses after which the first sleeve uses `led_approach` for such a
@@ -90,6 +93,10 @@ class TaskParameters:
         passing_behind: distance behind an unseen hand at which a tethered armhole ends, m.
         passing_from: distance outward of the hand at which a tethered armhole begins to come
             forward, m. Any closer and the panel would get in front of the hand.
+        edge_outward: replaces `passing_outward` for a garment that is held at the edges of its
+            opening: no panel hangs in front of the armhole, m.
+        edge_back: distance behind the hand to which the armhole of such a garment moves straight
+            back first, if it is in front of the hand, m.
         passing_beside: distance outward of the hand at which that armhole is all the way forward,
             beside the hand, m.
         outlook_distance: distance from the hand within which a sleeve that missed it moves to where
@@ -101,6 +108,8 @@ class TaskParameters:
         funnel_wide: lateral distance of the hand from the normal of a clearly seen opening above
             which the opening is aligned first, m.
         funnel_narrow: lateral distance below which the aligned opening is drawn on, m.
+        funnel_radius: radius of the armhole at rest that both distances are for, m. That by which
+            an armhole is wider is added to them.
         funnel_distance: distance before the hand at which the opening is aligned, m.
         aside_free: lateral distance that is ignored, m.
         overshoot: distance past the hand at which the target of an aligned armhole lies, m.
@@ -153,6 +162,12 @@ class TaskParameters:
         Approach(0.25, 0.85, 3.0),
         Approach(0.5, 0.85, 3.0),
     )
+    edge_approaches: tuple[Approach, ...] = (
+        Approach(0.75, 0.85, 3.0),
+        Approach(0.5, 0.75, 3.0),
+        Approach(0.9, 0.9, 3.0),
+        Approach(0.25, 0.6, tilt=0.3),
+    )
     led_inward: float = -0.03
     led_after: int = 3
     led_approach: Approach = Approach(0.9, 0.9, 3.0)
@@ -169,11 +184,14 @@ class TaskParameters:
     passing_behind: float = 0.05
     passing_from: float = 0.08
     passing_beside: float = 0.12
+    edge_outward: float = 0.04
+    edge_back: float = 0.18
     outlook_distance: float = 0.35
     longest_reach: float = 1.04
     clear_sight: float = 0.9
     funnel_wide: float = 0.07
     funnel_narrow: float = 0.03
+    funnel_radius: float = 0.095
     funnel_distance: float = 0.08
     aside_free: float = 0.02
     overshoot: float = 0.12

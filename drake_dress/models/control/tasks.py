@@ -39,7 +39,7 @@ from drake_dress.models.dressing.stages import (
     withdraws,
 )
 from drake_dress.models.garment.geodesics import Reach, reach
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import GarmentMesh, loop_length
 from drake_dress.models.human.ability import are_alike, room_for_second
 from drake_dress.models.human.arm import Arms
 from drake_dress.models.human.heading import Heading, heading, headings
@@ -136,6 +136,8 @@ class TaskPlanner:
         self.signs = (float(loop_orientation(mesh, "left")), float(loop_orientation(mesh, "right")))
         centers = [mesh.rest_position[loop].mean(axis=0) for loop in self.armholes]
         self._reach = float(np.linalg.norm(centers[0] - centers[1]))
+        left, right = (loop_length(mesh.rest_position, loop) for loop in self.armholes)
+        self._radii = (left / (2.0 * np.pi), right / (2.0 * np.pi))
         self._rooms = (0.0, 0.0)
         if arms is not None and not are_alike(arms):
             left, right = (room_for_second(arms, i, self._reach, from_front) for i in (0, 1))
@@ -173,7 +175,10 @@ class TaskPlanner:
         axes, to, sleeves = arm_axes(joints), self._heading(heading(joints)), self.sleeves(x)
         missed = stages.attempts
         linked = [self.is_linked(x, joints, side) for side in (0, 1)]
-        ways = [choose_approach(p, axes[i].D(0.0), to, i, missed[i], linked[1 - i]) for i in (0, 1)]
+        ways = [
+            choose_approach(p, axes[i].D(0.0), to, i, missed[i], linked[1 - i], self.mesh.hold)
+            for i in (0, 1)
+        ]
         facts = (
             self._facts(x, joints, axes[0], to, sleeves[0], 0, linked[0], ways[0]),
             self._facts(x, joints, axes[1], to, sleeves[1], 1, linked[1], ways[1]),
@@ -467,11 +472,13 @@ class TaskPlanner:
             p,
             side,
             given.facts[side],
-            choose_approach(p, arm.forearm[0], now, side, missed, tethered),
+            choose_approach(p, arm.forearm[0], now, side, missed, tethered, self.mesh.hold),
             tethered,
             missed,
             given.outlook[side],
             retreat,
+            self.mesh.hold,
+            self._radii[side],
         )
 
     def _swung(self, to: Heading, side: int, other: SleeveState) -> FloatArray:

@@ -8,17 +8,16 @@ spread, as people hold a coat for each other, the panels are walls of a way to t
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.garment.front import left_half, rim_of
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import GarmentMesh, Hold
 from drake_dress.models.sides import SIDES
 
-Hold = Literal["shoulders", "edges"]
 HOLDS: tuple[Hold, ...] = get_args(Hold)
 
 # Nodes within this distance of the held point are held, m, and at least so many.
@@ -60,7 +59,7 @@ def held_at_edges(mesh: GarmentMesh, depth: float, source: str) -> GarmentMesh:
         far[is_left != wanted] = np.inf
         count = max(_FEWEST, int(np.count_nonzero(far <= _RADIUS)))
         grasp[side] = np.argsort(far, kind="stable")[:count].astype(np.int32)
-    return replace(mesh, grasp=grasp)
+    return replace(mesh, grasp=grasp, hold="edges")
 
 
 def _middle_of_neck(mesh: GarmentMesh, rim: IntArray, is_left: BoolArray) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from drake_dress.models.garment.manifold import Named, check_manifold, plain_nod
 from drake_dress.models.sides import SIDES
 
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
+Hold = Literal["shoulders", "edges"]
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
 
 
@@ -31,6 +33,7 @@ class GarmentMesh:
         loops: node indices in order around each opening of `LOOP_NAMES`; the first is not repeated.
         grasp: nodes held by each gripper, with keys `left` and `right`.
         region: (n,) int8, index into `REGION_NAMES`.
+        hold: where the grippers hold it: at its shoulders, or at the edges of its opening.
     """
 
     rest_position: FloatArray
@@ -38,6 +41,7 @@ class GarmentMesh:
     loops: dict[str, IntArray]
     grasp: dict[str, IntArray]
     region: npt.NDArray[np.int8]
+    hold: Hold = "shoulders"
 
     @property
     def held(self) -> IntArray:

@@ -15,6 +15,7 @@ from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts, StageState, Task
 from drake_dress.models.garment.coat import CoatParameters, make_coat
+from drake_dress.models.garment.hold import held_at_edges
 from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
 from drake_dress.models.human.heading import heading
 from drake_dress.models.sides import SIDES
@@ -306,6 +307,62 @@ def test_a_tethered_sleeve_goes_around_the_hand_that_does_not_see_it(
         assert float(asked @ out) == pytest.approx(p.passing_outward)
     else:
         assert behind >= p.passing_behind - 1e-9
+
+
+def test_a_wider_armhole_may_be_further_beside_the_hand() -> None:
+    """It is drawn on where a narrower one is aligned first: the hand fits in beside the middle."""
+    q, to = np.stack([joints()] * (HORIZON + 1)), heading(joints())
+    facts = SleeveFacts(False, 0.0, 0.12, 0.06, 0.0)
+    given = Assignment((Task.PREPARE, Task.REST), (facts, facts))
+
+    def ahead(girth: float, beside: float) -> float:
+        coat = CoatParameters(armhole_girth=girth, cuff_girth=0.4, chest=1.5)
+        planner = TaskPlanner(make_coat(coat, 0.06), TaskParameters())
+        axis, p = arm_axes(joints())[0], planner.parameters
+        normal = p.approaches[0].direction(axis.D(0.0), to, 0)
+        across = np.cross(normal, [0.0, 0.0, 1.0])
+        across /= np.linalg.norm(across)
+        sleeve = SleeveState(axis.G(0.0) - 0.1 * normal + beside * across, normal)
+        goal = planner.targets(given, [sleeve, sleeve], q, STEP)[0].position[0]
+        return float(normal @ (goal - axis.G(0.0)))
+
+    p = TaskParameters()
+    at = p.funnel_wide
+    assert ahead(0.5, at) == pytest.approx(-p.funnel_distance)
+    assert ahead(0.56, at) == pytest.approx(-p.funnel_distance)
+    wider = 2.0 * np.pi * (p.funnel_radius + p.funnel_wide - p.funnel_narrow)
+    assert ahead(wider, at) == pytest.approx(p.overshoot, abs=0.01)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@drawn(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
+def test_with_the_edges_held_it_passes_behind_the_hand_and_not_over_it(
+    planner: TaskPlanner, side: int, outward: float, ahead: float, up: float
+) -> None:
+    """In front of the hand it goes straight back; only behind the hand it comes in line with it."""
+    held = TaskPlanner(held_at_edges(planner.mesh, 0.4, "test"), planner.parameters)
+    p, q = planner.parameters, joints()
+    axes, to = arm_axes(q), heading(q)
+    hand, out = axes[side].G(0.0), -to.inward(side)
+    place = hand + outward * out + ahead * to.front + [0.0, 0.0, up]
+    sleeve = SleeveState(place, np.array([0.6, 0.0, 0.8]))
+    waits = SleeveState(axes[1 - side].G(0.5), axes[1 - side].D(0.5))
+    off = SleeveFacts(False, 0.0, float(np.linalg.norm(hand - place)), 0.2, 0.0, sight=0.0)
+    on = SleeveFacts(linked=True, s=0.5, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+    given = Assignment(
+        (Task.PREPARE, Task.WAIT) if side == 0 else (Task.WAIT, Task.PREPARE),
+        (off, on) if side == 0 else (on, off),
+    )
+    both = [sleeve, waits] if side == 0 else [waits, sleeve]
+    rows = np.stack([q] * (HORIZON + 1))
+    asked = held.targets(given, both, rows, STEP)[side].position[0] - hand
+    behind, beside = -float(asked @ to.front), float(asked @ out)
+    assert behind > 0.5 * p.edge_back
+    if ahead > -0.25 * p.edge_back:
+        assert beside == pytest.approx(outward)
+        assert behind == pytest.approx(p.edge_back)
+    elif ahead < -0.75 * p.edge_back:
+        assert beside == pytest.approx(p.edge_outward)
 
 
 def test_the_first_sleeve_comes_in_line_before_it_is_drawn_over_the_hand(
