@@ -1,5 +1,7 @@
 import copy
+import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,11 @@ from drake_dress.diagrams import garment
 from drake_dress.diagrams.scenario import load_scenario
 from drake_dress.diagrams.scenario.schema import Coat, Garment, Mesh
 from drake_dress.diagrams.scenario.text import resolved_yaml
+from drake_dress.diagrams.setup import read_setup
+from drake_dress.diagrams.station import hung_garment, settled
 from drake_dress.errors import UserError
+from drake_dress.models.cloth.elements import make_elements
+from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.load import WholeGarment, read_garment
 from tests.present import present
@@ -119,6 +125,50 @@ def test_a_gown_like_the_nominal_one_has_its_nodes() -> None:
     assert np.array_equal(like.loops["left_cuff"], first.loops["left_cuff"])
     assert np.array_equal(np.sort(like.faces[:, 0]), np.sort(first.faces[:, 0]))
     assert np.abs(like.rest_position - first.rest_position).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    "other", ["coat: {grasp: seam}", "mesh: {file: a.obj, grasp: {left: [1, 2, 3, 4]}}"]
+)
+def test_a_garment_is_held_in_one_place_only(other: str, tmp_path: Path) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(f"garment: {{hold: edges, {other}}}\n")
+    with pytest.raises(
+        UserError, match=r"garment\.hold: is edges, but garment\.(coat|mesh)\.grasp"
+    ):
+        load_scenario(path)
+    path.write_text(f"garment: {{{other}}}\n")
+    assert load_scenario(path).garment.hold == "shoulders"
+
+
+def test_a_coat_like_the_nominal_one_is_held_at_its_nodes() -> None:
+    nominal = Garment(coat=Coat(), hold="edges")
+    first = garment.build_garment(nominal, 0.05, Path())
+    drawn = Garment(coat=Coat(armhole_girth=0.64, chest=1.3), hold="edges")
+    like = garment.build_garment_like(drawn, nominal, 0.05, Path())
+    assert first.hold == like.hold == "edges"
+    for side in ("left", "right"):
+        assert np.array_equal(first.grasp[side], like.grasp[side])
+
+
+def test_a_narrow_front_does_not_hang_through_itself_at_the_start() -> None:
+    coat = {"preset": "raincoat", "size": "XXL", "size_table": "women"}
+    words = [f"garment.coat={json.dumps(coat)}", "plant.spacing=0.035", "garment.hold=edges"]
+    scenario = load_scenario(SCENARIO, words)
+    p = read_setup(scenario, SCENARIO).station
+    elements = make_elements(p.mesh.rest_position, p.mesh.faces)
+    left = p.mesh.rest_position[:, 1] > 0.0
+    hung = hung_garment(p)
+
+    def hooked(layered: bool) -> int:
+        """Returns how many edges of one half pass through the other half."""
+        found = piercing_edges(settled(replace(p, self_collision=layered), hung), elements)
+        return int(
+            np.sum(left[elements.edge[found[:, 0], 0]] != left[elements.triangle[found[:, 1], 0]])
+        )
+
+    assert hooked(layered=False) > 10
+    assert hooked(layered=True) == 0
 
 
 def test_a_coat_and_a_file_in_one_scenario_contradict_each_other(tmp_path: Path) -> None:

@@ -91,6 +91,10 @@ def test_a_file_becomes_a_scenario_with_its_path_beside_the_scenario(
     assert mesh.file == "../../from/it's a: coat #1.obj"
     base = load_scenario(SCENARIOS / "dummy_standing.yaml")
     assert replace(written, garment=base.garment) == base
+    assert written.garment.hold == "edges"
+    words += ["--set", "garment.hold=shoulders"]
+    assert main(["garment", "it's a: coat #1.obj", *words]) == 0
+    assert load_scenario(out / "garment.yaml").garment.hold == "shoulders"
     monkeypatch.chdir("/")
     garment = build_garment(written.garment, 0.05, out)
     assert np.ptp(garment.rest_position, axis=0) == pytest.approx(
