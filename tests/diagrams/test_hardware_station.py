@@ -282,6 +282,8 @@ def test_arms_stop_by_themselves_when_commands_end() -> None:
         assert speed[(since > 1.2) & (since < 1.7)].max() < 0.02
 
 
+# plans come late beside other work, and then the grippers come to rest
+@pytest.mark.alone
 def test_an_arm_whose_commands_went_astray_meanwhile_follows_again() -> None:
     """A driver resumes only with commands that start at its held position."""
     pair = Pair(LabFault("bus_lost", "", 0.8, 0.6))
