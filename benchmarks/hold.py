@@ -28,6 +28,7 @@ from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.geodesics import reach
 from drake_dress.models.garment.hold import held_at_edges
 from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.sides import SIDES
 
 # Edge length of the meshes, m, fabric, time step, s, and steps until the coat hangs still.
 _SPACING = 0.035
@@ -81,7 +82,7 @@ def seen_from(mesh: GarmentMesh) -> float:
 def hung(mesh: GarmentMesh) -> FloatArray:
     """Returns the nodes (n,3), m, of a garment that hangs from two grippers, spread by its hold."""
     x = mesh.rest_position.copy()
-    left, right = (x[mesh.grasp[side]].mean(axis=0) for side in ("left", "right"))
+    left, right = (x[mesh.grasp[side]].mean(axis=0) for side in SIDES)
     apart = float(np.linalg.norm(left - right))
     further = 0.0
     if mesh.hold == "edges":
@@ -90,7 +91,7 @@ def hung(mesh: GarmentMesh) -> FloatArray:
         make_elements(x, mesh.faces), _FABRIC, _STEP, mesh.held, settings=_SOLVE
     )
     way = 0.5 * further * (left - right) / (apart * _STEPS)
-    counts = [len(mesh.grasp[side]) for side in ("left", "right")]
+    counts = [len(mesh.grasp[side]) for side in SIDES]
     motion = np.repeat(np.stack([way, -way]), counts, axis=0)
     v = np.zeros_like(x)
     for moves in (motion, 0.0 * motion):

@@ -79,9 +79,9 @@ class GrippersAsWorn:
         laying = step.situation.laying
         if laying is None:
             return np.zeros(3), 0.0
-        middle = [step.x[step.grip.nodes[of], 2].mean() for of in step.grip.of_side]
-        above = 0.5 * (middle[0] + middle[1]) - laying.height[step.index]
-        return step.grip.left_from_right(step.x) - laying.between[step.index], float(above)
+        left, right = step.grip.centers(step.x)
+        above = 0.5 * (left[2] + right[2]) - laying.height[step.index]
+        return left - right - laying.between[step.index], float(above)
 
 
 @dataclass(frozen=True)

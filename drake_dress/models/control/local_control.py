@@ -158,16 +158,16 @@ class LocalController:
         planner: task planner, with the controller's garment.
         parameters: settings of the problems.
         solver: takes a problem and a warm start, if any.
-        reach: reach of the controller's garment.
     """
 
     planner: TaskPlanner
     parameters: LocalParameters
     solver: Solver = field(default_factory=lambda: solve)
-    reach: Reach = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "reach", self.planner.reach)
+    @property
+    def reach(self) -> Reach:
+        """Largest distances between armholes and grippers of the controller's garment."""
+        return self.planner.reach
 
     def resting(self, time: float) -> LocalPlan:
         """Returns a plan without motion."""

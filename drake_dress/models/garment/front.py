@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
+from drake_dress.models.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.edges import boundary_loops, unique_edges
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.sides import SIDES
@@ -40,7 +40,7 @@ def front_of(mesh: GarmentMesh) -> Opening:
     if rim is None:
         return "closed"
     is_left = left_half(mesh)[rim]
-    changes = np.flatnonzero(is_left != np.roll(is_left, -1))
+    changes = side_changes(is_left)
     if len(changes) == 0:
         return "closed"
     # the lowest change of sides is at the hem, opposite to the opening
@@ -52,6 +52,15 @@ def left_half(mesh: GarmentMesh) -> BoolArray:
     """Returns (n,) which nodes are nearer to the left armhole than to the right, on the cloth."""
     left, right = (_way_to(mesh, mesh.loops[f"{side}_armhole"]) for side in SIDES)
     return np.asarray(left < right)
+
+
+def side_changes(is_left: BoolArray) -> IndexArray:
+    """Returns the places of a closed way after which it changes sides.
+
+    Args:
+        is_left: (k,) which nodes of the way are in the left half.
+    """
+    return np.flatnonzero(is_left != np.roll(is_left, -1))
 
 
 def rim_of(mesh: GarmentMesh) -> IntArray | None:

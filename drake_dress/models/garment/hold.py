@@ -14,7 +14,7 @@ import numpy as np
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
-from drake_dress.models.garment.front import left_half, rim_of
+from drake_dress.models.garment.front import left_half, rim_of, side_changes
 from drake_dress.models.garment.mesh import GarmentMesh, Hold
 from drake_dress.models.sides import SIDES
 
@@ -64,7 +64,7 @@ def held_at_edges(mesh: GarmentMesh, depth: float, source: str) -> GarmentMesh:
 
 def _middle_of_neck(mesh: GarmentMesh, rim: IntArray, is_left: BoolArray) -> int | None:
     """Returns the place on the rim after which it changes sides at the neck: the highest one."""
-    changes = np.flatnonzero(is_left[rim] != np.roll(is_left[rim], -1))
+    changes = side_changes(is_left[rim])
     if len(changes) == 0:
         return None
     return int(changes[np.argmax(mesh.rest_position[rim[changes], 2])])
