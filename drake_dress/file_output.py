@@ -22,6 +22,8 @@ RUN_FILES = ("run.h5", "summary.json", "report.html", "replay.html")
 EXPLAIN_FILES = ("extended.yaml", "report.html", "explanation.json")
 GARMENT_FILES = ("garment.html", "garment.json", "garment.yaml")
 DATASET_FILES = ("measured.h5", "answer.json")
+# Attempts to make a folder next to another command that makes and removes the same one.
+_ATTEMPTS = 5
 # The file system has no locks; two commands there cannot be detected.
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 
@@ -203,17 +205,34 @@ def _made(directory: Path) -> Iterator[None]:
     """Creates a folder for the duration of the context; removes the folders created."""
     made: list[Path] = []
     try:
-        for folder in (*reversed(directory.parents), directory):
-            if not folder.is_dir():
-                if folder.exists():
-                    raise NotADirectoryError(errno.ENOTDIR, f"{folder} is a file")
-                folder.mkdir()
-                made.append(folder)
+        for attempt in range(_ATTEMPTS):
+            try:
+                _make_all(directory, made)
+                break
+            except FileNotFoundError:  # another process has just removed one of the folders
+                if attempt == _ATTEMPTS - 1:
+                    raise
         yield
     finally:
         for folder in reversed(made):
             with suppress(OSError):  # another process may have started to use it
                 folder.rmdir()
+
+
+def _make_all(directory: Path, made: list[Path]) -> None:
+    """Creates a folder with its parents, and adds those that it created to `made`."""
+    for folder in (*reversed(directory.parents), directory):
+        if folder.is_dir():
+            continue
+        if folder.exists():
+            raise NotADirectoryError(errno.ENOTDIR, f"{folder} is a file")
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            if folder.is_symlink():
+                raise
+            continue  # another process has just made it
+        made.append(folder)
 
 
 def _short_name() -> str:

@@ -172,3 +172,23 @@ def test_only_results_are_removed(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     remove_results(tmp_path, RUN_FILES)
     assert set(os.listdir(tmp_path)) == {"notes.txt", "explanation.json"}
+
+
+def test_folders_side_by_side_are_proved_at_once(tmp_path: Path) -> None:
+    """Each command makes the common parent, and removes it again while others use it."""
+    wrong: list[UserError] = []
+
+    def prove(name: str) -> None:
+        for _ in range(200):
+            try:
+                prove_directory("--out", tmp_path / "runs" / "today" / name, RUN_FILES)
+            except UserError as error:
+                wrong.append(error)
+
+    threads = [threading.Thread(target=prove, args=(name,)) for name in "abc"]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+    assert not any(name.is_file() for name in tree(tmp_path))
