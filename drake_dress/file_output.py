@@ -23,7 +23,7 @@ EXPLAIN_FILES = ("extended.yaml", "report.html", "explanation.json")
 GARMENT_FILES = ("garment.html", "garment.json", "garment.yaml")
 DATASET_FILES = ("measured.h5", "answer.json")
 # Attempts to make a folder next to another command that makes and removes the same one.
-_ATTEMPTS = 5
+_ATTEMPTS = 50
 # The file system has no locks; two commands there cannot be detected.
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 

@@ -24,14 +24,17 @@ from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.arm import Arms
+from drake_dress.models.human.body import ArmPose
 from drake_dress.models.human.lowering import Lowering
 from drake_dress.models.human.motions import Motion, Turn
+from drake_dress.models.human.shape import CHAIR
 from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.human.stirring import DRIVE, StirringParameters
 from drake_dress.models.human.tremor import TremorParameters, driving_torque, tremor_torque
+from drake_dress.models.human.wheelchair import distance_of_arms
 from drake_dress.models.sides import SIDES
 from drake_dress.systems.active_person import ActivePerson
-from drake_dress.systems.arm_lowering import ArmLowering
+from drake_dress.systems.arm_lowering import ArmLowering, Around
 from drake_dress.systems.arm_muscles import ArmMuscles
 from drake_dress.systems.arm_spasm import ArmSpasm
 from drake_dress.systems.arm_stirring import ArmStirring
@@ -105,9 +108,7 @@ def add_behaviour(
     if behaviour.lowering.duration > 0.0:
         pose = np.clip(angles_of(behaviour.lowering.pose), *np.moveaxis(arms.limits, 1, 0))
         pose = np.where(np.array(arms.has_tone)[:, None], pose, arms.rest)
-        lowering = builder.AddNamedSystem(
-            "arm_lowering", ArmLowering(pose, behaviour.lowering.duration, plant.time_step())
-        )
+        lowering = _add_lowering(builder, plant, person, arms, pose, behaviour.lowering.duration)
     if behaviour.kind == "dummy":
         source: LeafSystem = ConstantVectorSource(person.tone_torque(plant))
         force = builder.AddSystem(source).get_output_port()
@@ -132,6 +133,35 @@ def add_behaviour(
         return will.GetOutputPort("intent"), told
     none = builder.AddNamedSystem("no_intent", ConstantVectorSource(np.zeros(len(SIDES))))
     return none.get_output_port(), told
+
+
+def _add_lowering(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    person: Person,
+    arms: Arms,
+    pose: FloatArray,
+    duration: float,
+) -> ArmLowering:
+    """Adds the system that lowers the arms to `pose` (2,4), rad; around a chair, if any."""
+    around, chair = None, [c for c in person.capsules if c.part == CHAIR]
+    if chair:
+        own = person.own_dofs(plant)
+        mine = [int(np.flatnonzero(own == d)[0]) for d in person.arm_dofs(plant)]
+        measures = arms.arms[0].measures
+
+        def room(angles: FloatArray) -> FloatArray:
+            poses = {side: ArmPose(*q.tolist()) for side, q in zip(SIDES, angles, strict=True)}
+            return np.array(distance_of_arms(chair, measures, poses))
+
+        around = Around(room, mine, 2 * len(own))
+    lowering: ArmLowering = builder.AddNamedSystem(
+        "arm_lowering", ArmLowering(pose, duration, plant.time_step(), around)
+    )
+    if around is not None:
+        state = plant.get_state_output_port(person.model)
+        builder.Connect(state, lowering.GetInputPort("person_state"))
+    return lowering
 
 
 def _muscles(

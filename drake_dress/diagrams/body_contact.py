@@ -7,6 +7,8 @@ there: its shape is thinner by the overlap, so that the rest pose stays in equil
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.geometry import AddContactMaterial, ProximityProperties
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -34,6 +36,10 @@ _STIFFNESS = 1e4
 _DISSIPATION, _FRICTION = 5.0, 0.4
 # Capsules that the rest pose makes thinner than this radius have no contact, m.
 _LEAST_RADIUS = 0.01
+# Thickness of the folded sleeve between an arm and a chair, with what a chair is thicker for the
+# mesh of a garment (`met_by_mesh`), m. A chair does not give way as flesh does: without this room
+# the cloth between both is pressed into one of them.
+_SLEEVE = 12e-3
 
 
 def add_body_contact(
@@ -61,7 +67,7 @@ def add_body_contact(
     def is_girdle(c: Capsule) -> bool:
         return c.part == PERSON and abs(c.a_B[1]) == abs(c.b_B[1]) == half
 
-    trunk = [c for c in capsules if c.body == "torso" and not is_girdle(c)]
+    trunk = [_padded(c) for c in capsules if c.body == "torso" and not is_girdle(c)]
     for number, capsule in enumerate(trunk):
         _collide(plant, bodies["torso"], capsule, 0.0, f"contact_{number}")
     still = _placed(trunk, np.eye(3), np.zeros(3))
@@ -78,6 +84,14 @@ def add_body_contact(
             if min(capsule.radii) - overlap > _LEAST_RADIUS:
                 name = f"{side}_contact_{number}"
                 _collide(plant, bodies[capsule.body], capsule, overlap, name)
+
+
+def _padded(capsule: Capsule) -> Capsule:
+    """Returns a trunk's capsule, and a chair's with the sleeve that lies between it and an arm."""
+    if capsule.part == PERSON:
+        return capsule
+    first, second = capsule.radii
+    return replace(capsule, radius=first + _SLEEVE, end_radius=second + _SLEEVE)
 
 
 def _placed(capsules: list[Capsule], rotation: FloatArray, origin: FloatArray) -> Capsules:

@@ -92,7 +92,7 @@ from drake_dress.models.effects.effect import Effect
 from drake_dress.models.effects.grip import GripperLatency
 from drake_dress.models.effects.mounts import Mounts
 from drake_dress.models.garment.grain import grain
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import GarmentMesh, edge_lengths
 from drake_dress.models.human.body import (
     ArmPose,
     BodyMeasures,
@@ -101,6 +101,7 @@ from drake_dress.models.human.body import (
     shoulder_height,
 )
 from drake_dress.models.human.joints import JointParameters
+from drake_dress.models.human.shape import met_by_mesh
 from drake_dress.models.human.skin.person_skin import PersonSkin, person_skin
 from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.human.wheelchair import Wheelchair
@@ -335,6 +336,7 @@ def _add_cloth(
     p: StationParameters,
 ) -> ClothPlant:
     """Adds the garment as it hangs at the start, with contact with the person's bodies."""
+    spacing = float(edge_lengths(p.mesh.rest_position, p.mesh.faces).mean())
     cloth: ClothPlant = builder.AddNamedSystem(
         "cloth",
         ClothPlant(
@@ -342,7 +344,7 @@ def _add_cloth(
             (len(p.mesh.grasp["left"]), len(p.mesh.grasp["right"])),
             settled(p, hung_garment(p)),
             grippers,
-            PersonBodies(person.capsules, person.body_indices),
+            PersonBodies(met_by_mesh(person.capsules, spacing), person.body_indices),
             p.grasp_stiffness,
             Mounts(p.effects),
             p.in_worker,

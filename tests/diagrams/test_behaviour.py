@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from pydrake.geometry import SceneGraph
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -22,7 +23,7 @@ from drake_dress.diagrams.person import (
 )
 from drake_dress.models.garment.coat import CoatParameters, make_coat
 from drake_dress.models.human.active import ActiveParameters
-from drake_dress.models.human.body import ArmPose, BodyMeasures, arm_points
+from drake_dress.models.human.body import ArmPose, BodyMeasures, Posture, arm_points
 from drake_dress.models.human.following import FollowingParameters
 from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.lowering import Lowering
@@ -30,6 +31,7 @@ from drake_dress.models.human.motions import Motion, Reach, Turn, Wave, Withdraw
 from drake_dress.models.human.spasm import SpasmParameters
 from drake_dress.models.human.stirring import StirringParameters
 from drake_dress.models.human.tremor import TremorParameters
+from drake_dress.models.human.wheelchair import Wheelchair
 from drake_dress.models.sides import SIDES, Side
 from tests.systems.draped import draped_station
 
@@ -86,15 +88,30 @@ class Scene:
 
 
 def scene(
-    behaviour: Behaviour, garment: np.ndarray | None = None, joints: JointParameters = JOINTS
+    behaviour: Behaviour,
+    garment: np.ndarray | None = None,
+    joints: JointParameters = JOINTS,
+    chair: Wheelchair | None = None,
+    poses: dict[Side, ArmPose] = ARMS,
 ) -> Scene:
+    """Returns a person who stands, or sits in a wheelchair."""
     builder = DiagramBuilder()
+    scene_graph = builder.AddSystem(SceneGraph())
     plant = builder.AddSystem(MultibodyPlant(PERIOD))
-    person = add_person(plant, M, "standing", ARMS, joints, turns=behaviour.turns)
+    if chair is not None:
+        plant.RegisterAsSourceForSceneGraph(scene_graph)
+    posture: Posture = "standing" if chair is None else "sitting"
+    person = add_person(plant, M, posture, poses, joints, turns=behaviour.turns, chair=chair)
     plant.Finalize()
+    if chair is not None:
+        builder.Connect(
+            plant.get_geometry_pose_output_port(),
+            scene_graph.get_source_pose_port(plant.get_source_id()),
+        )
+        builder.Connect(scene_graph.get_query_output_port(), plant.get_geometry_query_input_port())
     x = MESH.rest_position + [-2.0, 0.0, 1.4] if garment is None else garment
     nodes = builder.AddSystem(ConstantVectorSource(x.ravel()))
-    arms = person_arms(M, "standing", ARMS, joints)
+    arms = person_arms(M, posture, poses, joints)
     opened = builder.AddSystem(PassThrough(1))
     intent, told = add_behaviour(
         builder,
@@ -412,6 +429,32 @@ def test_arms_are_lowered_when_told_and_stir_once_the_coat_is_let_go(kind: Kind)
     swing = np.ptp(stirred[-150:, [2, 5]], axis=0)
     assert (np.linalg.norm(swing, axis=1) > 0.04).all()
     assert (np.linalg.norm(swing, axis=1) < 0.2).all()
+
+
+@pytest.mark.parametrize("kind", ["dummy", "active"])
+def test_arms_come_around_the_back_of_a_chair(kind: Kind) -> None:
+    """The elbow is behind the chair's back, inward of its edge; straight down it would stay there.
+
+    The arm ends over the armrest.
+    """
+    chair, sides = Wheelchair(handle_length=0.0), {"left": 1.0, "right": -1.0}
+    behind = ArmPose(*np.deg2rad([-10.0, 62.0, 0.0, 35.0]))
+    lowering = Lowering(ArmPose(*np.deg2rad([20.0, -20.0, 0.0, 70.0])))
+    s = scene(
+        Behaviour(kind=kind, lowering=lowering),
+        chair=chair,
+        poses={side: behind for side in SIDES},
+    )
+    half = 0.5 * (M.hip_width + 0.05)
+    for k, side in enumerate(SIDES):
+        elbow = s.joints()[3 * k + 1]
+        assert elbow[0] < -0.15
+        assert sides[side] * elbow[1] < half
+    s.tell("told", 1.0)
+    s.simulator.AdvanceTo(5.0)
+    for k, side in enumerate(SIDES):
+        expected = arm_points(M, "sitting", side, lowering.pose)[2]
+        np.testing.assert_allclose(s.joints()[3 * k + 2], expected, atol=0.04)
 
 
 def test_who_is_not_told_keeps_the_arms() -> None:

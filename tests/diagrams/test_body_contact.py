@@ -114,7 +114,8 @@ def test_an_arm_that_is_drawn_downward_stops_at_the_armrest(side: int) -> None:
     _, through = drawn("sitting", above, force, 2.0)
     assert into_chair(through) > 0.02
     _, joints = drawn("sitting", above, force, 2.0, chair=chair)
-    assert -0.002 < into_chair(joints) < 0.01
+    # the sleeve between both takes 12 mm
+    assert -0.014 < into_chair(joints) < -0.002
 
 
 @pytest.mark.parametrize("side", [0, 1])

@@ -123,6 +123,9 @@ class TaskParameters:
         near_position: factor on W below `near_distance`.
         near_direction: factor on Q below `near_distance`.
         dressing_direction: factor on Q while a sleeve is drawn up its arm.
+        elbow_outward: distance by which an armhole that passes a bent elbow aims away from the
+            inside of the bend, m, for a bend that folds the arm; less for a smaller one. The arm's
+            axis and a taut sleeve cut that corner, and the rim stays hooked behind the elbow.
         dressing_position: factor on W once both sleeves are on their arms. Without it the last
             centimetres cost less than the tilt of the armhole on the shoulder. Also used for a
             waiting sleeve that may slip off.
@@ -201,6 +204,7 @@ class TaskParameters:
     near_position: float = 3.0
     near_direction: float = 0.3
     dressing_direction: float = 0.1
+    elbow_outward: float = 0.04
     dressing_position: float = 4.0
     waiting_reach: float = 0.9
     largest_aside: float = 0.15

@@ -432,6 +432,9 @@ class TaskPlanner:
         progress = [min(p.final_progress, max(0.0, s)) for s in progress]
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])
+        if task == Task.DRESS:
+            outward = [a.outward(fact.s) for a in mine[1:]]
+            position = position + p.elbow_outward * np.stack(outward)
         if task == Task.WAIT:
             position = position + self._aside(position, places)
         if task == Task.HOLD:

@@ -12,6 +12,7 @@ from drake_dress.models.arrays import FloatArray
 # Share of the shorter limb that the arc at the elbow takes when no radius is given.
 _FILLET_SHARE = 0.3
 # Greatest share of the shorter limb that an arc of a given radius may take; a straight part stays.
+_NEAR_ELBOW = 0.4  # distance in s from the elbow at which `outward` ends
 _MOST_SHARE = 0.9
 # Bend, rad, below which the arm counts as straight: the arc is a line and its plane is undefined.
 # Also the least angle of an arm from fully folded.
@@ -141,6 +142,19 @@ class ArmAxis:
         phi = (before - self._lower) / self._radius
         direction: FloatArray = np.cos(phi) * self._u + np.sin(phi) * self._inward
         return direction
+
+    def outward(self, s: float) -> FloatArray:
+        """Returns the direction (3,) away from the inside of the elbow's bend near the elbow.
+
+        Its length is the sine of half the bend at s = 1 and falls to zero at `_NEAR_ELBOW` from it.
+        """
+        off = min(1.0, abs(float(s) - 1.0) / _NEAR_ELBOW)
+        if self._straight or off >= 1.0:
+            return np.zeros(3)
+        way = self._u - self._w
+        size = 0.5 * (1.0 + math.cos(math.pi * off)) * math.sin(0.5 * self._angle)
+        outward: FloatArray = size / _length(way) * way
+        return outward
 
     def to_shoulder(self, s: float) -> float:
         """Returns the length of axis from `s`, limited to [0, 2], to the shoulder, m."""

@@ -40,6 +40,8 @@ class FinishParameters:
             the collar comes no nearer to its place, m. A high collar may lie higher on the nape.
         stall_time: time without progress after which the collar counts as coming no nearer, s.
         stall_progress: approach of the collar that counts as progress, m.
+        steady_time: time for which both sleeves are on before the coat is laid, s. A sleeve that
+            its taut coat draws back by the next decision is drawn on again first.
         least_time: shortest time for which the coat is laid, s. The person lowers the arms
             meanwhile.
         lost_progress: progress s of a sleeve below which it counts as lost. The centre of an
@@ -59,6 +61,7 @@ class FinishParameters:
     open_distance: float = 0.04
     stall_time: float = 2.0
     stall_progress: float = 0.005
+    steady_time: float = 0.4
     least_time: float = 3.5
     lost_progress: float = 1.6
     gripper_height: float = 0.04
@@ -78,12 +81,14 @@ class FinishState:
         best: least distance of the collar from its place while it is laid, m.
         since: time of `best`, or at which the phase RELEASED began, s.
         begun: time at which the phase LAYING began, s.
+        on_since: time since which both sleeves are done, s; None while one is not.
     """
 
     phase: Phase = Phase.DRESSING
     best: float = float("inf")
     since: float = 0.0
     begun: float = 0.0
+    on_since: float | None = None
 
     def stages(self, given: tuple[Stage, Stage]) -> tuple[int, int]:
         """Returns the stages of left and right sleeve as logged, `given` those of the dressing."""
@@ -120,9 +125,7 @@ def advance_finish(
     if are_open:
         return replace(state, phase=Phase.RELEASED, since=time)
     if state.phase == Phase.DRESSING:
-        if any(stage != Stage.DONE for stage in stages):
-            return state
-        return FinishState(Phase.LAYING, off, time, time)
+        return _begun(state, stages, off, p, time)
     if any(not fact.linked or fact.s < p.lost_progress for fact in facts):
         return FinishState()
     if state.phase == Phase.LAID:
@@ -135,3 +138,15 @@ def advance_finish(
     if off < p.laid_distance or (stalled and from_nape < p.open_distance):
         return replace(state, phase=Phase.LAID)
     return state
+
+
+def _begun(
+    state: FinishState, stages: tuple[Stage, Stage], off: float, p: FinishParameters, time: float
+) -> FinishState:
+    """Returns the new state of a dressing: laying, once both sleeves are on for long enough."""
+    if any(stage != Stage.DONE for stage in stages):
+        return replace(state, on_since=None)
+    since = time if state.on_since is None else state.on_since
+    if time - since < p.steady_time:
+        return replace(state, on_since=since)
+    return FinishState(Phase.LAYING, off, time, time)

@@ -105,6 +105,8 @@ class StageParameters:
         pushed_distance: distance that a hand moves ahead of an armhole above which the garment
             pushes the hand instead of enclosing it, m. The armhole then withdraws before the arm
             has been pushed to where no hand can enter.
+        entering_distance: the same while the hand is at the opening already, m. An arm that yields
+            has to be carried along until its hand slips in.
         lingering_distance: distance from the hand below which `lingering_timeout` counts, m.
         lingering_timeout: time near the hand after which an armhole withdraws, s. Of 22 hands that
             entered, 19 did so within 2.6 s.
@@ -143,6 +145,7 @@ class StageParameters:
     reach: float = 0.45
     meeting_distance: float = 0.2
     pushed_distance: float = 0.06
+    entering_distance: float = 0.15
     lingering_distance: float = 0.12
     lingering_timeout: float = 4.0
     insertion_timeout: float = 8.0
@@ -318,7 +321,7 @@ def _advance(
         settled = stage == Stage.DONE or time - state.best_time[side] > p.stall_timeout
         enough = p.kept_progress if settled else p.done_progress
         new = Stage.DONE if fact.s >= enough else Stage.DRESS
-    elif _pushed(state, side, fact) > p.pushed_distance or _lingers(state, side, p, time):
+    elif _pushes(state, side, fact, p) or (not fact.touches and _lingers(state, side, p, time)):
         return _again(state, side, time)
     elif stage == Stage.PREPARE:
         if fact.prepared_error < p.prepared_distance and fact.sight >= p.least_sight:
@@ -374,6 +377,12 @@ def _pushed(state: StageState, side: int, fact: SleeveFacts) -> float:
     if met is None:
         return 0.0
     return sum((h - m) * a for h, m, a in zip(fact.hand, met, fact.away, strict=True))
+
+
+def _pushes(state: StageState, side: int, fact: SleeveFacts, p: StageParameters) -> bool:
+    """Returns whether the garment pushes a hand ahead rather than enclosing it."""
+    largest = p.entering_distance if fact.touches else p.pushed_distance
+    return _pushed(state, side, fact) > largest
 
 
 def _remember(

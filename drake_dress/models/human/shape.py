@@ -8,7 +8,7 @@ heights: just below the shoulders and at the breast that of the chest, then wais
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +24,8 @@ _BELOW_SHOULDERS = 0.02
 _BREAST, _WAIST, _HIPS = 0.35, 0.62, 0.92
 # Distance from the shoulders' line to the head, m, where it is not given.
 _NECK_LENGTH = 0.12
+# Depth, m, to which the middle of a taut triangle may cut into a part of a chair.
+_MESH_DEPTH = 3e-3
 # What a capsule is part of.
 PERSON, CHAIR = "person", "chair"
 
@@ -57,6 +59,29 @@ def capsule_arrays(capsules: Sequence[Capsule]) -> tuple[FloatArray, FloatArray,
     """Returns ends (k,3), (k,3), in the frames of their bodies, and radii (k,2), m."""
     a, b = (np.array([getattr(c, end) for c in capsules]).reshape(-1, 3) for end in ("a_B", "b_B"))
     return a, b, np.array([c.radii for c in capsules]).reshape(-1, 2)
+
+
+def met_by_mesh(capsules: Sequence[Capsule], spacing: float) -> tuple[Capsule, ...]:
+    """Returns capsules whose thin chair parts are thick enough for the contact of a mesh's nodes.
+
+    Only nodes touch obstacles. Around a tube of the radius r a taut triangle of a mesh cuts in
+    with its middle, as deep as r − √(r² − c²), c = spacing / √3, even through the whole tube. A
+    chair's parts become as thick as it takes for this depth to stay within 3 mm; limbs are thick
+    enough.
+
+    Args:
+        capsules: of a person and a chair.
+        spacing: mean length of the mesh's edges, m.
+    """
+    return tuple(
+        c if c.part != CHAIR else replace(c, radius=_met(c.radii[0], spacing), end_radius=None)
+        for c in capsules
+    )
+
+
+def _met(radius: float, spacing: float) -> float:
+    inner = max(radius - _MESH_DEPTH, 0.0)
+    return max(radius, float(np.hypot(inner, spacing / np.sqrt(3.0))))
 
 
 def body_capsules(measures: BodyMeasures, posture: Posture) -> tuple[Capsule, ...]:

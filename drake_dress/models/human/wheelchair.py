@@ -17,7 +17,7 @@ reach. Seat, front frame and spokes have no shape of their own: thighs and tyres
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -153,16 +153,29 @@ def room_of_arms(
     chair: Wheelchair, measures: BodyMeasures, arms: Mapping[Side, ArmPose]
 ) -> dict[Side, float]:
     """Returns the least distance of each arm from the chair, m; negative where they overlap."""
+    left, right = distance_of_arms(chair_capsules(chair, measures), measures, arms)
+    return {"left": left, "right": right}
+
+
+def distance_of_arms(
+    chair: Sequence[Capsule], measures: BodyMeasures, arms: Mapping[Side, ArmPose]
+) -> tuple[float, float]:
+    """Returns the least distance of left and right arm from a chair, m; negative if they overlap.
+
+    Args:
+        chair: its capsules, in the torso's frame.
+        measures: of the person who sits in it.
+        arms: poses of both arms.
+    """
     first, second, radius = posed_capsules(measures, "sitting", arms)
-    parts = Capsules(*capsule_arrays(chair_capsules(chair, measures)))
-    room: dict[Side, float] = {}
-    for k, side in enumerate(SIDES):
+    parts = Capsules(*capsule_arrays(chair))
+    others = np.arange(len(parts.radius))
+    gaps = []
+    for k in range(len(SIDES)):
         rows = np.arange(3) + len(radius) - _OF_ARMS + 3 * k
-        others = np.arange(len(parts.radius))
         pairs = np.stack([np.repeat(rows, len(others)), np.tile(others, len(rows))], axis=1)
-        gap = clearance(Capsules(first, second, radius), parts, pairs).distance
-        room[side] = float(gap.min())
-    return room
+        gaps.append(float(clearance(Capsules(first, second, radius), parts, pairs).distance.min()))
+    return gaps[0], gaps[1]
 
 
 def _placed(chair: Wheelchair, m: BodyMeasures) -> _Place:

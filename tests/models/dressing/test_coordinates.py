@@ -192,3 +192,22 @@ def test_unusable_arms_are_told() -> None:
         ArmAxis(HAND, ELBOW, np.array([0.0, np.nan, 0.0]))
     with pytest.raises(ValueError, match="fillet_radius is -1"):
         ArmAxis(HAND, ELBOW, SHOULDER, fillet_radius=-1.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_outward_is_away_from_the_inside_of_the_elbow(seed: int) -> None:
+    hand, elbow, shoulder = np.random.default_rng(seed).normal(size=(3, 3))
+    axis = ArmAxis(hand, elbow, shoulder)
+    u, w = elbow - hand, shoulder - elbow
+    way = u / np.linalg.norm(u) - w / np.linalg.norm(w)
+    at_elbow = axis.outward(1.0)
+    # half of the difference of two unit vectors is as long as the sine of half their angle
+    np.testing.assert_allclose(at_elbow, 0.5 * way, atol=1e-9)
+    # from the axis, which cuts the corner, outward is where the elbow is
+    assert (elbow - axis.G(1.0)) @ at_elbow > 0.0
+    sizes = [np.linalg.norm(axis.outward(s)) for s in np.linspace(1.0, 2.0, 50)]
+    assert np.all(np.diff(sizes) <= 1e-12)
+    for s in (0.0, 0.6, 1.4, 2.0):
+        np.testing.assert_allclose(axis.outward(s), 0.0, atol=1e-12)
+    straight = ArmAxis(hand, elbow, elbow + 0.7 * u)
+    np.testing.assert_array_equal(straight.outward(1.0), 0.0)

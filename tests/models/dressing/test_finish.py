@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -50,7 +51,18 @@ def test_it_is_laid_once_the_collar_lies_on_the_nape() -> None:
 def test_the_person_has_time_to_lower_the_arms() -> None:
     for count in range(2, 20):
         is_laid = laid([0.0] * count).phase == Phase.LAID
-        assert is_laid == ((count - 1) * 0.5 >= P.least_time)
+        begun = 0.5 * math.ceil(P.steady_time / 0.5)
+        assert is_laid == ((count - 1) * 0.5 >= begun + P.least_time)
+
+
+def test_a_sleeve_that_slips_back_at_once_is_drawn_again_before_the_coat_is_laid() -> None:
+    state, slips = FinishState(), (Stage.DRESS, Stage.DONE)
+    for k, stages in enumerate([DONE, slips] * 10):
+        state = advance_finish(state, stages, (ON, ON), 0.1, 0.1, False, P, 0.3 * k)
+        assert state.phase == Phase.DRESSING
+    for k in range(3):
+        state = advance_finish(state, DONE, (ON, ON), 0.1, 0.1, False, P, 9.0 + 0.3 * k)
+    assert state.phase == Phase.LAYING
 
 
 def test_a_collar_that_comes_no_nearer_is_let_go_only_near_the_nape() -> None:

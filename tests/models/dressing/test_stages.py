@@ -259,6 +259,22 @@ def test_an_armhole_that_pushes_the_hand_along_is_taken_back() -> None:
     assert state.attempts == (1, 0)
 
 
+def test_a_hand_at_the_opening_may_be_carried_further_and_for_longer() -> None:
+    state = StageState()
+    late = P.lingering_timeout + 1.0
+    for pushed, time in ((0.0, 0.0), (1.5 * P.pushed_distance, 0.5 * late), (0.14, late)):
+        entering = replace(_meeting(pushed, pushed - 0.05), touches=True)
+        state, _ = advance_stages(state, (entering, facts()), P, FAR, time)
+        assert state.attempts == (0, 0)
+    beside = _meeting(0.14, 0.14 - 0.05)
+    missed, _ = advance_stages(state, (beside, facts()), P, FAR, late)
+    assert missed.attempts == (1, 0)
+    hand = 1.1 * P.entering_distance
+    entering = replace(_meeting(hand, hand - 0.05), touches=True)
+    missed, _ = advance_stages(state, (entering, facts()), P, FAR, late)
+    assert missed.attempts == (1, 0)
+
+
 def test_a_hand_that_comes_to_the_armhole_is_pushed_from_where_it_came_to() -> None:
     state, _ = advance_stages(StageState(), (_meeting(0.0, -0.15), facts()), P, FAR, 0.0)
     state, _ = advance_stages(state, (_meeting(-0.08, -0.15), facts()), P, FAR, 0.1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from drake_dress.models.cloth.contact.detection import find_proximity
 from drake_dress.models.cloth.contact.obstacles import Obstacles
@@ -22,6 +23,7 @@ from drake_dress.models.human.body import (
     capsule_arrays,
     posed_capsules,
 )
+from drake_dress.models.human.shape import CHAIR, met_by_mesh
 from drake_dress.models.sides import SIDES, Side
 
 M = BodyMeasures()
@@ -159,3 +161,28 @@ def test_posed_limbs_lie_between_the_joints(seed: int) -> None:
     still = [k for k, c in enumerate(capsules) if c.body == "torso"]
     np.testing.assert_array_equal(a[still], [capsules[k].a_B for k in still])
     np.testing.assert_array_equal(radius, capsule_arrays(capsules)[2])
+
+
+@given(
+    spacing=st.floats(0.005, 0.06),
+    radius=st.floats(0.01, 0.06),
+    angles=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
+    seed=st.integers(0, 1000),
+)
+def test_a_taut_triangle_cuts_a_chair_by_at_most_its_depth(
+    spacing: float, radius: float, angles: list[float], seed: int
+) -> None:
+    tube = Capsule("torso", np.array([-1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), radius)
+    chair, limb = met_by_mesh([replace(tube, part=CHAIR), tube], spacing)
+    assert limb is tube
+    assert chair.radius >= radius
+    # nodes of a triangle with the circumradius of an equilateral one, as near as they may be
+    draw = np.random.default_rng(seed)
+    across = spacing / np.sqrt(3.0) * np.exp(2j * np.pi * (np.arange(3) / 3.0 + angles[0]))
+    turn = Rotation.random(random_state=draw)
+    corners = turn.apply(np.stack([across.real, across.imag, np.zeros(3)], axis=1))
+    for height in np.linspace(-2.0, 2.0, 401) * (radius + spacing):
+        placed = corners + [0.0, 0.0, height]
+        if (np.hypot(placed[:, 1], placed[:, 2]) >= chair.radius).all():
+            middle = placed.mean(axis=0)
+            assert radius - np.hypot(middle[1], middle[2]) <= 3e-3 + 1e-9
