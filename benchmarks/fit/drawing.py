@@ -37,7 +37,7 @@ SIZES = ("XS", "S", "M", "L", "XL", "XXL", "3XL", "4XL", "5XL")
 # Sizes of the coat, counted from the person's own.
 STEPS = (-1, 0, 1, 2)
 # Where coats are held, and the largest force, N: at 16 N edges at the neck strain by a tenth.
-_HELD = ("garment.hold=edges", "safety.force_limit=15", "safety.soft_force_limit=8")
+_HELD = ("garment.hold=edges", "safety.force_limit=14", "safety.soft_force_limit=7.5")
 # First numbers of the generators' seeds.
 _CUT, _BODY, _PAIR = 1, 2, 3
 _DIGITS = 5  # of a coat's measures, m

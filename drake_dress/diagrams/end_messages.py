@@ -1,6 +1,6 @@
 """Messages at the end of a dressing, of a hardware station and of its lab.
 
-    PERSON_CUE                       lcmt_robot_state          1: both sleeves are on
+    PERSON_CUE                       lcmt_robot_state          1: lower the arms
     GRIPPER_COMMAND_LEFT, _RIGHT     lcmt_schunk_wsg_command   0 mm: hold, else open
     GRIPPER_STATUS_LEFT, _RIGHT      lcmt_schunk_wsg_status    distance of the fingers, mm
 

@@ -80,7 +80,7 @@ class Links:
         garment, person: channels of the estimates.
         camera: channels of images; _NAME is appended.
         gripper_command, gripper_status: channels of the grippers; _LEFT and _RIGHT are appended.
-        cue: channel of the cue that both sleeves are on.
+        cue: channel of the cue to lower the arms.
         command_period: s. command_offset: time of the first command, s.
     """
 

@@ -11,8 +11,7 @@ With arms:
 Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always:
 
     inputs   release                                         (1,) > 0.5: both grippers are to open
-             cue                                             (1,) > 0.5: both sleeves are on, so
-                                                             the person may lower the arms
+             cue                                             (1,) > 0.5: arms are to be lowered
     outputs  {left,right}_gripper.position_measured          (3,) m
              {left,right}_gripper.velocity_measured          (3,) m/s
              {left,right}_gripper.force_measured             (3,) of the garment on the gripper, N

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.human.lowering import least_lift, lowered, next_share
+from drake_dress.models.human.lowering import least_lift, longer, lowered, next_share
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ArmLowering(LeafSystem):
 
     Args:
         pose: (2,4) angles of both arms in the end, rad.
-        duration: Time that it takes, s.
+        duration: Time that it takes, s; longer if the arms have to go around something.
         period: Period of the discrete update, s.
         around: The chair that the arms have to go around, if there is one.
     """
@@ -65,6 +65,8 @@ class ArmLowering(LeafSystem):
         self._state = self.DeclareDiscreteState([0.0, 0.0])
         # lift of left and right arm on the way, rad
         self._lift = self.DeclareDiscreteState([0.0, 0.0])
+        # how many times as long the way is with it
+        self._longer = self.DeclareDiscreteState([1.0])
         self.DeclareVectorInputPort("set_point", 8)
         self._rate = self.DeclareVectorInputPort("set_point_rate", 8)
         self._told = self.DeclareVectorInputPort("told", 1)
@@ -77,12 +79,16 @@ class ArmLowering(LeafSystem):
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         before = float(context.get_discrete_state(self._state).value()[0])
         is_told = self._told.HasValue(context) and bool(self._told.Eval(context)[0] > 0.5)
-        share = next_share(before, is_told, self._duration, self._period)
-        discrete.set_value(self._state, [share, (share - before) / self._period])
-        if self._around is not None and before == 0.0 and share > 0.0:
+        longer_by = float(context.get_discrete_state(self._longer).value()[0])
+        if self._around is not None and before == 0.0 and is_told:
             state: FloatArray = self._person.Eval(context)
             start = state[list(self._around.angles)].reshape(2, 4)
-            discrete.set_value(self._lift, least_lift(self._around.room, start, self._pose))
+            lift = least_lift(self._around.room, start, self._pose)
+            longer_by = longer(start, self._pose, lift)
+            discrete.set_value(self._lift, lift)
+            discrete.set_value(self._longer, [longer_by])
+        share = next_share(before, is_told, longer_by * self._duration, self._period)
+        discrete.set_value(self._state, [share, (share - before) / self._period])
 
     def _calc(self, which: int) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:

@@ -1,4 +1,4 @@
-"""The cue that both sleeves are on, as `lcmt_robot_state` with one value of that name.
+"""The cue to lower the arms, as `lcmt_robot_state` with one value of that name.
 
 A loudspeaker, or whoever stands beside the person, passes it on: the arms may be lowered.
 """
@@ -36,7 +36,7 @@ class CueSender(LeafSystem):
         output_ports:
         - message
 
-    cue: (1,) above 0.5 while both sleeves are on. message: lcmt_robot_state.
+    cue: (1,) above 0.5 while the person is to lower the arms. message: lcmt_robot_state.
     """
 
     def __init__(self) -> None:

@@ -107,7 +107,8 @@ class GlobalMpc(LeafSystem):
     target positions of left and right armhole, m. solve_time: (2,) wall time of the last finished
     solve, s, and the number of finished solves. age: (1,) time since the observation that the plan
     in use is based on, s. release: (1,) 1 once the coat is laid: the grippers are to open. cue:
-    (1,) 1 from the time on at which the coat is being laid: the person may lower the arms.
+    (1,) 1 while the person is to lower the arms: while the coat is laid, and before it if a sleeve
+    stalls beyond the elbow.
 
     A solve starts from the observation at k·period, and its plan is used from k·period + delay on,
     however long the solve takes: the run is the same on any machine. Solves run on a background
@@ -197,10 +198,9 @@ class GlobalMpc(LeafSystem):
         ):
             self.DeclareVectorOutputPort(name, rows.stop - rows.start, self._show(rows), shown)
         self.DeclareVectorOutputPort("age", 1, self._calc_age)
-        self.DeclareVectorOutputPort(
-            "release", 1, self._calc_release, {self.abstract_state_ticket(self._plan)}
-        )
-        self.DeclareVectorOutputPort("cue", 1, self._calc_cue, shown)
+        planned = {self.abstract_state_ticket(self._plan)}
+        self.DeclareVectorOutputPort("release", 1, self._calc_release, planned)
+        self.DeclareVectorOutputPort("cue", 1, self._calc_cue, planned)
 
     def rehearse(
         self, x: np.ndarray, joints: np.ndarray, stopped: Callable[[], bool]
@@ -241,6 +241,7 @@ class GlobalMpc(LeafSystem):
             finished.joints[first:] if p.plans else None,
             decision.release,
             finished.state.finish.phase == Phase.RELEASED,
+            decision.lowers,
         )
 
     def failure(self, context: Context) -> str | None:
@@ -347,8 +348,8 @@ class GlobalMpc(LeafSystem):
         output.SetFromVector([context.get_time() - seen])
 
     def _calc_cue(self, context: Context, output: BasicVector) -> None:
-        stages = context.get_discrete_state(self._shown).value()[:2]
-        output.SetFromVector([float(np.all(stages > Stage.DONE))])
+        plan: GlobalPlan = context.get_abstract_state(self._plan).get_value()
+        output.SetFromVector([float(plan.lowers)])
 
     def _calc_release(self, context: Context, output: BasicVector) -> None:
         plan: GlobalPlan = context.get_abstract_state(self._plan).get_value()

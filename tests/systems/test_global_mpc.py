@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import sleep
 from types import SimpleNamespace
 from typing import Any
@@ -31,6 +31,7 @@ class _Policy(DressingPolicy):
     parameters: PolicyParameters = PolicyParameters(time_step=0.1, horizon=8)
     mesh: Any = field(default_factory=lambda: SimpleNamespace(rest_position=np.zeros((1, 3))))
     planner: Any = None
+    lowers: bool = False
 
     def initial_state(self) -> Any:
         return SimpleNamespace(shown=(0, 0), finish=FinishState())
@@ -55,7 +56,11 @@ class _Policy(DressingPolicy):
             sleep({"hangs": 600.0, "is late": 1.3}[self.ends])
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), 0.1), armhole=np.zeros((n, 2, 3)))
         return state, SimpleNamespace(
-            plan=plan, assignment="some", target=np.zeros((n, 2, 3)), release=False
+            plan=plan,
+            assignment="some",
+            target=np.zeros((n, 2, 3)),
+            release=False,
+            lowers=self.lowers,
         )
 
 
@@ -131,3 +136,12 @@ def test_a_run_is_finished_while_sleeves_that_are_done_are_still_on() -> None:
         mpc.get_input_port(0).FixValue(context, np.full(3, height))
         assert mpc.is_finished(context) == finished
     assert looked == [((1, 3), (6, 3))] * 2
+
+
+def test_the_person_is_told_to_lower_the_arms_as_the_plan_in_use_says() -> None:
+    mpc = GlobalMpc(_Policy("hangs"), _PERIOD, _DELAY, waits=True)
+    context = mpc.CreateDefaultContext()
+    assert mpc.GetOutputPort("cue").Eval(context) == [0.0]
+    for lowers in (True, False):
+        context.SetAbstractState(mpc._plan, replace(GlobalPlan.resting(), lowers=lowers))
+        assert mpc.GetOutputPort("cue").Eval(context) == [float(lowers)]

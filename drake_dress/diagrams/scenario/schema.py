@@ -968,8 +968,8 @@ class Hardware:
         gripper_command_channel: channel of the commands to open the grippers; `_LEFT` and `_RIGHT`
             are appended.
         gripper_status_channel: channel of the grippers' status; `_LEFT` and `_RIGHT` are appended.
-        cue_channel: channel of the cue that both sleeves are on, so that the person may lower the
-            arms.
+        cue_channel: channel of the cue to lower the arms, once both sleeves are on, or are past the
+            elbows and one of them stalls.
         release: `confirm` asks before the grippers open, `automatic` does not.
         status_rate: rate of the lab's arm status, Hz.
         estimate_rate: rate of the lab's estimates, Hz.

@@ -64,6 +64,8 @@ class Weights:
         passage_length: length of the cylinder that stands for the forearm, m.
         collar: weight of the collar's distance from the nape, and of the grippers' deviation from
             a level line just above the shoulders, while the coat is laid, 1/m².
+        leading: weight of the collar's distance from its place beside a hanging arm, 1/m².
+        leading_level: replaces `least_level` meanwhile; the garment comes partly on edge.
     """
 
     position: float = 1.0
@@ -85,6 +87,8 @@ class Weights:
     passage_radius: float = 0.06
     passage_length: float = 0.25
     collar: float = 10.0
+    leading: float = 0.5
+    leading_level: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -358,11 +362,13 @@ class GripperSpread:
 class GripperLevel:
     """w e²: e, m, is the shortfall of the left gripper's lateral lead over the right one.
 
-    `least` is the required lead, as a share of the grippers' rest distance.
+    `least` is the required lead, as a share of the grippers' rest distance; `leading` that while
+    the garment comes along a hanging arm.
     """
 
     weight: float
     least: float
+    leading: float
 
     def value(self, step: PlannedStep) -> float:
         """See `GarmentCost`."""
@@ -381,7 +387,8 @@ class GripperLevel:
         if leftward is None:
             return 0.0
         between = step.grip.left_from_right(step.x)
-        return max(0.0, self.least * step.grip.span - float(between @ leftward[step.index]))
+        least = self.least if step.situation.leading is None else self.leading
+        return max(0.0, least * step.grip.span - float(between @ leftward[step.index]))
 
 
 @dataclass(frozen=True)
@@ -469,7 +476,7 @@ def dressing_costs(
         ),
         (
             GripperSpread(w.separation, w.least_spread, w.entering_spread),
-            GripperLevel(w.level, w.least_level),
+            GripperLevel(w.level, w.least_level, w.leading_level),
             PersonClearance(w.clearance, w.free_clearance),
             *more,
         ),

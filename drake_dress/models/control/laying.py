@@ -25,29 +25,38 @@ Toward = Callable[[FloatArray], Heading]
 
 @dataclass(frozen=True)
 class CollarPosition:
-    """w ‖p − p̄‖²: draws the middle of the collar's back to its target on the nape."""
+    """w ‖p − p̄‖²: draws the middle of the collar's back to its target.
+
+    That is on the nape while the coat is laid, and beside a hanging arm while an armhole comes to
+    its hand.
+    """
 
     weight: float
     collar: Nape | None
+    leading_weight: float = 0.0
 
     def value(self, step: PlannedStep) -> float:
         """See `GarmentCost`."""
         off = self._off(step)
-        return 0.0 if off is None else self.weight * float(np.sum(off**2))
+        return 0.0 if off is None else self._weight(step) * float(np.sum(off**2))
 
     def add_slope(self, step: PlannedStep, slope: Slope) -> None:
         """See `GarmentCost`."""
         off = self._off(step)
         if off is not None and self.collar is not None:
-            pull = 2.0 * self.weight * off
+            pull = 2.0 * self._weight(step) * off
             np.add.at(slope.x, self.collar.nodes, self.collar.weights[:, None] * pull)
 
     def _off(self, step: PlannedStep) -> FloatArray | None:
-        laying = step.situation.laying
-        if laying is None or self.collar is None:
+        laying, leading = step.situation.laying, step.situation.leading
+        target = leading if laying is None else laying.collar
+        if target is None or self.collar is None:
             return None
-        off: FloatArray = self.collar.at(step.x) - laying.collar[step.index]
+        off: FloatArray = self.collar.at(step.x) - target[step.index]
         return off
+
+    def _weight(self, step: PlannedStep) -> float:
+        return self.leading_weight if step.situation.laying is None else self.weight
 
 
 @dataclass(frozen=True)

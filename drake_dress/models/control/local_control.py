@@ -46,6 +46,7 @@ class GlobalPlan(Immutable):
             and the local controller tracks the targets by itself.
         release: whether the coat is laid, so that the grippers are to open.
         is_released: whether they have opened, so that nothing ties them to the garment.
+        lowers: whether the person is to lower the arms.
     """
 
     start: float
@@ -56,6 +57,7 @@ class GlobalPlan(Immutable):
     joints: FloatArray | None = None
     release: bool = False
     is_released: bool = False
+    lowers: bool = False
 
     @classmethod
     def resting(cls) -> GlobalPlan:

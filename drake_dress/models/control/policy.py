@@ -27,14 +27,16 @@ from drake_dress.models.control.laying import (
     way_back,
 )
 from drake_dress.models.control.person_model import PersonModel, kept_away, person_obstacles
+from drake_dress.models.control.preparing import lifts
 from drake_dress.models.control.situation import HeldGarment, Situation, SleeveTarget
-from drake_dress.models.control.task_parameters import TaskParameters
+from drake_dress.models.control.task_parameters import TaskParameters, unit
 from drake_dress.models.control.tasks import Assignment, TaskPlanner
 from drake_dress.models.dressing.finish import (
     FinishParameters,
     FinishState,
     Phase,
     advance_finish,
+    may_lower,
 )
 from drake_dress.models.dressing.sleeve import find_entry
 from drake_dress.models.dressing.stages import StageState, Task
@@ -87,12 +89,16 @@ class PolicyParameters:
 
 @dataclass(frozen=True)
 class PolicyState(Immutable):
-    """State carried from one decision to the next."""
+    """State carried from one decision to the next.
+
+    `lowers` is whether the person has been told to lower the arms.
+    """
 
     stages: StageState
     velocity: FloatArray
     finish: FinishState = FinishState()
     search: SearchState = SearchState()
+    lowers: bool = False
 
     @property
     def shown(self) -> tuple[int, int]:
@@ -104,13 +110,15 @@ class PolicyState(Immutable):
 class Decision:
     """A plan with its tasks; `target` (N,2,3) holds the targets of the armhole centres, m.
 
-    `release` tells whether the coat is laid, so that the grippers are to open.
+    `release` tells whether the coat is laid, so that the grippers are to open; `lowers` whether the
+    person is to lower the arms.
     """
 
     plan: Plan
     assignment: Assignment
     target: FloatArray
     release: bool = False
+    lowers: bool = False
 
 
 class DressingPolicy:
@@ -175,7 +183,7 @@ class DressingPolicy:
             parameters.max_speed,
             parameters.max_iterations,
             costs=(
-                CollarPosition(parameters.weights.collar, collar),
+                CollarPosition(parameters.weights.collar, collar, parameters.weights.leading),
                 GrippersAsWorn(parameters.weights.collar),
                 *costs,
             ),
@@ -231,7 +239,8 @@ class DressingPolicy:
             # the sleeves sink as the coat is laid, which is no reason to draw them again
             stages = state.stages
             assignment = replace(assignment, tasks=(Task.LAY, Task.LAY))
-        state = replace(state, stages=stages, finish=finish)
+        lowers = may_lower(state.lowers, finish, stages.stalls, assignment.facts, self.finish)
+        state = replace(state, stages=stages, finish=finish, lowers=lowers)
         targets = self.planner.targets(assignment, self.planner.sleeves(x), joints, p.time_step)
         target = np.stack([t.position for t in targets], axis=1)
         if finish.phase == Phase.RELEASED:
@@ -244,14 +253,16 @@ class DressingPolicy:
                 time - finish.since,
                 p.time_step,
             )
-            return state, Decision(self._moving(x, back, "released"), assignment, target)
+            plan = self._moving(x, back, "released")
+            return state, Decision(plan, assignment, target, lowers=True)
         if not p.plans:
             return state, Decision(
                 self._moving(x, 0.0 * state.velocity, "no_plan"), assignment, target
             )
         state, plan = self._planned(state, x, v, joints, targets, assignment, elapsed_steps, radius)
         laid = finish.phase == Phase.LAID
-        return replace(state, velocity=plan.velocity), Decision(plan, assignment, target, laid)
+        decision = Decision(plan, assignment, target, laid, lowers)
+        return replace(state, velocity=plan.velocity), decision
 
     def _advanced(
         self,
@@ -304,7 +315,8 @@ class DressingPolicy:
         ):
             max_speed = p.tasks.settling_speed
         leftward = headings(joints[1:]).leftward
-        situation = Situation(x, v, targets, obstacles, leftward, away, laying)
+        leading = self._leading(state, assignment, targets, joints)
+        situation = Situation(x, v, targets, obstacles, leftward, away, laying, leading)
         guess = later(state.velocity, elapsed_steps)
         state, side = self._entering(state, assignment)
         if side is None:
@@ -320,6 +332,35 @@ class DressingPolicy:
         rest = velocity[: len(moves) - first]
         moves[first : first + len(rest)] = rest
         return replace(state, search=search), self.controller.follow(situation, moves)
+
+    def _leading(
+        self,
+        state: PolicyState,
+        assignment: Assignment,
+        targets: tuple[SleeveTarget, SleeveTarget],
+        joints: FloatArray,
+    ) -> FloatArray | None:
+        """Returns places (N,3), m, of the collar while an armhole is lifted over a hand that hangs.
+
+        The collar is where it would be if the forearm were in the sleeve: further up along the
+        forearm, and behind it. Elsewhere the coat's shoulder lies across the forearm, and pushes it
+        away from the armhole.
+        """
+        first, p = state.stages.first, self.parameters.tasks
+        if self._worn is None or first < 0 or assignment.withdraw or assignment.retreat[first]:
+            return None
+        forearm = unit(joints[1:, 3 * first + 1] - joints[1:, 3 * first + 2])
+        is_on = any(fact.linked for fact in assignment.facts)
+        near = assignment.facts[first].hand_distance < p.leading_distance
+        missed = assignment.attempts[first]
+        if not near or not lifts(p, forearm[0], is_on, missed, self.mesh.hold):
+            return None
+        rest = self.mesh.rest_position
+        armhole = rest[self.planner.armholes[first]].mean(axis=0)
+        above = float(np.linalg.norm(self._worn.collar.at(rest) - armhole))
+        behind = p.leading_behind * self.planner.toward(joints[0]).front
+        place: FloatArray = targets[first].position + above * forearm - behind
+        return place
 
     def _entering(
         self, state: PolicyState, assignment: Assignment

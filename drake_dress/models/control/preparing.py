@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.control.task_parameters import Approach, TaskParameters
+from drake_dress.models.control.task_parameters import Approach, TaskParameters, unit
 from drake_dress.models.dressing.sleeve import SleeveState
 from drake_dress.models.dressing.stages import SleeveFacts
 from drake_dress.models.garment.mesh import Hold
@@ -34,8 +34,11 @@ def choose_approach(
     """
     level = float(np.hypot(forearm[0], forearm[1]))
     if hold == "edges":
-        last = len(p.edge_approaches) - 1
-        return _in_turn(p.edge_approaches, last if level <= p.steep else 0, attempts)
+        if level > p.steep:
+            return _in_turn(p.edge_approaches, 0, attempts)
+        # every second attempt is in the first one's way, with the armhole lifted over the hand
+        turn = 0 if attempts % 2 == 1 else attempts // 2
+        return _in_turn(p.edge_approaches, len(p.edge_approaches) - 1, turn)
     if tethered:
         return p.tethered_approaches[attempts % len(p.tethered_approaches)]
     led = opening(forearm, to, side) < p.led_inward
@@ -43,6 +46,20 @@ def choose_approach(
         return p.led_approach
     best = 1 if level >= p.flat else 2 if level <= p.steep else 0
     return _in_turn(p.approaches, best, attempts)
+
+
+def lifts(p: TaskParameters, forearm: FloatArray, tethered: bool, missed: int, hold: Hold) -> bool:
+    """Returns whether an armhole is lifted over a hand that hangs, in every second attempt.
+
+    Args:
+        p: settings.
+        forearm: (3,) unit, from hand to elbow.
+        tethered: whether the other sleeve is on its arm; it keeps the armhole from coming below.
+        missed: how often the armhole has missed the hand.
+        hold: where the garment is held; one that is held at its shoulders hangs between both.
+    """
+    level = float(np.hypot(forearm[0], forearm[1]))
+    return hold == "edges" and not tethered and missed % 2 == 1 and level <= p.steep
 
 
 def _in_turn(ways: Sequence[Approach], best: int, attempts: int) -> Approach:
@@ -153,6 +170,32 @@ class Preparation:
         if not waits.any():
             return goal
         return np.where(waits, self._behind(sleeve, outside, to), goal)
+
+    def lifts(self, forearm: FloatArray) -> bool:
+        """Returns whether the armhole is lifted over the hand; see the function `lifts`."""
+        return lifts(self.parameters, forearm, self.tethered, self.attempts, self.hold)
+
+    def through(self, hand: FloatArray, forearm: FloatArray, sleeve: SleeveState) -> FloatArray:
+        """Returns the targets (N,3), m, of an armhole at which a hand is about to enter.
+
+        Its centre comes to the hand first, then on along its normal, and along the forearm once the
+        hand is inside. An armhole that is drawn along the forearm at once catches the hand with its
+        lower rim, and takes the arm along.
+
+        Args:
+            hand: (N,3) m.
+            forearm: (N,3) unit, from hand to elbow.
+            sleeve: its current state.
+        """
+        p = self.parameters
+        offset = hand - sleeve.p_c
+        beside = distance_aside(offset, sleeve.v_c)[:, None]
+        more = max(0.0, self.radius - p.funnel_radius)
+        aligned = _ramp(beside - more, p.funnel_wide, p.funnel_narrow)
+        inside = _ramp((offset @ -sleeve.v_c)[:, None], 0.0, 2.0 * p.aside_free)
+        onward = (1.0 - inside) * aligned * unit(sleeve.v_c + forearm) + inside * forearm
+        place: FloatArray = hand + p.overshoot * onward
+        return place
 
     def _around(self, offset: FloatArray, back: FloatArray, to: Heading) -> FloatArray:
         """Returns places (N,3), m, relative to the hand, of a tethered armhole hidden from it.

@@ -60,6 +60,8 @@ class Situation:
         laying: where the coat is laid; None before both sleeves are on.
         kept_away: the person as grippers keep away from it, wider where it is uncertain; None: as
             in `obstacles`.
+        leading: (N,3) target of the middle of the collar's back while the first armhole comes to a
+            hand that hangs, m; None: anywhere.
         leftward: (N,3) horizontal unit vectors to the person's left. None disables the cost of the
             grippers' level.
     """
@@ -71,6 +73,7 @@ class Situation:
     leftward: FloatArray | None = None
     kept_away: Sequence[Obstacles] | None = None
     laying: LayingTarget | None = None
+    leading: FloatArray | None = None
 
 
 @dataclass(frozen=True)

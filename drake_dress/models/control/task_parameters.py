@@ -70,7 +70,7 @@ class TaskParameters:
         tethered_approaches: the same while the other sleeve is on, starting with the first.
         edge_approaches: ways to approach a hand with a garment that is held at the edges of its
             opening, in turn: mostly from behind, along the forearm. A steep forearm begins with the
-            last one.
+            last one, and has it in every second attempt, with the armhole lifted over the hand.
         led_inward: inward component of the forearm's direction, from hand to elbow, below which the
             hand counts as pulled inward.
         led_after: number of misses after which the first sleeve uses `led_approach` for such a
@@ -101,6 +101,9 @@ class TaskParameters:
             beside the hand, m.
         outlook_distance: distance from the hand within which a sleeve that missed it moves to where
             the hand sees the opening, m.
+        leading_distance: distance of the armhole from a hand that hangs below which the collar of a
+            garment that is held at its edges is led beside the arm, m.
+        leading_behind: distance of the collar behind the forearm's line there, m.
         longest_reach: assumed greatest distance between the armholes, as a share of their distance
             at rest.
         clear_sight: share of the opening that the hand must see for a tethered sleeve, or one that
@@ -118,6 +121,8 @@ class TaskParameters:
         touch_distance: distance of a hand from the surface that spans the armhole below which the
             hand is about to enter, m. The armhole is then drawn along the forearm, even if cloth
             hides it from the hand.
+        edge_touch: replaces `touch_distance` for a garment that is held at the edges of its
+            opening, m. Its armhole stands open before a hand, and no panel comes in between.
         near_distance: distance from the hand below which the armhole's position counts more than
             its direction, m.
         near_position: factor on W below `near_distance`.
@@ -126,6 +131,8 @@ class TaskParameters:
         elbow_outward: distance by which an armhole that passes a bent elbow aims away from the
             inside of the bend, m, for a bend that folds the arm; less for a smaller one. The arm's
             axis and a taut sleeve cut that corner, and the rim stays hooked behind the elbow.
+        elbow_lead: how far ahead of the armhole, in s, its target is at an elbow that folds the
+            arm; further for a smaller bend. A target further up would outweigh `elbow_outward`.
         dressing_position: factor on W once both sleeves are on their arms. Without it the last
             centimetres cost less than the tilt of the armhole on the shoulder. Also used for a
             waiting sleeve that may slip off.
@@ -190,6 +197,8 @@ class TaskParameters:
     edge_outward: float = 0.04
     edge_back: float = 0.18
     outlook_distance: float = 0.35
+    leading_distance: float = 0.35
+    leading_behind: float = 0.03
     longest_reach: float = 1.04
     clear_sight: float = 0.9
     funnel_wide: float = 0.07
@@ -200,11 +209,13 @@ class TaskParameters:
     overshoot: float = 0.12
     inside_radius: float = 0.08
     touch_distance: float = 0.03
+    edge_touch: float = 0.07
     near_distance: float = 0.2
     near_position: float = 3.0
     near_direction: float = 0.3
     dressing_direction: float = 0.1
     elbow_outward: float = 0.04
+    elbow_lead: float = 0.15
     dressing_position: float = 4.0
     waiting_reach: float = 0.9
     largest_aside: float = 0.15

@@ -324,7 +324,9 @@ class TaskPlanner:
         aside = distance_aside(offset, way.direction(axis.D(0.0), to, side))
         loop = self.armholes[side]
         sight = free_sight(x, self.mesh.faces, loop, hand)
-        touches = not linked and distance_to_opening(x[loop], hand) < self.parameters.touch_distance
+        p = self.parameters
+        near = p.edge_touch if self.mesh.hold == "edges" else p.touch_distance
+        touches = not linked and distance_to_opening(x[loop], hand) < near
         return SleeveFacts(
             linked=linked,
             sight=1.0 if touches else sight,
@@ -376,6 +378,8 @@ class TaskPlanner:
             position = arm.shoulder[1:] - p.withdrawal_distance * soon.front
         elif given.swing[side]:
             position = self._swung(soon, side, sleeves[1 - side])
+        elif fact.touches and not away and preparation.lifts(forearm[0]):
+            position = preparation.through(hand, forearm, sleeves[side])
         elif fact.touches and not away:
             times = time_step * np.arange(1, len(hand) + 1)
             drawn = zip(arm.axes[1:], p.progress_rate * times, strict=True)
@@ -417,7 +421,10 @@ class TaskPlanner:
         if task == Task.HOLD:
             progress = [max(fact.s, p.held_progress)] * n
         elif task == Task.DRESS:
-            progress = self._drawn_progress(given, side, [j * time_step for j in range(1, n + 1)])
+            times = [j * time_step for j in range(1, n + 1)]
+            outward = np.stack([a.outward(fact.s) for a in mine[1:]])
+            bend = float(np.linalg.norm(outward[0]))
+            progress = self._drawn_progress(given, side, times, bend)
         else:
             k = 1 - side
             other, soon = self._preparation(given, k, arms[k], to), Heading(to.rotation[1:])
@@ -433,8 +440,7 @@ class TaskPlanner:
         position = np.stack([a.G(s) for a, s in zip(mine[1:], progress, strict=True)])
         direction = np.stack([a.D(s) for a, s in zip(mine[1:], progress, strict=True)])
         if task == Task.DRESS:
-            outward = [a.outward(fact.s) for a in mine[1:]]
-            position = position + p.elbow_outward * np.stack(outward)
+            position = position + p.elbow_outward * outward
         if task == Task.WAIT:
             position = position + self._aside(position, places)
         if task == Task.HOLD:
@@ -451,11 +457,14 @@ class TaskPlanner:
         direction = np.stack([axis.D(2.0) for axis in arm.axes[1:]])
         return SleeveTarget(arm.shoulder[1:], direction, 0.0, 0.0)
 
-    def _drawn_progress(self, given: Assignment, side: int, times: Sequence[float]) -> list[float]:
+    def _drawn_progress(
+        self, given: Assignment, side: int, times: Sequence[float], bend: float
+    ) -> list[float]:
         """Returns the target s of a sleeve on its arm at `times` from now, s.
 
         It leads the other sleeve by at most `largest_lead`, and goes no further than
-        `done_progress` until the other one reaches `kept_progress`. An easing sleeve moves back.
+        `done_progress` until the other one reaches `kept_progress`. At a bent elbow, `bend` is the
+        length of `ArmAxis.outward`, it goes little ahead. An easing sleeve moves back.
         """
         p, fact, other = self.parameters, given.facts[side], given.facts[1 - side]
         rate = -p.progress_rate if given.ease[side] else p.progress_rate
@@ -464,6 +473,8 @@ class TaskPlanner:
             largest = max(fact.s, other.s + p.largest_lead)
             if other.s < p.stages.kept_progress:
                 largest = min(largest, p.stages.done_progress)
+        if bend > 0.0:
+            largest = min(largest, fact.s + p.elbow_lead / bend)
         return [min(fact.s + t * rate, largest) for t in times]
 
     def _preparation(

@@ -29,6 +29,10 @@ class Phase(IntEnum):
 LAY, RELEASED = 3, 4
 
 
+# By how much s may fall again before a person who was told to lower the arms raises them.
+_LOWERED_MARGIN = 0.3
+
+
 @dataclass(frozen=True)
 class FinishParameters:
     """Settings of laying the coat and letting it go.
@@ -40,6 +44,8 @@ class FinishParameters:
             the collar comes no nearer to its place, m. A high collar may lie higher on the nape.
         stall_time: time without progress after which the collar counts as coming no nearer, s.
         stall_progress: approach of the collar that counts as progress, m.
+        lowering_progress: progress s of both sleeves from which on the person is told to lower the
+            arms if one of them stalls. 1 is the elbow.
         steady_time: time for which both sleeves are on before the coat is laid, s. A sleeve that
             its taut coat draws back by the next decision is drawn on again first.
         least_time: shortest time for which the coat is laid, s. The person lowers the arms
@@ -61,6 +67,7 @@ class FinishParameters:
     open_distance: float = 0.04
     stall_time: float = 2.0
     stall_progress: float = 0.005
+    lowering_progress: float = 1.05
     steady_time: float = 0.4
     least_time: float = 3.5
     lost_progress: float = 1.6
@@ -138,6 +145,35 @@ def advance_finish(
     if off < p.laid_distance or (stalled and from_nape < p.open_distance):
         return replace(state, phase=Phase.LAID)
     return state
+
+
+def may_lower(
+    was_told: bool,
+    state: FinishState,
+    stalls: tuple[int, int],
+    facts: tuple[SleeveFacts, SleeveFacts],
+    parameters: FinishParameters,
+) -> bool:
+    """Returns whether the person is told to lower the arms.
+
+    That is while the coat is laid. Before, it is also once both armholes are past the elbows and
+    one of them makes no more progress: an arm that is held back and bent lets no sleeve over its
+    elbow, and its sleeve pulls it straight at the shoulder, which moves nothing.
+
+    Args:
+        was_told: whether the person was told before.
+        state: of the finish.
+        stalls: number of stalls of left and right sleeve at the same place.
+        facts: of left and right sleeve.
+        parameters: settings.
+    """
+    if state.phase != Phase.DRESSING:
+        return True
+    if not parameters.release:
+        return False
+    least = parameters.lowering_progress - (_LOWERED_MARGIN if was_told else 0.0)
+    past = all(fact.linked and fact.s >= least for fact in facts)
+    return past and (was_told or any(n > 0 for n in stalls))
 
 
 def _begun(

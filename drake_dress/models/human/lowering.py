@@ -62,11 +62,10 @@ def lowered(
     """
     if share <= 0.0 and share_rate <= 0.0:
         return set_point, rate
-    if lift is None:
-        w, slope = _smooth(share, 0.0, 1.0)
-        return _between(set_point, rate, pose, w, slope * share_rate)
-    late, late_slope = _smooth(share, _OUT, 1.0)
     soon, soon_slope = _smooth(share, 0.0, 1.0)
+    if lift is None:
+        return _between(set_point, rate, pose, soon, soon_slope * share_rate)
+    late, late_slope = _smooth(share, _OUT, 1.0)
     lifted = lift > 0.0
     w = np.where(lifted, late, soon)[..., None]
     w_rate = np.where(lifted, late_slope, soon_slope)[..., None] * share_rate
@@ -122,6 +121,25 @@ def least_lift(
         if np.all(most >= asked - 1e-9):
             break
     return best
+
+
+def longer(start: FloatArray, pose: FloatArray, lift: FloatArray) -> float:
+    """Returns how many times as long the way down is with the lifts as without, 1 or more.
+
+    Args:
+        start: (2,4) angles of both arms now, rad.
+        pose: (2,4) in the end, rad.
+        lift: (2,) of the arms on the way, rad.
+    """
+    zero, shares = np.zeros_like(start), np.linspace(0.0, 1.0, _SAMPLES)
+
+    def length(lifts: FloatArray) -> FloatArray:
+        way = np.stack([lowered(start, zero, pose, share, 1.0, lifts)[0] for share in shares])
+        total: FloatArray = np.linalg.norm(np.diff(way, axis=0), axis=2).sum(axis=0)
+        return total
+
+    ratio = length(lift) / np.maximum(length(np.zeros(2)), 1e-6)
+    return float(np.max(ratio, initial=1.0, where=lift > 0.0))
 
 
 def next_share(share: float, is_told: bool, duration: float, period: float) -> float:

@@ -164,9 +164,44 @@ def test_level_costs_nothing_where_left_is_left() -> None:
     step = drawn(2)
     between = step.grip.left_from_right(step.x)
     leftward = (between / np.linalg.norm(between))[None]
-    level = GripperLevel(1.0, 0.5)
+    level = GripperLevel(1.0, 0.5, 0.3)
     good = replace(step, situation=replace(step.situation, leftward=leftward))
     turned = replace(step, situation=replace(step.situation, leftward=-leftward))
     assert level.value(good) == 0.0
     assert level.value(turned) > 0.0
     assert level.value(replace(step, situation=replace(step.situation, leftward=None))) == 0.0
+
+
+def test_a_coat_that_comes_along_a_hanging_arm_may_be_on_edge() -> None:
+    step = drawn(2)
+    between = step.grip.left_from_right(step.x)
+    # the left gripper leads by 0.4 of the span
+    across = np.cross(between, [0.3, -0.2, 0.9])
+    across /= np.linalg.norm(across)
+    share = 0.4 * step.grip.span / np.linalg.norm(between)
+    along = between / np.linalg.norm(between)
+    leftward = (share * along + np.sqrt(1.0 - share**2) * across)[None]
+    situation = replace(step.situation, leftward=leftward, leading=None)
+    level = GripperLevel(1.0, 0.5, 0.3)
+    expected = (0.1 * step.grip.span) ** 2
+    assert level.value(replace(step, situation=situation)) == pytest.approx(expected)
+    leading = replace(situation, leading=np.zeros((1, 3)))
+    assert level.value(replace(step, situation=leading)) == 0.0
+
+
+@given(seed=seeds)
+def test_the_collar_is_led_before_the_coat_is_laid(seed: int) -> None:
+    assert NAPE is not None
+    step, cost = drawn(seed), CollarPosition(2.0, NAPE, 0.7)
+    place = np.array([[0.1, -0.2, 0.4]])
+    led = replace(step.situation, laying=None, leading=place)
+    there = replace(step, situation=led)
+    off = NAPE.at(step.x) - place[0]
+    assert cost.value(there) == pytest.approx(0.7 * off @ off)
+    slope = Slope.onto(np.zeros_like(step.x), len(HELD))
+    cost.add_slope(there, slope)
+    # drawn straight to its place by all its nodes together
+    np.testing.assert_allclose(slope.x.sum(axis=0), 1.4 * off)
+    assert cost.value(replace(step, situation=replace(led, leading=None))) == 0.0
+    both = replace(step, situation=replace(step.situation, leading=place))
+    assert cost.value(both) == cost.value(step), "once it is laid, only the nape counts"

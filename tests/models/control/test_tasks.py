@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
+from drake_dress.models.control.preparing import choose_approach, lifts
 from drake_dress.models.control.situation import SleeveTarget
 from drake_dress.models.control.task_parameters import TaskParameters
 from drake_dress.models.control.tasks import Assignment, TaskPlanner, arm_axes
@@ -136,8 +137,35 @@ def test_a_sleeve_on_its_arm_is_asked_to_go_on_at_its_rate(planner: TaskPlanner)
         rows = np.stack([joints()] * (count + 1))
         for axis, target in zip(axes, planner.targets(renewed, sleeves, rows, step), strict=True):
             s = 0.7 + rate * step * np.arange(1, count + 1)
-            np.testing.assert_allclose(target.position, [axis.G(v) for v in s], atol=1e-12)
+            aside = planner.parameters.elbow_outward * axis.outward(0.7)
+            np.testing.assert_allclose(target.position - aside, [axis.G(v) for v in s], atol=1e-12)
             np.testing.assert_allclose(target.direction, [axis.D(v) for v in s], atol=1e-12)
+
+
+def test_a_sleeve_passes_a_bent_elbow_on_its_outside_and_little_ahead(
+    planner: TaskPlanner,
+) -> None:
+    bent = ArmPose(0.25, 0.8, 0.0, 1.5)
+    q = np.vstack([arm_points(M, "sitting", side, bent) for side in SIDES])
+    axis, p = arm_axes(q)[0], planner.parameters
+    rows = np.stack([q] * (HORIZON + 1))
+
+    def asked(s: float) -> np.ndarray:
+        on = SleeveFacts(linked=True, s=s, hand_distance=0.2, prepared_error=0.2, passed=0.0)
+        sleeve = SleeveState(axis.G(s), axis.D(s))
+        given = Assignment((Task.DRESS, Task.DRESS), (on, on))
+        # 1 s per step: the rate alone asks for more than is left of the arm
+        return np.asarray(planner.targets(given, [sleeve, sleeve], rows, 1.0)[0].position)
+
+    outward = axis.outward(1.0)
+    at_elbow = asked(1.0)
+    lead = p.elbow_lead / np.linalg.norm(outward)
+    np.testing.assert_allclose(
+        at_elbow,
+        np.tile(axis.G(float(1.0 + lead)) + p.elbow_outward * outward, (HORIZON, 1)),
+        atol=1e-9,
+    )
+    np.testing.assert_allclose(asked(1.45)[-1], axis.G(p.final_progress), atol=0.02)
 
 
 def test_a_sleeve_that_is_on_no_arm_makes_no_progress(planner: TaskPlanner) -> None:
@@ -202,6 +230,26 @@ def test_a_forearm_is_first_gone_about_as_its_slope_asks_for(
         asked.append(planner.targets(given, [away, away], rows, STEP)[0].direction[0])
     order = [first, *(i for i in range(len(ways)) if i != first)]
     np.testing.assert_allclose(asked, [ways[i].entry(axis.D(0.0), to, 0) for i in order])
+
+
+def test_a_hanging_hand_is_gone_about_in_the_first_way_every_second_time() -> None:
+    p, to = TaskParameters(), heading(joints())
+    ways = p.edge_approaches
+
+    def order(forearm: np.ndarray) -> list[int]:
+        chosen = [choose_approach(p, forearm, to, 0, k, False, "edges") for k in range(7)]
+        return [ways.index(way) for way in chosen]
+
+    last = len(ways) - 1
+    steep = np.array([0.1, 0.0, 0.995])
+    assert order(steep) == [last, last, 0, last, 1, last, 2]
+    assert order(np.array([0.8, 0.0, 0.6])) == [0, 1, 2, 3, 0, 1, 2]
+    for missed in range(4):
+        lifted = missed % 2 == 1
+        assert lifts(p, steep, False, missed, "edges") == lifted
+        assert not lifts(p, steep, True, missed, "edges")
+        assert not lifts(p, steep, False, missed, "shoulders")
+        assert not lifts(p, np.array([0.8, 0.0, 0.6]), False, missed, "edges")
 
 
 @pytest.mark.parametrize("tethered", [False, True])
@@ -610,3 +658,49 @@ def test_a_hand_at_an_opening_is_drawn_in_along_its_forearm(planner: TaskPlanner
         np.testing.assert_allclose(target.passage, np.tile(-axis.D(0.0), (HORIZON, 1)))
         onward = np.stack([axis.G((j + 1) * STEP * p.progress_rate) for j in range(HORIZON)])
         assert np.allclose(target.position, onward) == facts.touches
+
+
+HANGING = ArmPose(np.deg2rad(12.0), np.deg2rad(5.0), 0.0, np.deg2rad(10.0))
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize(("spread", "missed"), [(True, 1), (True, 0), (False, 1)])
+def test_an_armhole_that_missed_a_hanging_hand_comes_to_it_then_through_it(
+    planner: TaskPlanner, side: int, spread: bool, missed: int
+) -> None:
+    """With the edges held; otherwise, and at first, it is drawn along the forearm at once."""
+    mesh = held_at_edges(planner.mesh, 0.4, "test") if spread else planner.mesh
+    held, p = TaskPlanner(mesh, planner.parameters), planner.parameters
+    rest = np.vstack([arm_points(M, "standing", s, HANGING) for s in SIDES])
+    axis, hand = arm_axes(rest)[side], rest[3 * side + 2]
+    forearm = axis.D(0.0)
+    tilted = np.cross(forearm, [1.0, 0.0, 0.0])
+    normal = (forearm + tilted / np.linalg.norm(tilted)) / np.sqrt(2.0)
+    across = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+    across /= np.linalg.norm(across)
+    off = SleeveFacts(linked=False, s=0.0, hand_distance=0.5, prepared_error=0.2, passed=0.0)
+    near = replace(off, hand_distance=0.08, touches=True)
+    facts = (near, off) if side == 0 else (off, near)
+    tasks = (Task.PREPARE, Task.REST) if side == 0 else (Task.REST, Task.PREPARE)
+
+    def asked(center: np.ndarray) -> np.ndarray:
+        sleeve = SleeveState(center, normal)
+        rows = np.stack([rest] * (HORIZON + 1))
+        given = Assignment(tasks, facts, attempts=(missed, missed))
+        found = held.targets(given, [sleeve, sleeve], rows, STEP)[side]
+        return np.asarray(found.position[-1] - hand)
+
+    radius = planner._radii[side]
+    wide = p.funnel_wide + max(0.0, radius - p.funnel_radius)
+    beside = asked(hand + 1.1 * wide * across - 0.02 * normal)
+    before = asked(hand - 0.02 * normal)
+    inside = asked(hand + 0.06 * normal)
+    if not spread or missed == 0:
+        drawn = axis.G(HORIZON * STEP * p.progress_rate) - hand
+        for place in (beside, before, inside):
+            np.testing.assert_allclose(place, drawn, atol=1e-9)
+        return
+    np.testing.assert_allclose(beside, 0.0, atol=1e-9)
+    between = (normal + forearm) / np.linalg.norm(normal + forearm)
+    np.testing.assert_allclose(before, p.overshoot * between, atol=1e-9)
+    np.testing.assert_allclose(inside, p.overshoot * forearm, atol=1e-9)

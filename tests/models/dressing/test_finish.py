@@ -14,6 +14,7 @@ from drake_dress.models.dressing.finish import (
     FinishState,
     Phase,
     advance_finish,
+    may_lower,
 )
 from drake_dress.models.dressing.stages import SleeveFacts, Stage
 
@@ -101,3 +102,27 @@ def test_a_sleeve_that_is_lost_is_dressed_again(side: int, s: float, linked: boo
 def test_without_release_the_coat_is_held() -> None:
     p = replace(P, release=False)
     assert laid([0.0] * 50, p=p) == FinishState()
+
+
+@given(
+    s=st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0)),
+    stalls=st.tuples(*[st.integers(0, 3)] * 2),
+)
+def test_arms_are_lowered_early_only_past_the_elbows_and_stalled(
+    s: tuple[float, float], stalls: tuple[int, int]
+) -> None:
+    facts = (replace(ON, s=s[0]), replace(ON, s=s[1]))
+    told = may_lower(False, FinishState(), stalls, facts, P)
+    assert told == (min(s) >= P.lowering_progress and max(stalls) > 0)
+    # who has lowered them keeps them down while the sleeve eases, but not once it slips off
+    kept = may_lower(True, FinishState(), (0, 0), facts, P)
+    assert kept == (min(s) >= P.lowering_progress - 0.3)
+    off = (facts[0], replace(OFF, s=2.0))
+    assert not may_lower(True, FinishState(), stalls, off, P)
+    # a garment that is held in the end is not laid, and nobody lowers the arms for it
+    assert not may_lower(True, FinishState(), stalls, facts, replace(P, release=False))
+
+
+@pytest.mark.parametrize("phase", [Phase.LAYING, Phase.LAID, Phase.RELEASED])
+def test_arms_are_lowered_while_the_coat_is_laid(phase: Phase) -> None:
+    assert may_lower(False, FinishState(phase), (0, 0), (ON, ON), P)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drake_dress.models.human.lowering import least_lift, lowered, next_share
+from drake_dress.models.human.lowering import least_lift, longer, lowered, next_share
 
 POSE = np.array([0.2, 0.1, 0.0, 0.3])
 angles = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).map(np.array)
@@ -110,3 +110,14 @@ def test_a_way_that_is_free_needs_no_lift() -> None:
     # an arm that touches the chair at the start or in the end does not have to leave it
     touching = least_lift(lambda q: np.full(2, -0.01), start, pose)
     np.testing.assert_array_equal(touching, 0.0)
+
+
+@given(q=angles, lift=st.floats(0.0, 1.2))
+def test_a_way_with_a_lift_is_longer(q: np.ndarray, lift: float) -> None:
+    start, pose = np.stack([q, q]), np.stack([POSE, POSE])
+    both = longer(start, pose, np.array([lift, 0.0]))
+    assert both >= 1.0
+    assert longer(start, pose, np.zeros(2)) == 1.0
+    if lift > 0.0:
+        direct = float(np.linalg.norm(POSE - q))
+        assert both * max(direct, 1e-6) >= 2.0 * lift - abs(POSE[0] - q[0]) - 0.05 * lift - 1e-9
