@@ -96,9 +96,9 @@ def scene(
 ) -> Scene:
     """Returns a person who stands, or sits in a wheelchair."""
     builder = DiagramBuilder()
-    scene_graph = builder.AddSystem(SceneGraph())
     plant = builder.AddSystem(MultibodyPlant(PERIOD))
-    if chair is not None:
+    if chair is not None:  # arms touch it
+        scene_graph = builder.AddSystem(SceneGraph())
         plant.RegisterAsSourceForSceneGraph(scene_graph)
     posture: Posture = "standing" if chair is None else "sitting"
     person = add_person(plant, M, posture, poses, joints, turns=behaviour.turns, chair=chair)

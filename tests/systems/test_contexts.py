@@ -128,7 +128,7 @@ class _Policy(DressingPolicy):
         plan = SimpleNamespace(velocity=np.full((n, 2, 3), asked), armhole=np.zeros((n, 2, 3)))
         after = SimpleNamespace(shown=state.shown, finish=state.finish, before=asked)
         return after, SimpleNamespace(
-            plan=plan, assignment="some", target=np.zeros((n, 2, 3)), release=False
+            plan=plan, assignment="some", target=np.zeros((n, 2, 3)), release=False, lowers=False
         )
 
 
