@@ -20,7 +20,7 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, Out
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain
 
 from drake_dress.diagrams.person import Person, angles_of
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.arm import Arms
@@ -146,15 +146,14 @@ def _add_lowering(
     """Adds the system that lowers the arms to `pose` (2,4), rad; around a chair, if any."""
     around, chair = None, [c for c in person.capsules if c.part == CHAIR]
     if chair:
-        own = person.own_dofs(plant)
-        mine = [int(np.flatnonzero(own == d)[0]) for d in person.arm_dofs(plant)]
+        mine = _arms_among_own(plant, person)
         measures = arms.arms[0].measures
 
         def room(angles: FloatArray) -> FloatArray:
             poses = {side: ArmPose(*q.tolist()) for side, q in zip(SIDES, angles, strict=True)}
             return np.array(distance_of_arms(chair, measures, poses))
 
-        around = Around(room, mine, 2 * len(own))
+        around = Around(room, mine, 2 * len(person.own_dofs(plant)))
     lowering: ArmLowering = builder.AddNamedSystem(
         "arm_lowering", ArmLowering(pose, duration, plant.time_step(), around)
     )
@@ -162,6 +161,12 @@ def _add_lowering(
         state = plant.get_state_output_port(person.model)
         builder.Connect(state, lowering.GetInputPort("person_state"))
     return lowering
+
+
+def _arms_among_own(plant: MultibodyPlant, person: Person) -> IndexArray:
+    """Returns the indices (8,) of the arms' joints in the person's own velocities."""
+    own = person.own_dofs(plant)
+    return np.array([np.flatnonzero(own == d)[0] for d in person.arm_dofs(plant)], dtype=np.intp)
 
 
 def _muscles(
@@ -176,7 +181,7 @@ def _muscles(
 ) -> tuple[OutputPort, LeafSystem]:
     """Returns the port of the muscles' forces, and the system that outputs their set-points."""
     own, dofs = person.own_dofs(plant), person.arm_dofs(plant)
-    mine = np.array([int(np.flatnonzero(own == d)[0]) for d in dofs])
+    mine = _arms_among_own(plant, person)
     muscles = builder.AddNamedSystem("arm_muscles", ArmMuscles(arms, plant.num_velocities(), dofs))
     period = plant.time_step()
     if behaviour.kind == "passive":

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import FloatArray, IndexArray
 from drake_dress.models.human.lowering import least_lift, longer, lowered, next_share
 
 
@@ -23,7 +23,7 @@ class Around:
     """
 
     room: Callable[[FloatArray], FloatArray]
-    angles: Sequence[int]
+    angles: IndexArray
     state_size: int
 
 
@@ -43,7 +43,7 @@ class ArmLowering(LeafSystem):
         - lowered_set_point_rate
 
     set_point, set_point_rate: (8,) abduction, extension, rotation, elbow of the left, then the
-    right arm, rad, rad/s. told: (1,) above 0.5 while the person is told that both sleeves are on;
+    right arm, rad, rad/s. told: (1,) above 0.5 while the person is told to lower the arms;
     never, if not connected. person_state: (2d,) positions and velocities of the person's joints,
     rad, rad/s; only with `around`. Outputs: as the inputs, lowered; see
     `models/human/lowering.py`.
@@ -82,7 +82,7 @@ class ArmLowering(LeafSystem):
         longer_by = float(context.get_discrete_state(self._longer).value()[0])
         if self._around is not None and before == 0.0 and is_told:
             state: FloatArray = self._person.Eval(context)
-            start = state[list(self._around.angles)].reshape(2, 4)
+            start = state[self._around.angles].reshape(2, 4)
             lift = least_lift(self._around.room, start, self._pose)
             longer_by = longer(start, self._pose, lift)
             discrete.set_value(self._lift, lift)

@@ -254,7 +254,7 @@ class DressingPolicy:
                 p.time_step,
             )
             plan = self._moving(x, back, "released")
-            return state, Decision(plan, assignment, target, lowers=True)
+            return state, Decision(plan, assignment, target, lowers=lowers)
         if not p.plans:
             return state, Decision(
                 self._moving(x, 0.0 * state.velocity, "no_plan"), assignment, target

@@ -110,11 +110,8 @@ def least_lift(
     """
     asked = np.minimum(_ROOM, np.minimum(room(start), room(pose)))
     best, most = np.zeros(2), np.full(2, -np.inf)
-    zero = np.zeros_like(start)
     for lift in _LIFTS:
-        both = np.full(2, lift)
-        shares = np.linspace(0.0, 1.0, _SAMPLES)
-        way = [lowered(start, zero, pose, share, 1.0, both)[0] for share in shares]
+        way = _way(start, pose, np.full(2, lift))
         least = np.min([room(angles) for angles in way], axis=0)
         better = (most < asked - 1e-9) & (least > most)
         best, most = np.where(better, lift, best), np.where(better, least, most)
@@ -131,15 +128,20 @@ def longer(start: FloatArray, pose: FloatArray, lift: FloatArray) -> float:
         pose: (2,4) in the end, rad.
         lift: (2,) of the arms on the way, rad.
     """
-    zero, shares = np.zeros_like(start), np.linspace(0.0, 1.0, _SAMPLES)
 
     def length(lifts: FloatArray) -> FloatArray:
-        way = np.stack([lowered(start, zero, pose, share, 1.0, lifts)[0] for share in shares])
-        total: FloatArray = np.linalg.norm(np.diff(way, axis=0), axis=2).sum(axis=0)
+        steps = np.diff(_way(start, pose, lifts), axis=0)
+        total: FloatArray = np.linalg.norm(steps, axis=2).sum(axis=0)
         return total
 
     ratio = length(lift) / np.maximum(length(np.zeros(2)), 1e-6)
     return float(np.max(ratio, initial=1.0, where=lift > 0.0))
+
+
+def _way(start: FloatArray, pose: FloatArray, lift: FloatArray) -> FloatArray:
+    """Returns samples (k,2,4), rad, of the way down of arms that begin at rest."""
+    zero, shares = np.zeros_like(start), np.linspace(0.0, 1.0, _SAMPLES)
+    return np.stack([lowered(start, zero, pose, share, 1.0, lift)[0] for share in shares])
 
 
 def next_share(share: float, is_told: bool, duration: float, period: float) -> float:
