@@ -21,9 +21,8 @@ from benchmarks.dressing.cases import PERSONS, SCENARIOS
 from benchmarks.dressing.cases import VARIATIONS as DRESSING
 from benchmarks.study import run_case
 from drake_dress.diagrams.scenario import Scenario, load_scenario
-from drake_dress.diagrams.scenario.drawn_coat import draw_coat, in_size
+from drake_dress.diagrams.scenario.drawn_coat import draw_coat, in_size, own_size
 from drake_dress.diagrams.scenario.schema import Coat
-from drake_dress.models.garment.coat import body_of_size
 from drake_dress.models.human.skin.drawing import draw_phenotype
 from drake_dress.models.human.skin.measures import skin_measures
 from drake_dress.models.human.skin.phenotype import Phenotype, phenotype_skin
@@ -97,8 +96,7 @@ def coat_of(case: Case) -> Coat:
 
 def size_for(body: int, table: str) -> str:
     """Returns the person's own size: that whose chest is nearest to the tape's around theirs."""
-    chest = _chest_of(body)
-    return min(SIZES, key=lambda code: abs(body_of_size(table, code).chest - chest))
+    return own_size(table, _chest_of(body), SIZES)
 
 
 def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.errors import UserError
-from drake_dress.models.garment.coat import COATS, make_coat, size_codes
+from drake_dress.models.garment.coat import COATS, body_of_size, make_coat, size_codes
 
 # Relative width of a measure's own variation: makers differ by this in coats of one size.
 MEASURE_WIDTH = 0.03
@@ -81,6 +81,21 @@ def in_size(coat: Coat, size: str) -> Coat:
         if given is not None and own and other is not None:
             setattr(found, name, float(given * other / own))
     return found
+
+
+def own_size(table: str, chest: float, codes: Sequence[str] | None = None) -> str:
+    """Returns the size of a table whose body has the chest girth nearest to `chest`, m.
+
+    Args:
+        table: of sizes.
+        chest: girth, as a tape measures it, m.
+        codes: sizes to choose from; None for all of the table.
+
+    Raises:
+        UserError: there is no such table.
+    """
+    codes = size_codes(table) if codes is None else codes
+    return min(codes, key=lambda code: abs(body_of_size(table, code).chest - chest))
 
 
 def _one_of(rng: np.random.Generator, words: Sequence[str]) -> str:

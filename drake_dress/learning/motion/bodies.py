@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -14,14 +13,15 @@ from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.geodesics import Reach, reach
 from drake_dress.models.human.arm import Arm
 from drake_dress.models.human.body import BodyMeasures, Posture
-from drake_dress.models.human.measures import FOREARM_MASS, UPPER_ARM_MASS
+from drake_dress.models.human.skin.drawing import draw_phenotype
+from drake_dress.models.human.skin.measures import body_values, skin_measures
+from drake_dress.models.human.skin.phenotype import phenotype_skin
 from drake_dress.models.sides import SIDES
 
 _SITTING = 0.35  # share of persons who sit
-# Stature of adults and of tall children over that of the preset. Each measure varies besides:
-# standard deviation, and the number of these at which it is cut off.
-_STATURE = 0.78, 1.18
-_MEASURE, _OUTLIERS = 0.07, 2.5
+# Adults of one sex, age, height and weight differ in each measure besides: relative standard
+# deviation, and the number of these at which it is cut off.
+_MEASURE, _OUTLIERS = 0.035, 2.5
 # Comfortable poses, rad: abduction, extension, rotation, elbow; arms that hang, that are held
 # forward, or that lie in the lap. A share of persons offer their arms to a coat behind them: nearly
 # straight, and held back.
@@ -104,19 +104,14 @@ def draw_reach(rng: np.random.Generator) -> Reach:
 
 
 def _draw_measures(rng: np.random.Generator) -> BodyMeasures:
-    # sizes that follow from others are not drawn
-    plain = {f.name: f.default for f in fields(BodyMeasures) if isinstance(f.default, float)}
-    plain |= {"upper_arm_mass": UPPER_ARM_MASS, "forearm_mass": FOREARM_MASS}
     for _ in range(_ATTEMPTS):
-        scale = rng.uniform(*_STATURE)
-        values: dict[str, Any] = {}
-        for name, default in plain.items():
-            # a body that is a tenth larger in all lengths weighs a third more
-            whole = scale**3 if name.endswith("mass") else scale
-            own = 1.0 + _MEASURE * float(np.clip(rng.normal(), -_OUTLIERS, _OUTLIERS))
-            values[name] = default * whole * own
+        values = body_values(skin_measures(phenotype_skin(draw_phenotype(rng))))
+        own = np.clip(rng.normal(size=len(values)), -_OUTLIERS, _OUTLIERS)
+        factors = (1.0 + _MEASURE * own).tolist()
+        drawn = {name: values[name] * factor for name, factor in zip(values, factors, strict=True)}
         try:
-            return BodyMeasures(**values)
+            return BodyMeasures(**drawn)
         except UserError:
+            # measures that make no person
             continue
     return BodyMeasures()

@@ -17,6 +17,7 @@ import numpy as np
 from drake_dress import __version__
 from drake_dress.cluster import completed_on
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.scenario.drawn_coat import own_size
 from drake_dress.errors import FailedError
 from drake_dress.file_output import RUN_FILES
 from drake_dress.interrupt import Interrupt
@@ -30,6 +31,9 @@ from drake_dress.models.dressing.linking import arm_linking_number, torso_interi
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
 from drake_dress.models.human.active import ActiveParameters
 from drake_dress.models.human.motions import Wave
+from drake_dress.models.human.skin.drawing import draw_phenotype
+from drake_dress.models.human.skin.measures import skin_measures
+from drake_dress.models.human.skin.phenotype import phenotype_skin
 from drake_dress.models.sides import SIDES
 from drake_dress.report.log import RunLog
 from drake_dress.report.summary import read_summary
@@ -46,8 +50,9 @@ _SCENARIOS: dict[Person, str] = {
     "active": "active_standing",
 }
 _VARIED = "dummy_varied"  # the scenario whose variation of coat, body and pose is used
-# Keeps the draws of motions apart from those of a run's variation, which has the seed itself.
-_OF_MOTIONS = 3
+# Keep the draws of motions and bodies apart from those of a run's variation, which has the seed
+# itself.
+_OF_MOTIONS, _OF_BODY = 3, 4
 # Motions of an active person, and how probable each but the first is.
 _WITHIN, _PUSH = (0.2, 0.3), 0.05  # reach, m
 _PROBABLE = 0.5
@@ -87,7 +92,7 @@ class Dressing:
     def settings(self) -> list[str]:
         """Returns the KEY=VALUE settings of its scenario."""
         varied = load_scenario(shipped_scenario(_VARIED)).variation
-        settings = ["plant.fidelity=quick", f"log.rate={_RATE:g}"]
+        settings = ["plant.fidelity=quick", f"log.rate={_RATE:g}", *_body_and_coat(self.seed)]
         settings += [f"variation.{name}={value}" for name, value in vars(varied).items()]
         if self.person == "active":
             settings.append(f"person.behaviour.motions={json.dumps(draw_motions(self.seed))}")
@@ -102,6 +107,16 @@ def drawn_dressings(count: int, seed: int) -> list[Dressing]:
     persons = [PERSONS[n % len(PERSONS)] for n in range(count)]
     seeds = drawn_seeds("report", count, seed)
     return [Dressing(n, *each) for n, each in enumerate(zip(persons, seeds, strict=True))]
+
+
+def _body_and_coat(seed: int) -> list[str]:
+    """Returns the settings of a drawn adult and of a jacket in their size."""
+    person = draw_phenotype(np.random.default_rng((seed, _OF_BODY)))
+    chest, _, _ = skin_measures(phenotype_skin(person)).trunk.chest
+    table = "women" if person.sex == "female" else "men"
+    coat = {"preset": "jacket", "size_table": table, "size": own_size(table, chest)}
+    body = {key: getattr(person, key) for key in ("sex", "age", "height", "weight")}
+    return [f"garment.coat={json.dumps(coat)}", f"person.body={json.dumps(body)}"]
 
 
 def draw_motions(seed: int) -> list[dict[str, dict[str, Any]]]:

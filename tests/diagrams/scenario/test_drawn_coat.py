@@ -7,11 +7,11 @@ import pytest
 
 from drake_dress.diagrams.scenario import Scenario
 from drake_dress.diagrams.scenario.coat import COAT_MEASURES, coat_parameters
-from drake_dress.diagrams.scenario.drawn_coat import MEASURE_WIDTH, draw_coat, in_size
+from drake_dress.diagrams.scenario.drawn_coat import MEASURE_WIDTH, draw_coat, in_size, own_size
 from drake_dress.diagrams.scenario.loading import checked_scenario
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.errors import UserError
-from drake_dress.models.garment.coat import COATS
+from drake_dress.models.garment.coat import COATS, body_of_size, size_codes
 
 
 def drawn(seed: int, count: int) -> list[Coat]:
@@ -92,3 +92,12 @@ def test_in_another_size_a_coat_keeps_its_ratios_to_the_cut_and_comes_back() -> 
     assert in_size(Coat(size="M"), "L") == Coat(size="L")
     with pytest.raises(UserError, match="expected one of"):
         in_size(coat, "7XL")
+
+
+@pytest.mark.parametrize("table", ["women", "men", "children"])
+def test_the_body_of_a_size_has_this_size(table: str) -> None:
+    for code in size_codes(table):
+        chest = body_of_size(table, code).chest
+        for near in (chest - 1e-3, chest + 1e-3):
+            assert body_of_size(table, own_size(table, near)).chest == chest
+    assert own_size("men", 1.0, ["S", "3XL"]) == "S"

@@ -18,7 +18,7 @@ def test_a_comfortable_pose_is_within_the_limits() -> None:
     assert postures == {"standing", "sitting"}
 
 
-def test_persons_differ_in_size_like_adults_and_tall_children() -> None:
+def test_persons_differ_in_size_like_adults() -> None:
     lengths = [draw_person(np.random.default_rng(s)).arms[0].length for s in range(50)]
     assert 0.38 < min(lengths) < 0.55
     assert 0.65 < max(lengths) < 0.85

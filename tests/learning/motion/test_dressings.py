@@ -26,6 +26,7 @@ from drake_dress.learning.motion.making import Workplace
 from drake_dress.learning.motion.motion_file import MotionFile
 from drake_dress.learning.motion.sequence import is_moving
 from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
+from drake_dress.models.garment.coat import body_of_size
 from drake_dress.report.log import RunLog
 from tests.report.synthetic import coat, dressing, write
 
@@ -58,6 +59,13 @@ def test_settings_are_those_of_a_scenario(run: Dressing) -> None:
     assert scenario.plant.fidelity == "quick"
     assert scenario.log.rate == 20.0
     assert scenario.variation.coat_measures > 0.0
+    body, coat = scenario.person.body, scenario.garment.coat
+    assert body is not None
+    assert coat.size_table == ("women" if body.sex == "female" else "men")
+    # the trunk's ellipse is narrower than a tape around the chest
+    ellipse = np.pi * (scenario.person.measures.chest_width + scenario.person.measures.chest_depth)
+    assert coat.size is not None
+    assert 0.0 <= body_of_size(coat.size_table, coat.size).chest - 0.5 * ellipse < 0.35
     assert scenario.variation.arm_angle_deg > 0.0
     behaviour = scenario.person.behaviour
     assert behaviour.kind == ("active" if run.person == "active" else "passive")
