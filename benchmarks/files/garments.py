@@ -8,11 +8,13 @@ import numpy as np
 
 from benchmarks.files.surface import kept, zero_level
 from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.garment.edges import border_edges
 from drake_dress.models.garment.files.raw import RawMesh
 from drake_dress.models.garment.mend import mended
 
 _STEP = 0.03  # of the grid, m
 _BLEND = 0.03  # width over which trunk and sleeve are blended, m
+_IN_PLANE = 0.01  # largest distance of a cuff's edges from its plane, m
 _WALL = 0.9  # share of the cuff's plane at which the sleeve's radius is the cuff's
 
 
@@ -50,7 +52,8 @@ class Made:
 
     Attributes:
         x: (n,3), m; faces: (F,3), counter-clockwise seen from outside.
-        cuffs: middle (3,) of each cuff, m, by side; cuff_girth: m.
+        cuffs: middle (3,) of each cuff, m, by side.
+        cuff_girths: of each cuff, as the mesh has it, m, by side.
         armholes: where each sleeve begins, (3,) m, by side.
         front: `front` if it is open, else `closed`.
     """
@@ -58,7 +61,7 @@ class Made:
     x: FloatArray
     faces: IntArray
     cuffs: dict[str, FloatArray]
-    cuff_girth: float
+    cuff_girths: dict[str, float]
     armholes: dict[str, FloatArray]
     front: str
 
@@ -137,7 +140,18 @@ def make(cut: Cut) -> Made:
     ends = {side: start + cut.sleeve * along for side, (start, along) in sides(cut).items()}
     begins = {side: start for side, (start, _) in sides(cut).items()}
     front = "front" if cut.is_open else "closed"
-    return Made(x, faces, ends, 2.0 * np.pi * cut.cuff, begins, front)
+    girths = {side: _cuff_girth(cut, side, x, faces) for side in ends}
+    return Made(x, faces, ends, girths, begins, front)
+
+
+def _cuff_girth(cut: Cut, side: str, x: FloatArray, faces: IntArray) -> float:
+    """Returns the length of all border edges in the plane of a cuff, m."""
+    start, along = sides(cut)[side]
+    ends = x[border_edges(faces, len(x))]
+    offset = ends.mean(axis=1) - start - cut.sleeve * along
+    flat = np.abs(offset @ along) < _IN_PLANE
+    near = np.linalg.norm(offset, axis=1) < 2.0 * cut.upper
+    return float(np.linalg.norm(ends[flat & near, 1] - ends[flat & near, 0], axis=1).sum())
 
 
 def near_sleeve(cut: Cut, x: FloatArray) -> FloatArray:

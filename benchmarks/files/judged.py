@@ -23,7 +23,7 @@ from drake_dress.models.sides import SIDES
 MOST_KEYS = 3
 # What may differ: places of the cloth, m; its area and the cuffs' girth, as shares; places of the
 # openings, m.
-_OFF, _AREA, _GIRTH, _PLACE = 0.01, 0.03, 0.08, 0.03
+_OFF, _AREA, _GIRTH, _PLACE = 0.01, 0.03, 0.03, 0.03
 # Farthest place of an armhole from where the sleeve leaves the trunk, m.
 _ARMHOLE = 0.2
 
@@ -97,8 +97,8 @@ def unlike(whole: WholeGarment, made: Made) -> str:
     for side in SIDES:
         cuff, armhole = whole.loops[f"{side}_cuff"], whole.loops[f"{side}_armhole"]
         girth = loop_length(x, cuff)
-        if abs(girth / made.cuff_girth - 1.0) > _GIRTH:
-            return f"the {side} cuff is {girth:.3f} m around, not {made.cuff_girth:.3f} m"
+        if abs(girth / made.cuff_girths[side] - 1.0) > _GIRTH:
+            return f"the {side} cuff is {girth:.3f} m around, not {made.cuff_girths[side]:.3f} m"
         away = np.linalg.norm(x[cuff].mean(axis=0) - made.cuffs[side])
         if away > _PLACE:
             return f"the {side} cuff is {away:.3f} m from its place"

@@ -39,10 +39,21 @@ def duplicates_merged(mesh: RawMesh) -> RawMesh:
 def seams_sewn(mesh: RawMesh, distance: float) -> RawMesh:
     """Returns the mesh with border edges that lie side by side joined.
 
+    A joined edge brings the ends of its neighbours together, so this is repeated until nothing
+    more is joined.
+
     Args:
         mesh: without duplicate nodes.
         distance: largest distance between the ends of two edges.
     """
+    while True:
+        sewn = _sewn_once(mesh, distance)
+        if len(sewn.position) == len(mesh.position):
+            return sewn
+        mesh = sewn
+
+
+def _sewn_once(mesh: RawMesh, distance: float) -> RawMesh:
     x, n = mesh.position, len(mesh.position)
     border = border_edges(mesh.faces, n)
     if len(border) < 2 or distance <= 0.0:

@@ -52,6 +52,17 @@ def test_seams_within_the_distance_are_sewn_and_nothing_else(gap: float, seed: i
 
 
 @settings(max_examples=25)
+@given(st.floats(5e-3, 3e-2), st.integers(0, 2**32 - 1))
+def test_what_is_sewn_lets_nothing_more_be_sewn(gap: float, seed: int) -> None:
+    mesh, origin = in_panels(quadrants(), gap, seed)
+    sewn = seams_sewn(mesh, gap)
+    assert len(sewn.position) < len(mesh.position)
+    assert len(seams_sewn(sewn, gap).position) == len(sewn.position)
+    assert sewn.became.shape == origin.shape
+    assert sewn.became.max() == len(sewn.position) - 1
+
+
+@settings(max_examples=25)
 @given(st.floats(0.0, 0.02))
 def test_a_sound_mesh_stays_as_it_is(distance: float) -> None:
     mesh = RawMesh.of("coat", X, FACES)
