@@ -22,6 +22,7 @@ from benchmarks.dressing.cases import VARIATIONS as DRESSING
 from benchmarks.study import run_case
 from drake_dress.diagrams.scenario import Scenario, load_scenario
 from drake_dress.diagrams.scenario.drawn_coat import draw_coat, in_size, own_size
+from drake_dress.diagrams.scenario.edges import AT_EDGES
 from drake_dress.diagrams.scenario.schema import Coat
 from drake_dress.models.human.skin.drawing import draw_phenotype
 from drake_dress.models.human.skin.measures import skin_measures
@@ -35,8 +36,6 @@ VARIATIONS = {"few": DRESSING["few"], "none": "{}"}
 SIZES = ("XS", "S", "M", "L", "XL", "XXL", "3XL", "4XL", "5XL")
 # Sizes of the coat, counted from the person's own.
 STEPS = (-1, 0, 1, 2)
-# Where coats are held, and the largest force, N: at 16 N edges at the neck strain by a tenth.
-_HELD = ("garment.hold=edges", "safety.force_limit=14", "safety.soft_force_limit=7.5")
 # First numbers of the generators' seeds.
 _CUT, _BODY, _PAIR = 1, 2, 3
 _DIGITS = 5  # of a coat's measures, m
@@ -109,7 +108,7 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
         f"garment.coat={json.dumps(keys)}",
         f"person.body={json.dumps(body)}",
         f"variation={VARIATIONS[case.variation]}",
-        *_HELD,
+        *AT_EDGES,
         *overrides,
     ]
 

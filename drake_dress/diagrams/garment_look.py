@@ -18,6 +18,7 @@ from drake_dress.diagrams.scenario import (
     load_scenario,
     resolved_yaml,
 )
+from drake_dress.diagrams.scenario.edges import at_edges
 from drake_dress.diagrams.scenario.schema import Coat, Mesh
 from drake_dress.diagrams.sections.person import measures
 from drake_dress.file_output import GARMENT_FILES, claimed, write_text
@@ -53,9 +54,8 @@ class Subject:
         """Returns the subject and its mesh as it is best held."""
         if not self.picks_hold or front_of(mesh) == "closed":
             return self, mesh
-        garment = replace(self.scenario.garment, hold="edges")
-        scenario = replace(self.scenario, garment=garment)
-        return replace(self, scenario=scenario), as_held(mesh, garment)
+        scenario = at_edges(self.scenario)
+        return replace(self, scenario=scenario), as_held(mesh, scenario.garment)
 
 
 def garment_source(given: str) -> tuple[Path, bool]:

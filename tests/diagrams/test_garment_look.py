@@ -14,6 +14,7 @@ import pytest
 from drake_dress.__main__ import main
 from drake_dress.diagrams.garment import build_garment
 from drake_dress.diagrams.scenario import load_scenario
+from drake_dress.diagrams.scenario.edges import at_edges
 from drake_dress.file_output import GARMENT_FILES
 from drake_dress.models.arrays import FloatArray
 from drake_dress.models.garment.coat import COATS, make_coat
@@ -90,7 +91,7 @@ def test_a_file_becomes_a_scenario_with_its_path_beside_the_scenario(
     mesh = present(written.garment.mesh)
     assert mesh.file == "../../from/it's a: coat #1.obj"
     base = load_scenario(SCENARIOS / "dummy_standing.yaml")
-    assert replace(written, garment=base.garment) == base
+    assert replace(written, garment=base.garment) == replace(at_edges(base), garment=base.garment)
     assert written.garment.hold == "edges"
     words += ["--set", "garment.hold=shoulders"]
     assert main(["garment", "it's a: coat #1.obj", *words]) == 0
