@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ def run_scenario(
     seed: int | None = None,
     report: bool = True,
     one_process: bool = True,
+    checkout: Path | None = None,
 ) -> tuple[int, str]:
     """Returns the exit status, and why the run gave no result (empty if it gave one).
 
@@ -25,6 +27,7 @@ def run_scenario(
         seed: Seed of the run; None for the scenario's own.
         report: Whether to write report and replay in addition to log and summary.
         one_process: Whether to use one process only, which leaves other cores to parallel runs.
+        checkout: Version of the code that runs it; None for this one.
     """
     command = [sys.executable, "-m", "drake_dress", "run", str(scenario), "--no-meshcat"]
     command += ["--out", str(out)]
@@ -36,7 +39,10 @@ def run_scenario(
         command += ["--seed", str(seed)]
     for item in overrides:
         command += ["--set", item]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    environment = None if checkout is None else {**os.environ, "PYTHONPATH": str(checkout)}
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=checkout, env=environment
+    )
     if done.returncode in (0, 1):
         return done.returncode, ""
     return done.returncode, f"exit {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"

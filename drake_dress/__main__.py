@@ -57,6 +57,7 @@ BENCHMARKS = {
     "predictors": "active persons dressed with each predictor of their motion",
     "transfer": "dressings with MuJoCo as the world, beside the package's own simulation",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
+    "realtime": "real-time factor of a dressing, beside an earlier version of the code",
     "repeat": "whether the same seed gives the same log bit for bit under any load",
     "mutation": "share of mutants of central modules that the tests detect",
 }

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from drake_dress.diagrams.scenario.schema import Scenario, Stages
 
-# N: the pull of both edges runs around the neck, where 16 N strain a hundredth of the edges by 10 %.
+# N: the pull of both edges runs around the neck, where 16 N strain a hundredth of the mesh's edges
+# by 10 %.
 _FORCE, _SOFT_FORCE = 14.0, 7.5
 # Misses of the second hand after which its sleeve swings back. Held at the edges, a coat that has
 # missed twice lies before the hand, and further attempts end in the same way (docs/coats.md).

@@ -1,0 +1,1 @@
+"""How fast a dressing runs, beside an earlier version of the code."""
