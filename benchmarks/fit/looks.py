@@ -16,7 +16,7 @@ from drake_dress.diagrams.garment_fit import judged
 from drake_dress.errors import UserError
 from drake_dress.interrupt import Interrupt, caught_interrupt
 from drake_dress.models.garment.fit import Fit
-from drake_dress.models.garment.fit.judge import ARMHOLE, BACK, CUFF
+from drake_dress.models.garment.fit.judge import ARMHOLE_AT_EDGES, BACK, CUFF
 from drake_dress.side_by_side import completed
 
 # What the look calls a garment, in order of the verdict.
@@ -25,7 +25,7 @@ FITTING, TOO_TIGHT = CALLED[:2], CALLED[2]
 # Of which the tightest is looked for: key of a coat, or `back_width`.
 MEASURES = ("cuff_girth", "armhole_girth", "back_width")
 # The limits that verdicts follow from; verdicts by other limits are made anew.
-_LIMITS = [list(astuple(limits)) for limits in (CUFF, ARMHOLE, BACK)]
+_LIMITS = [list(astuple(limits)) for limits in (CUFF, ARMHOLE_AT_EDGES, BACK)]
 _TOLD = 30  # looks between two lines of progress
 
 Looks = Mapping[str, dict[str, Any]]

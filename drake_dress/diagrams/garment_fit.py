@@ -45,7 +45,11 @@ class Judged:
 
 
 def judged(
-    garment: schema.Garment, person: schema.Person, spacings: tuple[float, float], base: Path
+    garment: schema.Garment,
+    person: schema.Person,
+    spacings: tuple[float, float],
+    base: Path,
+    at_edges: bool | None = None,
 ) -> Judged:
     """Returns the verdict on a garment and a person.
 
@@ -54,10 +58,12 @@ def judged(
         person: who is to wear it.
         spacings: of a coat, and of the mesh on which distances over the cloth are measured, m.
         base: directory that a mesh file's name is relative to.
+        at_edges: whether it is to be held at the edges of its opening; None as it says itself.
 
     Raises:
         UserError: the garment cannot be used.
     """
+    at_edges = garment.hold == "edges" if at_edges is None else at_edges
     fine, coarse = spacings
     simple = build_garment(garment, coarse, base)
     if garment.mesh is not None:
@@ -66,7 +72,7 @@ def judged(
         mesh = build_garment(garment, fine, base)
     sizes = garment_sizes(mesh, simple)
     girths = person_girths(measures(person))
-    return Judged(mesh, sizes, girths, judge(sizes, girths))
+    return Judged(mesh, sizes, girths, judge(sizes, girths, at_edges))
 
 
 def check_fit(setup: Setup) -> None:
@@ -80,7 +86,8 @@ def check_fit(setup: Setup) -> None:
     if garment.mesh is not None:
         mesh = read_whole(garment.mesh, setup.source.parent).mesh()
     girths = person_girths(setup.station.measures)
-    fit = judge(garment_sizes(mesh, setup.garments.belief), girths)
+    sizes = garment_sizes(mesh, setup.garments.belief)
+    fit = judge(sizes, girths, garment.hold == "edges")
     from_front = setup.scenario.station.side == "front"
     for finding in (*fit.impossible, *fit.reasons):
         if finding.level == "unknown" and from_front:

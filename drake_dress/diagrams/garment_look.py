@@ -112,7 +112,8 @@ def look_at(subject: Subject, out: Path) -> GarmentLook:
     drawn = apply_variation(subject.scenario)
     garment = drawn.garment
     spacings = (drawn.plant.spacing, drawn.controller.spacing)
-    found: Judged = judged(garment, drawn.person, spacings, subject.base)
+    at_edges = True if subject.picks_hold else None
+    found: Judged = judged(garment, drawn.person, spacings, subject.base, at_edges)
     body: BodyMeasures = measures(drawn.person)
     mended = () if garment.mesh is None else read_whole(garment.mesh, subject.base).notes
     subject, mesh = subject.held(found.mesh)

@@ -15,7 +15,7 @@ from drake_dress.diagrams.setup import read_setup
 from drake_dress.errors import UserError
 from drake_dress.models.garment.coat import COATS, make_coat
 from drake_dress.models.garment.fit import Finding, Fit, person_girths
-from drake_dress.models.garment.fit.judge import ARMHOLE, CUFF
+from drake_dress.models.garment.fit.judge import ARMHOLE, ARMHOLE_AT_EDGES, CUFF
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import BodyMeasures
 from tests.closed_coat import closed_coat
@@ -178,3 +178,12 @@ def test_a_scale_that_cannot_be_used_is_not_advised(settings: list[str], told: s
     measures = [f"{key}={value}" for key, value in advice.measures.items()]
     assert len(measures) == 1
     assert fit_of(load_scenario(DUMMY, [large, *settings, *measures])).reasons == ()
+
+
+def test_a_coat_held_at_its_edges_may_have_narrower_armholes() -> None:
+    girth = 0.5 * (ARMHOLE_AT_EDGES.fails + ARMHOLE.fails) * PERSON.upper_arm
+    told = {}
+    for hold in ("shoulders", "edges"):
+        settings = [*COARSE, f"garment.coat.armhole_girth={girth:.4f}", f"garment.hold={hold}"]
+        told[hold] = fit_of(load_scenario(DUMMY, settings)).fits
+    assert told == {"shoulders": False, "edges": True}

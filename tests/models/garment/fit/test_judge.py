@@ -9,7 +9,15 @@ import pytest
 
 from drake_dress.models.garment.coat import COATS, CoatParameters, make_coat
 from drake_dress.models.garment.fit.girths import PersonGirths, person_girths
-from drake_dress.models.garment.fit.judge import ARMHOLE, BACK, CUFF, Fit, Limits, judge
+from drake_dress.models.garment.fit.judge import (
+    ARMHOLE,
+    ARMHOLE_AT_EDGES,
+    BACK,
+    CUFF,
+    Fit,
+    Limits,
+    judge,
+)
 from drake_dress.models.garment.fit.sizes import GarmentSizes, garment_sizes
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.body import BodyMeasures
@@ -92,14 +100,19 @@ def test_a_front_that_opens_at_the_back_is_not_judged() -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(
-    ("name", "limits", "girth"),
-    [("cuff", CUFF, PERSON.hand), ("armhole", ARMHOLE, PERSON.upper_arm)],
+    ("name", "limits", "girth", "at_edges"),
+    [
+        ("cuff", CUFF, PERSON.hand, False),
+        ("cuff", CUFF, PERSON.hand, True),
+        ("armhole", ARMHOLE, PERSON.upper_arm, False),
+        ("armhole", ARMHOLE_AT_EDGES, PERSON.upper_arm, True),
+    ],
 )
 def test_a_girth_is_told_just_below_its_limits(
-    side: str, name: str, limits: Limits, girth: float
+    side: str, name: str, limits: Limits, girth: float, at_edges: bool
 ) -> None:
     def at(ratio: float) -> Fit:
-        return judge(with_girths(SIZES, **{f"{side}_{name}": ratio * girth}), PERSON)
+        return judge(with_girths(SIZES, **{f"{side}_{name}": ratio * girth}), PERSON, at_edges)
 
     assert at(limits.wanted + 1e-3).reasons == ()
     narrow = at(limits.least - 1e-3)
