@@ -146,8 +146,9 @@ def _sleeve_rows(summary: dict[str, Any], rules: SuccessRules) -> list[_Row]:
     rows = []
     for side in SIDES:
         s = summary.get(f"s_dressed_{side}")
-        met = s is not None and s >= rules.min_s
-        rows.append(_Row(f"progress s, {side}", f"≥ {rules.min_s:g}", _figure(s, "{:.2f}"), met))
+        asked = summary.get(f"s_asked_{side}") or rules.min_s
+        met = s is not None and s >= asked
+        rows.append(_Row(f"progress s, {side}", f"≥ {asked:g}", _figure(s, "{:.2f}"), met))
     if summary.get("stays_on") is not None:
         rows += _release_rows(summary, rules)
     for side in SIDES:

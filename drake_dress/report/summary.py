@@ -34,7 +34,11 @@ class SuccessRules:
     """Success criteria of a dressing.
 
     Attributes:
-        min_s: Least progress s of both sleeves at the end; 2 is the shoulder.
+        min_s: Least progress s of both sleeves when the coat is laid; 2 is the shoulder.
+        min_hanging_s: The same of a sleeve whose arm hangs. An armhole that hangs on the shoulder
+            of a lowered arm lies lower; from 1.65 on its upper edge is 2 cm and more beyond the
+            joint.
+        hanging_angle: Greatest angle of an upper arm to the vertical at which it hangs, rad.
         max_gripper_force: Limit of the gripper force at every sample, N.
         max_penetration: Limit of the garment's penetration into the person at every sample, m.
         max_edge_strain: Limit of the strain of 99 % of the edges at every sample.
@@ -47,12 +51,26 @@ class SuccessRules:
     """
 
     min_s: float = 1.9
+    min_hanging_s: float = 1.65
+    hanging_angle: float = 0.6
     max_gripper_force: float = 40.0
     max_penetration: float = 5e-3
     max_edge_strain: float = 0.10
     min_gripper_to_chair: float = 0.0
     min_arm_distance: float = 0.05
     release: ReleaseRules = ReleaseRules()
+
+    def least_s(self, joints: FloatArray, lets_go: bool) -> FloatArray:
+        """Returns (...,2) the least progress of left and right sleeve of a person.
+
+        Args:
+            joints: (...,6,3) shoulder, elbow, hand of left, then of right arm, m.
+            lets_go: Whether the coat is let go in the end, which shows that hanging sleeves are on.
+        """
+        upper = joints[..., [0, 3], :] - joints[..., [1, 4], :]
+        length = np.linalg.norm(upper, axis=-1)
+        hangs = upper[..., 2] >= np.cos(self.hanging_angle) * length
+        return np.where(hangs & lets_go, self.min_hanging_s, self.min_s)
 
 
 def summarize(
@@ -64,7 +82,9 @@ def summarize(
 ) -> dict[str, Any]:
     """Returns the content of `summary.json`; figures that do not exist are None.
 
-    `armhole_to_shoulder_left_m`, `…_right_m` are the remaining distances along the arm at the end.
+    `s_asked_left`, `…_right` are the progress that is asked when the coat is laid (lower where the
+    arm hangs). `armhole_to_shoulder_left_m`, `…_right_m` are the remaining distances along the arm
+    at the end.
     Beyond the fixed keys: `linking_number_left`, `…_right` (final), `simulated_time_s`,
     `max_edge_strain_all`, `max_total_contact_force_N`. `max_edge_strain` is the 99th percentile
     over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` is the
@@ -104,7 +124,7 @@ def summarize(
         or _arm_reason(log, arms, rules)
     )
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
-    summary |= _sleeve_figures(log, m, release.held)
+    summary |= _sleeve_figures(log, m, release.held, rules)
     summary["stays_on"] = release.stays_on
     summary["collar_to_neck_m"] = release.collar_to_neck
     summary |= _course_figures(log, m, release.held, rules, wall_time)
@@ -160,12 +180,14 @@ def _reason(log: RunLog, m: Measures, release: Release, rules: SuccessRules) -> 
 def _sleeve_that_is_off(log: RunLog, m: Measures, held: int, rules: SuccessRules) -> str | None:
     """Returns a sentence on a sleeve that is off when the coat is laid, after `held` samples."""
     last = max(held, 1) - 1
-    for side in SIDES:
+    for side, least in zip(
+        SIDES, rules.least_s(log.joint_position[last], log.lets_go), strict=True
+    ):
         s = log.dressing[side][last, 0]
-        if not s >= rules.min_s:
+        if not s >= least:
             far = _to_shoulder(log, side, last)
             short = "" if far is None else f", armhole {100.0 * far:.1f} cm from the shoulder"
-            return f"{side} sleeve not on: s = {s:.2f} < {rules.min_s:g}{short}"
+            return f"{side} sleeve not on: s = {s:.2f} < {least:g}{short}"
     for k, side in enumerate(SIDES):
         linking = int(m.linking[last, k])
         if abs(linking) != 1:
@@ -211,13 +233,16 @@ def _damage(log: RunLog, m: Measures, rules: SuccessRules) -> str | None:
     return None
 
 
-def _sleeve_figures(log: RunLog, m: Measures, held: int) -> dict[str, Any]:
+def _sleeve_figures(log: RunLog, m: Measures, held: int, rules: SuccessRules) -> dict[str, Any]:
     """Returns the progress of each sleeve: final, and when the coat began to be laid."""
     figures: dict[str, Any] = {}
-    for side in SIDES:
+    last = max(held, 1) - 1
+    least = rules.least_s(log.joint_position[last], log.lets_go) if len(log) else None
+    for k, side in enumerate(SIDES):
         figures[f"s_{side}"] = _number(log.dressing[side][-1, 0]) if len(log) else None
-        dressed = _number(log.dressing[side][max(held, 1) - 1, 0]) if len(log) else None
+        dressed = _number(log.dressing[side][last, 0]) if len(log) else None
         figures[f"s_dressed_{side}"] = dressed
+        figures[f"s_asked_{side}"] = None if least is None else float(least[k])
         figures[f"armhole_to_shoulder_{side}_m"] = _to_shoulder(log, side)
     for k, side in enumerate(SIDES):
         figures[f"arm_inside_{side}"] = bool(len(log)) and abs(int(m.linking[-1, k])) == 1
@@ -233,7 +258,7 @@ def _course_figures(
 ) -> dict[str, Any]:
     """Returns times and the largest forces, strains and penetrations of the run."""
     s = np.stack([log.dressing[side][:, 0] for side in SIDES], axis=1)
-    on = (s >= rules.min_s) & (np.abs(m.linking) == 1)
+    on = (s >= rules.least_s(log.joint_position, log.lets_go)) & (np.abs(m.linking) == 1)
     dressed = first_lasting(on.all(axis=1)[:held])
     duration = _duration(log)
     return {

@@ -32,12 +32,23 @@ def garment() -> GarmentMesh:
 
 @pytest.fixture
 def summary_of(tmp_path: Path, garment: GarmentMesh) -> SummaryOf:
-    def summary(opened: int, s: float, off: float = 0.0, scenario: str = LETS_GO) -> dict[str, Any]:
-        """Summarizes a run with sleeves at `s` after the release, and the coat `off`, m, above."""
+    def summary(
+        opened: int,
+        s: float,
+        off: float = 0.0,
+        scenario: str = LETS_GO,
+        before: float = 2.0,
+        tilt: float = 0.0,
+    ) -> dict[str, Any]:
+        """Summarizes a run with sleeves at `s` after the release, and the coat `off`, m, above.
+
+        Before, the sleeves are at `before`. The upper arms are moved outward by `tilt`, m, at their
+        elbows.
+        """
         samples: list[Sample] = []
         for i, sample in enumerate(synthetic.dressing(garment, COUNT, 10.0, travel=0.0)):
             stage = 2 if i < LAID else 3 if i < opened else 4
-            after = s if i >= opened else 2.0
+            after = s if i >= opened else before
             position = np.asarray(sample.garment_position)
             if i >= opened:
                 position = position + [0.0, 0.0, off]
@@ -45,6 +56,7 @@ def summary_of(tmp_path: Path, garment: GarmentMesh) -> SummaryOf:
             a[-1], b[-1] = NECK
             joints = np.array(sample.joint_position)
             joints[[0, 3]] = SHOULDERS
+            joints[[1, 4], 1] += [tilt, -tilt]
             samples.append(
                 replace(
                     sample,
@@ -100,3 +112,19 @@ def test_a_scenario_that_holds_the_coat_is_judged_while_it_is_held(summary_of: S
 def test_the_collars_distance_is_that_to_the_nape(summary_of: SummaryOf) -> None:
     near, far = (summary_of(70, 1.75, off)["collar_to_neck_m"] for off in (0.1, 0.2))
     assert 0.07 < far - near <= 0.1 + 1e-6
+
+
+def test_of_sleeves_on_arms_that_hang_less_is_asked_if_the_coat_is_let_go(
+    summary_of: SummaryOf,
+) -> None:
+    rules = SuccessRules()
+    low = rules.min_hanging_s + 0.01
+    on = summary_of(65, 1.8, before=low)
+    assert (on["success"], on["s_asked_left"]) == (True, rules.min_hanging_s)
+    assert on["dressing_time_s"] == 0.0
+    lower = summary_of(65, 1.8, before=rules.min_hanging_s - 0.01)
+    assert "sleeve not on" in lower["reason"]
+    held = summary_of(COUNT, low, scenario=HOLDS, before=low)
+    assert (held["success"], held["s_asked_right"]) == (False, rules.min_s)
+    away = summary_of(65, 1.8, before=low, tilt=0.4)
+    assert (away["success"], away["s_asked_left"]) == (False, rules.min_s)

@@ -37,6 +37,7 @@ from drake_dress.models.dressing.finish import (
     Phase,
     advance_finish,
     may_lower,
+    sleeves_on,
 )
 from drake_dress.models.dressing.sleeve import find_entry
 from drake_dress.models.dressing.stages import StageState, Task
@@ -282,7 +283,7 @@ class DressingPolicy:
         ends = nape(joints, self.person.shoulder_radius, self.person.neck_radius, toward(joints))
         return advance_finish(
             state.finish,
-            stages.stage,
+            sleeves_on(stages.stage, assignment.facts, joints, self.finish),
             assignment.facts,
             float(np.linalg.norm(collar - place)),
             distance_to_nape(collar, ends),

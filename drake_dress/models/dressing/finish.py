@@ -1,6 +1,6 @@
 """What follows once both sleeves are on: the coat is laid on the shoulders and let go.
 
-    DRESSING   both sleeves are done ──▶ LAYING
+    DRESSING   both sleeves are done, or hang on lowered arms ──▶ LAYING
     LAYING     the collar lies on the nape ──▶ LAID;  a sleeve is lost ──▶ DRESSING
     LAID       the grippers have opened ──▶ RELEASED
     RELEASED   the grippers move away
@@ -10,9 +10,13 @@ A coat that hangs from the grippers is not on: its collar is at the height of th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
+import numpy as np
+
+from drake_dress.models.arrays import FloatArray
 from drake_dress.models.dressing.stages import SleeveFacts, Stage
 
 
@@ -25,12 +29,22 @@ class Phase(IntEnum):
     RELEASED = 3
 
 
+class On(IntEnum):
+    """Whether both sleeves are on."""
+
+    NO = 0
+    HANGING = 1  # on the shoulders of lowered arms
+    DONE = 2
+
+
 # Stages of both sleeves in these phases, as written in the log, after those of `Stage`.
 LAY, RELEASED = 3, 4
 
 
 # By how much s may fall again before a person who was told to lower the arms raises them.
 _LOWERED_MARGIN = 0.3
+# By how much s sinks as a coat is laid.
+_SINKING = 0.15
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,13 @@ class FinishParameters:
         stall_progress: approach of the collar that counts as progress, m.
         lowering_progress: progress s of both sleeves from which on the person is told to lower the
             arms if one of them stalls. 1 is the elbow.
+        hanging_progress: progress s of both sleeves from which on they are on although they are not
+            done, if the arms hang. The centre of an armhole that hangs on the shoulder of a lowered
+            arm is at 1.55 to 1.9, lower on thick arms; at 1.5 its upper edge begins to leave the
+            shoulder.
+        hanging_angle: greatest angle of the upper arms to the vertical at which they hang, rad.
+        hanging_time: time for which they hang there before the coat is laid, s: they may come
+            further.
         steady_time: time for which both sleeves are on before the coat is laid, s. A sleeve that
             its taut coat draws back by the next decision is drawn on again first.
         least_time: shortest time for which the coat is laid, s. The person lowers the arms
@@ -68,6 +89,9 @@ class FinishParameters:
     stall_time: float = 2.0
     stall_progress: float = 0.005
     lowering_progress: float = 1.05
+    hanging_progress: float = 1.65
+    hanging_angle: float = 0.6
+    hanging_time: float = 3.0
     steady_time: float = 0.4
     least_time: float = 3.5
     lost_progress: float = 1.6
@@ -88,7 +112,8 @@ class FinishState:
         best: least distance of the collar from its place while it is laid, m.
         since: time of `best`, or at which the phase RELEASED began, s.
         begun: time at which the phase LAYING began, s.
-        on_since: time since which both sleeves are done, s; None while one is not.
+        on_since: time since which both sleeves are done or hang, s; None while one does not.
+        least: progress s of a sleeve below which it counts as lost while the coat is laid.
     """
 
     phase: Phase = Phase.DRESSING
@@ -96,6 +121,7 @@ class FinishState:
     since: float = 0.0
     begun: float = 0.0
     on_since: float | None = None
+    least: float = 0.0
 
     def stages(self, given: tuple[Stage, Stage]) -> tuple[int, int]:
         """Returns the stages of left and right sleeve as logged, `given` those of the dressing."""
@@ -106,7 +132,7 @@ class FinishState:
 
 def advance_finish(
     state: FinishState,
-    stages: tuple[Stage, Stage],
+    on: On,
     facts: tuple[SleeveFacts, SleeveFacts],
     off: float,
     from_nape: float,
@@ -118,7 +144,7 @@ def advance_finish(
 
     Args:
         state: state so far.
-        stages: of left and right sleeve.
+        on: whether both sleeves are on, from `sleeves_on`.
         facts: of left and right sleeve.
         off: distance of the collar from its place, m.
         from_nape: distance of the collar from the nearest point of the nape, m.
@@ -132,8 +158,8 @@ def advance_finish(
     if are_open:
         return replace(state, phase=Phase.RELEASED, since=time)
     if state.phase == Phase.DRESSING:
-        return _begun(state, stages, off, p, time)
-    if any(not fact.linked or fact.s < p.lost_progress for fact in facts):
+        return _begun(state, on, off, p, time)
+    if any(not fact.linked or fact.s < state.least for fact in facts):
         return FinishState()
     if state.phase == Phase.LAID:
         return state
@@ -176,13 +202,35 @@ def may_lower(
     return past and (was_told or any(n > 0 for n in stalls))
 
 
-def _begun(
-    state: FinishState, stages: tuple[Stage, Stage], off: float, p: FinishParameters, time: float
-) -> FinishState:
+def sleeves_on(
+    stages: tuple[Stage, Stage],
+    facts: tuple[SleeveFacts, SleeveFacts],
+    joints: FloatArray,
+    parameters: FinishParameters,
+) -> On:
+    """Returns whether both sleeves are on.
+
+    Args:
+        stages: of left and right sleeve.
+        facts: of left and right sleeve.
+        joints: (6,3) shoulder, elbow, hand of left, then of right arm, m.
+        parameters: settings.
+    """
+    if all(stage == Stage.DONE for stage in stages):
+        return On.DONE
+    upper = joints[[0, 3]] - joints[[1, 4]]
+    upright = upper[:, 2] >= math.cos(parameters.hanging_angle) * np.linalg.norm(upper, axis=1)
+    high = all(fact.linked and fact.s >= parameters.hanging_progress for fact in facts)
+    return On.HANGING if high and upright.all() else On.NO
+
+
+def _begun(state: FinishState, on: On, off: float, p: FinishParameters, time: float) -> FinishState:
     """Returns the new state of a dressing: laying, once both sleeves are on for long enough."""
-    if any(stage != Stage.DONE for stage in stages):
+    if on == On.NO:
         return replace(state, on_since=None)
+    done = on == On.DONE
     since = time if state.on_since is None else state.on_since
-    if time - since < p.steady_time:
+    if time - since < (p.steady_time if done else p.hanging_time):
         return replace(state, on_since=since)
-    return FinishState(Phase.LAYING, off, time, time)
+    least = p.lost_progress if done else min(p.lost_progress, p.hanging_progress - _SINKING)
+    return FinishState(Phase.LAYING, off, time, time, least=least)

@@ -58,6 +58,11 @@ class Pinhole:
         middle = np.array([0.5 * (self.width - 1), 0.5 * (self.height - 1)])
         return off + middle, z
 
+    def coarser(self, factor: int) -> Pinhole:
+        """Returns the camera with pixels that are larger by a factor."""
+        size = self.width // factor, self.height // factor
+        return Pinhole(*size, self.focal / factor, self.rotation, self.position)
+
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Pinhole:
         """Returns the camera turned about its own position and moved.
 
