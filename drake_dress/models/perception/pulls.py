@@ -154,14 +154,9 @@ def out_of_free_space(
     off *= (z[node] / camera.focal)[:, None]
     off *= np.minimum(1.0, settings.through_reach / np.linalg.norm(off, axis=1))[:, None]
     weight = np.full(len(node), settings.through_deviation**-2)
-    ones = np.ones((len(node), 1, 1))
-    return joined(
-        [
-            Pulls(_rows(node[:, None].astype(np.int32), ones * camera.rotation[:, k], n), off[:, k], weight)
-            for k in (0, 1)
-        ],
-        n,
-    )
+    alone, ones = node[:, None].astype(np.int32), np.ones((len(node), 1, 1))
+    rows = [_rows(alone, ones * camera.rotation[:, k], n) for k in (0, 1)]
+    return joined([Pulls(rows[k], off[:, k], weight) for k in (0, 1)], n)
 
 
 def _samples(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:

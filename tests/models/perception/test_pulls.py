@@ -66,7 +66,7 @@ def test_points_out_of_reach_do_not_pull_and_far_ones_pull_weakly() -> None:
     )
     assert len(far.residual) > 0
     assert np.median(far.weight) < 0.25 * np.median(near.weight)
-    none = to_points(CAMERA, points_of(np.array([-0.15, 0.0, 0.0])), X, FACES, 0.1, SETTINGS)
+    none = to_points(CAMERA, points_of(np.array([-0.5, 0.0, 0.0])), X, FACES, 0.1, SETTINGS)
     assert len(none.residual) == 0
     assert len(to_points(CAMERA, np.zeros((0, 3)), X, FACES, 0.1, SETTINGS).residual) == 0
 
