@@ -36,6 +36,8 @@ VARIATIONS = {"few": DRESSING["few"], "none": "{}"}
 SIZES = ("XS", "S", "M", "L", "XL", "XXL", "3XL", "4XL", "5XL")
 # Sizes of the coat, counted from the person's own.
 STEPS = (-1, 0, 1, 2)
+# A coat that comes on late is watched after its release as well.
+_DURATION = "duration=120"
 # First numbers of the generators' seeds.
 _CUT, _BODY, _PAIR = 1, 2, 3
 _DIGITS = 5  # of a coat's measures, m
@@ -109,6 +111,7 @@ def settings_of(case: Case, overrides: Sequence[str] = ()) -> list[str]:
         f"person.body={json.dumps(body)}",
         f"variation={VARIATIONS[case.variation]}",
         *AT_EDGES,
+        _DURATION,
         *overrides,
     ]
 
