@@ -82,9 +82,8 @@ def summarize(
 ) -> dict[str, Any]:
     """Returns the content of `summary.json`; figures that do not exist are None.
 
-    `s_asked_left`, `…_right` are the progress that is asked when the coat is laid (lower where the
-    arm hangs). `armhole_to_shoulder_left_m`, `…_right_m` are the remaining distances along the arm
-    at the end.
+    `s_asked_left`, `…_right` are the progress that is asked when the coat is laid.
+    `armhole_to_shoulder_left_m`, `…_right_m` are the remaining distances along the arm at the end.
     Beyond the fixed keys: `linking_number_left`, `…_right` (final), `simulated_time_s`,
     `max_edge_strain_all`, `max_total_contact_force_N`. `max_edge_strain` is the 99th percentile
     over the edges of length / rest length - 1, at its worst sample; `max_edge_strain_all` is the
@@ -125,8 +124,7 @@ def summarize(
     )
     summary: dict[str, Any] = {"success": reason is None, "reason": reason}
     summary |= _sleeve_figures(log, m, release.held, rules)
-    summary["stays_on"] = release.stays_on
-    summary["collar_to_neck_m"] = release.collar_to_neck
+    summary |= {"stays_on": release.stays_on, "collar_to_neck_m": release.collar_to_neck}
     summary |= _course_figures(log, m, release.held, rules, wall_time)
     summary |= _solve_figures(log)
     summary["late_plans"] = _late_plans(log)

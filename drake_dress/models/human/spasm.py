@@ -21,6 +21,7 @@ _DRAWN = np.array([-0.5, 0.0, -0.5, 1.0])
 _RISE, _FALL = 0.25, 0.6  # s
 _WEAKEST, _STRONGEST = 0.6, 1.4  # strength of a spasm, relative
 _LONGEST = 3600.0  # time for which spasms are drawn, s
+_ROUNDING = 1e-9  # s, of sums of durations
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class SpasmParameters:
             if not (math.isfinite(value) and value >= 0.0):
                 raise UserError("person.spasm", name, f"is {value}, expected 0 or more")
         least = 2.0 * (_RISE + self.duration + _FALL)
-        if not (math.isfinite(self.interval) and self.interval >= least):
+        if not (math.isfinite(self.interval) and self.interval >= least - _ROUNDING):
             raise UserError(
                 "person.spasm",
                 "interval",
