@@ -21,6 +21,7 @@ from drake_dress.models.cloth.elements import make_elements
 from drake_dress.models.cloth.layers.piercing import piercing_edges
 from drake_dress.models.control.safety import Verdict
 from drake_dress.models.dressing.coordinates import ArmAxis
+from drake_dress.models.dressing.finish import arms_hang
 from drake_dress.models.sides import SIDES, Side
 from drake_dress.report.arms import ArmMeasures, measure_arms
 from drake_dress.report.chair import gripper_to_chair
@@ -67,10 +68,8 @@ class SuccessRules:
             joints: (...,6,3) shoulder, elbow, hand of left, then of right arm, m.
             lets_go: Whether the coat is let go in the end, which shows that hanging sleeves are on.
         """
-        upper = joints[..., [0, 3], :] - joints[..., [1, 4], :]
-        length = np.linalg.norm(upper, axis=-1)
-        hangs = upper[..., 2] >= np.cos(self.hanging_angle) * length
-        return np.where(hangs & lets_go, self.min_hanging_s, self.min_s)
+        hang = arms_hang(joints, self.hanging_angle)
+        return np.where(hang & lets_go, self.min_hanging_s, self.min_s)
 
 
 def summarize(

@@ -16,7 +16,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from drake_dress.models.arrays import FloatArray
+from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.dressing.stages import SleeveFacts, Stage
 
 
@@ -218,10 +218,19 @@ def sleeves_on(
     """
     if all(stage == Stage.DONE for stage in stages):
         return On.DONE
-    upper = joints[[0, 3]] - joints[[1, 4]]
-    upright = upper[:, 2] >= math.cos(parameters.hanging_angle) * np.linalg.norm(upper, axis=1)
     high = all(fact.linked and fact.s >= parameters.hanging_progress for fact in facts)
-    return On.HANGING if high and upright.all() else On.NO
+    return On.HANGING if high and arms_hang(joints, parameters.hanging_angle).all() else On.NO
+
+
+def arms_hang(joints: FloatArray, angle: float) -> BoolArray:
+    """Returns (...,2) whether left and right upper arm are within an angle, rad, of the vertical.
+
+    Args:
+        joints: (...,6,3) shoulder, elbow, hand of left, then of right arm, m.
+        angle: greatest angle, rad.
+    """
+    upper = joints[..., [0, 3], :] - joints[..., [1, 4], :]
+    return np.asarray(upper[..., 2] >= math.cos(angle) * np.linalg.norm(upper, axis=-1))
 
 
 def _begun(state: FinishState, on: On, off: float, p: FinishParameters, time: float) -> FinishState:

@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from drake_dress.models.arrays import FloatArray, IntArray
+from drake_dress.models.garment.edges import unique_edges
 from drake_dress.models.immutable import Immutable
 from drake_dress.models.perception.pulls import Pulls
 
@@ -63,7 +64,8 @@ class Correction(Immutable):
         prior = (s.alone * sp.eye_array(count) + s.together * _laplacian(faces, count)).tocsr()
         self._prior = prior / s.deviation**2
         self._free = np.setdiff1d(np.arange(count), held)
-        self._factor = splu(sp.csc_matrix(self._prior[self._free][:, self._free]))
+        self._prior_of_free = self._prior[self._free][:, self._free]
+        self._factor = splu(sp.csc_matrix(self._prior_of_free))
         self._settings = settings
         self._count = count
 
@@ -79,11 +81,10 @@ class Correction(Immutable):
         column = (3 * free[:, None] + np.arange(3)).ravel()
         matrix = sp.csr_array(pulls.matrix[:, column])
         transposed = sp.csr_array(matrix.T)
-        prior = self._prior[free][:, free]
 
         def applied(d: FloatArray) -> FloatArray:
             asked = transposed @ (pulls.weight * (matrix @ d))
-            return np.asarray(asked + (prior @ d.reshape(-1, 3)).ravel())
+            return np.asarray(asked + (self._prior_of_free @ d.reshape(-1, 3)).ravel())
 
         def preconditioned(d: FloatArray) -> FloatArray:
             return np.asarray(self._factor.solve(d.reshape(-1, 3)).ravel())
@@ -105,8 +106,7 @@ class Correction(Immutable):
 
 def _laplacian(faces: IntArray, count: int) -> sp.csr_array:
     """Returns the graph Laplacian (n,n) of a mesh."""
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
+    first, second = unique_edges(faces).T
     ones = np.ones(2 * len(first))
     ends = np.concatenate([first, second]), np.concatenate([second, first])
     neighbours = sp.coo_array((ones, ends), shape=(count, count)).tocsr()
