@@ -26,6 +26,7 @@ from drake_dress.models.immutable import Immutable
 from drake_dress.models.perception.correction import Correction, CorrectionSettings
 from drake_dress.models.perception.point_cloud import Pinhole
 from drake_dress.models.perception.pulls import (
+    Outline,
     Pulls,
     PullSettings,
     joined,
@@ -159,7 +160,14 @@ class GarmentTracker:
             since: time since the last correction, s.
         """
         s, predicted = self._settings, state.cloth.x
-        seen = [(v, surface_points(v.camera, v.depth, v.labels, v.label, s.points)) for v in views]
+        seen = [
+            (
+                v,
+                surface_points(v.camera, v.depth, v.labels, v.label, s.points),
+                Outline.of(v.labels == v.label),
+            )
+            for v in views
+        ]
         x, reach = predicted, s.pulls.reach
         for _ in range(s.rounds):
             x = x + self._correction.displacement(self._pulls(seen, x, reach), predicted - x)
@@ -171,10 +179,11 @@ class GarmentTracker:
         cloth = replace(state.cloth, x=x, v=velocity)
         return TrackedGarment(cloth, s.bias_kept * state.bias + s.bias_gain * force)
 
-    def _pulls(self, seen: Sequence[tuple[View, FloatArray]], x: FloatArray, reach: float) -> Pulls:
+    def _pulls(
+        self, seen: Sequence[tuple[View, FloatArray, Outline]], x: FloatArray, reach: float
+    ) -> Pulls:
         settings, pulls = self._settings.pulls, []
-        for view, points in seen:
+        for view, points, outline in seen:
             pulls.append(to_points(view.camera, points, x, self._faces, reach, settings))
-            is_garment = view.labels == view.label
-            pulls.append(out_of_free_space(view.camera, view.depth, is_garment, x, settings))
+            pulls.append(out_of_free_space(view.camera, view.depth, outline, x, settings))
         return joined(pulls, len(x))

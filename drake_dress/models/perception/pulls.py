@@ -126,31 +126,56 @@ def to_points(
     return joined([along, *each], n)
 
 
+@dataclass(frozen=True)
+class Outline:
+    """Where a garment is in an image.
+
+    Attributes:
+        away: (h,w) distance of each pixel to the garment, pixels; inf without a garment.
+        nearest: (h,w,2) column and row of the garment's nearest pixel.
+    """
+
+    away: FloatArray
+    nearest: FloatArray
+
+    @staticmethod
+    def of(is_garment: BoolArray) -> Outline:
+        """Returns the outline of the garment's pixels (h,w)."""
+        if not is_garment.any():
+            return Outline(np.full(is_garment.shape, np.inf), np.zeros((*is_garment.shape, 2)))
+        free = np.where(is_garment, 0, 1).astype(np.uint8)
+        away, label = cv2.distanceTransformWithLabels(
+            free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+        )
+        row, column = np.nonzero(is_garment)
+        place = np.zeros((int(label.max()) + 1, 2))
+        place[label[row, column]] = np.stack([column, row], axis=1)
+        return Outline(np.asarray(away, dtype=float), place[label])
+
+
 def out_of_free_space(
-    camera: Pinhole, depth: FloatArray, is_garment: BoolArray, x: FloatArray, settings: PullSettings
+    camera: Pinhole, depth: FloatArray, outline: Outline, x: FloatArray, settings: PullSettings
 ) -> Pulls:
     """Returns the pulls on nodes that a camera sees through, toward the garment in the image.
 
     Args:
         camera: that sees.
         depth: (h,w) measured, m; 0 where nothing is within its range, or nothing was measured.
-        is_garment: (h,w) pixels of the garment.
+        outline: of the garment in the image.
         x: (n,3) nodes, m.
         settings: weights.
     """
     n = len(x)
-    if not is_garment.any():
-        return joined([], n)
-    away, nearest = _to_garment(is_garment)
     pixels, z = camera.pixels(x)
     place, inside = pixel_indices(camera, pixels, z)
     row, column = place[:, 1], place[:, 0]
     behind = (depth[row, column] > z + settings.through_depth) | (depth[row, column] == 0.0)
-    through = inside & behind & (away[row, column] > settings.through_pixels)
+    through = inside & behind & (outline.away[row, column] > settings.through_pixels)
+    through &= np.isfinite(outline.away[row, column])
     node = np.flatnonzero(through)
     if len(node) == 0:
         return joined([], n)
-    off = nearest[row[node], column[node]] - pixels[node]
+    off = outline.nearest[row[node], column[node]] - pixels[node]
     off *= (z[node] / camera.focal)[:, None]
     off *= np.minimum(1.0, settings.through_reach / np.linalg.norm(off, axis=1))[:, None]
     weight = np.full(len(node), settings.through_deviation**-2)
@@ -176,15 +201,3 @@ def _rows(node: IntArray, value: FloatArray, count: int) -> sp.csr_array:
     column = 3 * node[:, :, None].astype(np.int64) + np.arange(3)
     start = np.arange(0, 3 * k * m + 1, 3 * k)
     return sp.csr_array((value.reshape(-1), column.reshape(-1), start), shape=(m, 3 * count))
-
-
-def _to_garment(is_garment: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Returns (h,w) the distance to the garment, pixels, and (h,w,2) its nearest pixel."""
-    free = np.where(is_garment, 0, 1).astype(np.uint8)
-    away, label = cv2.distanceTransformWithLabels(
-        free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    row, column = np.nonzero(is_garment)
-    place = np.zeros((int(label.max()) + 1, 2))
-    place[label[row, column]] = np.stack([column, row], axis=1)
-    return np.asarray(away, dtype=float), place[label]

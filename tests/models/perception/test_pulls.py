@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from drake_dress.models.perception.point_cloud import Pinhole
 from drake_dress.models.perception.pulls import (
+    Outline,
     Pulls,
     PullSettings,
     joined,
@@ -88,7 +89,7 @@ def test_a_node_that_is_seen_through_is_pulled_to_the_garment_in_the_image(
     # a node in the middle of the image, between both
     node = np.array([[0.0, 0.0, 0.0]])
     for d, g, sign in ((depth, garment, 1.0), (depth2, garment2, -1.0)):
-        pulls = out_of_free_space(CAMERA, d, g, node, SETTINGS)
+        pulls = out_of_free_space(CAMERA, d, Outline.of(g), node, SETTINGS)
         assert len(pulls.residual) == 2
         # columns to the left lie toward +y
         moved = pulls.matrix.T @ pulls.residual
@@ -101,11 +102,11 @@ def test_a_node_that_is_hidden_or_on_the_garment_is_not_seen_through() -> None:
     depth, garment = seen_at(slice(20, 60))
     person = np.where(garment, depth, 1.5)
     node = np.array([[0.0, 0.0, 0.0], [-9.0, 0.0, 0.0]])
-    assert len(out_of_free_space(CAMERA, person, garment, node, SETTINGS).residual) == 0
+    assert len(out_of_free_space(CAMERA, person, Outline.of(garment), node, SETTINGS).residual) == 0
     on = np.array([[0.0, 0.5, 0.0]])
-    assert len(out_of_free_space(CAMERA, depth, garment, on, SETTINGS).residual) == 0
+    assert len(out_of_free_space(CAMERA, depth, Outline.of(garment), on, SETTINGS).residual) == 0
     nowhere = np.zeros_like(garment)
-    assert len(out_of_free_space(CAMERA, depth, nowhere, node, SETTINGS).residual) == 0
+    assert len(out_of_free_space(CAMERA, depth, Outline.of(nowhere), node, SETTINGS).residual) == 0
 
 
 def test_equations_are_joined_in_their_order() -> None:
