@@ -11,14 +11,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from scipy.special import ndtri
 
 from drake_dress.models.arrays import BoolArray, FloatArray
 from drake_dress.models.perception.smooth_noise import smooth_noise
-
-_EDGE = 1  # pixels on either side of a jump of depth that count as its edge
+from drake_dress.models.perception.surface_points import extremes_around
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def measured_depth(
     z = np.where(seen, depth, errors.farthest * 10.0)
     lost = ~seen | shadowed(z, focal * errors.baseline)
     largest = np.radians(errors.grazing_deg + errors.grazing_spread_deg * tolerance)
-    near, far = _extremes(z)
+    near, far = extremes_around(z)
     edge = far > (1.0 + errors.jump) * near
     # across an edge there is no surface whose angle could be taken
     lost |= ~edge & (np.cos(largest) > cosine_of_rays(z, focal))
@@ -125,9 +123,3 @@ def cosine_of_rays(depth: FloatArray, focal: float) -> FloatArray:
     z = depth + focal * (u * right + v * down)
     # the normal times the ray (u, v, 1) is the depth
     return np.asarray(depth / np.sqrt((x**2 + y**2 + z**2) * (u**2 + v**2 + 1.0)))
-
-
-def _extremes(depth: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Returns (h,w) the least and the greatest depth around each pixel, m."""
-    around = np.ones((2 * _EDGE + 1, 2 * _EDGE + 1), dtype=np.uint8)
-    return np.asarray(cv2.erode(depth, around)), np.asarray(cv2.dilate(depth, around))

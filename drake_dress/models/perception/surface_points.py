@@ -48,7 +48,11 @@ def away_from_edges(depth: FloatArray, chosen: BoolArray, jump: float) -> BoolAr
         chosen: (h,w).
         jump: largest relative difference of depth among them.
     """
-    around = np.ones((3, 3), dtype=np.uint8)
-    z = np.where(chosen, depth, 0.0)
-    nearest, farthest = cv2.erode(z, around), cv2.dilate(z, around)
+    nearest, farthest = extremes_around(np.where(chosen, depth, 0.0))
     return np.asarray(chosen & (nearest > 0.0) & (farthest < (1.0 + jump) * nearest))
+
+
+def extremes_around(depth: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns (h,w) the least and the greatest depth of each pixel and its eight neighbours, m."""
+    around = np.ones((3, 3), dtype=np.uint8)
+    return np.asarray(cv2.erode(depth, around)), np.asarray(cv2.dilate(depth, around))
