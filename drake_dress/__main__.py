@@ -55,6 +55,7 @@ BENCHMARKS = {
     "delay": "solve time of the global controller on this machine",
     "prediction": "prediction of a person's arms and intent, beside simple predictors",
     "predictors": "active persons dressed with each predictor of their motion",
+    "perception": "errors of the coat as it is tracked with depth cameras",
     "transfer": "dressings with MuJoCo as the world, beside the package's own simulation",
     "plant": "accuracy and cost of the plant's cloth compared with a fine reference",
     "realtime": "real-time factor of a dressing, beside an earlier version of the code",

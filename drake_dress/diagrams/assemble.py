@@ -11,6 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from drake_dress.diagrams.arms import ArmSetup
 from drake_dress.diagrams.confirmation import Confirmation
 from drake_dress.diagrams.dressing import Dressing, make_dressing
+from drake_dress.diagrams.eyes import with_tracker
 from drake_dress.diagrams.hardware_station import (
     at_start,
     listen,
@@ -96,7 +97,10 @@ def parts(
         ArmReachError: the arms cannot reach the start of the run, or later goals of a dressing.
     """
     station = simulated_station(setup, page, in_worker)
-    return Parts(setup, station, setup.policy(station.person, own.costs), page, in_worker, own)
+    policy = setup.policy(station.person, own.costs)
+    if setup.garments.tracked is not None:
+        station = with_tracker(station, setup, policy)
+    return Parts(setup, station, policy, page, in_worker, own)
 
 
 def hardware_parts(

@@ -23,8 +23,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from drake_dress.diagrams.person import Person
+from drake_dress.models.effects.composition import world_points, world_rates
+from drake_dress.models.effects.effect import Effect
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.skin.person_skin import PersonSkin
+from drake_dress.models.perception.camera_errors import CameraErrors, drawn_pose_error
+from drake_dress.models.perception.point_cloud import Pinhole
+from drake_dress.systems.depth_camera import DepthCamera
 from drake_dress.systems.garment_geometry import GarmentGeometry
 from drake_dress.systems.joint_oracle import JointOracle
 from drake_dress.systems.skin_geometry import SkinGeometry
@@ -33,8 +38,11 @@ from drake_dress.systems.surface_geometry import SurfaceGeometry
 _RENDERER = "vtk"
 _NEAR, _FAR = 0.05, 6.0  # range of rendering, m
 _DEPTH = (0.1, 5.0)  # range of depth measurement, m
+# Second numbers of the seeds of a camera's errors.
+_POSE, _IMAGES = 11, 12
 # Ports of an RgbdSensor, and the names under which they are exported.
-IMAGES = {"color_image": "color_image", "depth_image_32f": "depth_image"}
+_COLOR = {"color_image": "color_image"}
+_SHAPE = {"depth_image_32f": "depth_image", "label_image": "label_image"}
 
 
 @dataclass(frozen=True)
@@ -68,6 +76,41 @@ class Camera:
         """X_WC: z to the target, y down, x to the right."""
         return RigidTransform(RotationMatrix(looking(self.position, self.target)), self.position)
 
+    @property
+    def pinhole(self) -> Pinhole:
+        """Where points are in its images."""
+        rotation = looking(self.position, self.target)
+        return Pinhole(self.width, self.height, self.info.focal_x(), rotation, self.position)
+
+
+@dataclass(frozen=True)
+class CameraFaults:
+    """What makes images of simulated cameras differ from perfect ones.
+
+    Attributes:
+        errors: of depth, labels, time and pose.
+        seed: of the errors.
+        effects: physical effects; those of cameras displace what they see.
+    """
+
+    errors: CameraErrors
+    seed: int
+    effects: Sequence[Effect] = ()
+
+    def true_pose(self, camera: Camera, number: int) -> RigidTransform:
+        """Returns where a camera stands that is believed to be at `camera.pose`.
+
+        Args:
+            camera: as believed.
+            number: of the camera in the station.
+        """
+        rng = np.random.default_rng([self.seed, _POSE, number])
+        turned, moved = drawn_pose_error(self.errors, rng)
+        position = world_points(camera.position[None], self.effects)[0] + moved
+        # rows are the camera's axes
+        axes = world_rates(camera.pose.rotation().matrix().T, self.effects)
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(axes.T @ turned), position)
+
 
 def looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Returns R_WC (3,3) of a camera at `position` (3,) that looks at `target` (3,), m.
@@ -89,8 +132,12 @@ def export_cameras(
     mesh: GarmentMesh,
     garment_position: OutputPort,
     cameras: Sequence[Camera],
+    faults: CameraFaults | None = None,
 ) -> None:
-    """Adds cameras that see the garment; exports `NAME.color_image` and `NAME.depth_image`.
+    """Adds cameras that see the garment; exports their images.
+
+    These are `NAME.color_image`, `NAME.depth_image` and `NAME.label_image`, and with faults
+    `NAME.image_time`, the time of the last two.
 
     Args:
         builder: of the station.
@@ -98,28 +145,65 @@ def export_cameras(
         mesh: the true garment.
         garment_position: its nodes, (3n,) m.
         cameras: with distinct names; without any, the scene graph is left unchanged.
+        faults: what makes depth and labels differ from perfect ones; None for perfect images.
     """
     if not cameras:
         return
     scene_graph.AddRenderer(_RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
     garment = builder.AddNamedSystem("garment_geometry", GarmentGeometry(scene_graph, mesh))
     _connect(builder, scene_graph, garment, garment_position)
-    for camera in cameras:
-        core = RenderCameraCore(
-            _RENDERER, camera.info, ClippingRange(_NEAR, _FAR), RigidTransform()
-        )
-        sensor = builder.AddNamedSystem(
-            f"camera_{camera.name}",
-            RgbdSensor(
-                scene_graph.world_frame_id(),
-                camera.pose,
-                ColorRenderCamera(core, False),
-                DepthRenderCamera(core, DepthRange(*_DEPTH)),
-            ),
-        )
-        builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
-        for port, name in IMAGES.items():
+    for number, camera in enumerate(cameras):
+        pose = camera.pose if faults is None else faults.true_pose(camera, number)
+        sensor = _add_sensor(builder, scene_graph, camera, pose)
+        for port, name in _COLOR.items():
             builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
+        if faults is not None:
+            _export_measured(builder, sensor, camera, faults, number)
+            continue
+        for port, name in _SHAPE.items():
+            builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
+
+
+def _add_sensor(
+    builder: DiagramBuilder, scene_graph: SceneGraph, camera: Camera, pose: RigidTransform
+) -> RgbdSensor:
+    """Adds a perfect camera at a pose in the world."""
+    core = RenderCameraCore(_RENDERER, camera.info, ClippingRange(_NEAR, _FAR), RigidTransform())
+    sensor: RgbdSensor = builder.AddNamedSystem(
+        f"camera_{camera.name}",
+        RgbdSensor(
+            scene_graph.world_frame_id(),
+            pose,
+            ColorRenderCamera(core, False),
+            DepthRenderCamera(core, DepthRange(*_DEPTH)),
+        ),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    return sensor
+
+
+def _export_measured(
+    builder: DiagramBuilder,
+    sensor: RgbdSensor,
+    camera: Camera,
+    faults: CameraFaults,
+    number: int,
+) -> None:
+    """Exports depth and labels of a camera as a real one tells them, and their time."""
+    device = builder.AddNamedSystem(
+        f"depth_camera_{camera.name}",
+        DepthCamera(
+            (camera.width, camera.height),
+            camera.info.focal_x(),
+            1.0 / camera.rate,
+            faults.errors,
+            (faults.seed, _IMAGES, number),
+        ),
+    )
+    for port, name in zip(_SHAPE, ("true_depth", "true_labels"), strict=True):
+        builder.Connect(sensor.GetOutputPort(port), device.GetInputPort(name))
+    for name in (*_SHAPE.values(), "image_time"):
+        builder.ExportOutput(device.GetOutputPort(name), f"{camera.name}.{name}")
 
 
 def show_skin(

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drake_dress.diagrams.cameras import CameraFaults
 from drake_dress.diagrams.garment import build_garment, check_opening
 from drake_dress.diagrams.integrator import check_integrator
 from drake_dress.diagrams.person import Person, person_arms, person_model
 from drake_dress.diagrams.planning import Rates
 from drake_dress.diagrams.prediction import Predictor
 from drake_dress.diagrams.scenario import Scenario
+from drake_dress.diagrams.scenario.mirror import model_of
 from drake_dress.diagrams.sections.controller import controller_policy, predictor, solve_budget
 from drake_dress.diagrams.sections.effects import effects
 from drake_dress.diagrams.sections.person import (
@@ -37,10 +39,11 @@ from drake_dress.models.human.wheelchair import room_of_arms
 
 @dataclass(frozen=True)
 class Garments:
-    """The garment of the plant, and the coarser one of the controller."""
+    """The garment of the plant, the coarser one of the controller, and the tracked one, if any."""
 
     plant: GarmentMesh
     belief: GarmentMesh
+    tracked: GarmentMesh | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class Setup:
         """Returns the setup for an unknown true garment, which the controller's replaces."""
         belief = self.garments.belief
         station = replace(self.station, mesh=belief)
-        return replace(self, garments=Garments(belief, belief), station=station)
+        return replace(self, garments=replace(self.garments, plant=belief), station=station)
 
     def policy(self, person: Person, costs: Sequence[GarmentCost] = ()) -> DressingPolicy:
         """Returns the policy of the global controller.
@@ -115,7 +118,10 @@ def read_setup(scenario: Scenario, source: Path) -> Setup:
     broken = limits.broken_at(start_grippers(station))
     if broken is not None:
         raise UserError(str(source), "safety", f"{broken} at the start")
-    garments = Garments(plant, belief)
+    tracked = None
+    if scenario.perception.kind == "cameras":
+        tracked = build_garment(scenario.garment, scenario.perception.spacing, source.parent)
+    garments = Garments(plant, belief, tracked)
     return Setup(scenario, source, garments, station, limits, rates(scenario), foreseen)
 
 
@@ -172,8 +178,17 @@ def station_parameters(scenario: Scenario, mesh: GarmentMesh) -> StationParamete
         placement=placement(station.arms, person, station.side),
         mode=station.arms.mode,
         cameras=cameras(station.cameras),
+        camera_faults=camera_faults(scenario),
         phenotype=phenotype(person),
     )
+
+
+def camera_faults(scenario: Scenario) -> CameraFaults | None:
+    """Returns what is wrong with camera images; None where no controller sees with them."""
+    if scenario.perception.kind != "cameras":
+        return None
+    errors = model_of(scenario.station.camera_errors)
+    return CameraFaults(errors, scenario.seed, effects(scenario.effects))
 
 
 def rates(scenario: Scenario) -> Rates:

@@ -17,7 +17,8 @@ Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always
              {left,right}_gripper.force_measured             (3,) of the garment on the gripper, N
              estimate.garment_position, garment_velocity     (3m,) of the controller's garment
              estimate.joint_position                         (18,) of the person's arms, m
-             NAME.color_image, NAME.depth_image              of each camera
+             NAME.color_image, depth_image, label_image      of each camera
+             NAME.image_time                                 (1,) s, of the last two; see `Eyes`
              permission                                      (1,) 0: arms must come to rest
              grippers_open                                   (1,) 1: both have let go
              cheat_garment_position, cheat_garment_velocity  (3n,)
@@ -60,7 +61,7 @@ from drake_dress.diagrams.arms import (
     set_up_arms,
 )
 from drake_dress.diagrams.behaviour import Behaviour, add_behaviour
-from drake_dress.diagrams.cameras import Camera, export_cameras, show_skin
+from drake_dress.diagrams.cameras import Camera, CameraFaults, export_cameras, show_skin
 from drake_dress.diagrams.oracles import export_oracles
 from drake_dress.diagrams.panda_driver import SimPandaDriver
 from drake_dress.diagrams.person import (
@@ -142,7 +143,8 @@ class StationParameters:
     `time_step` is the garment's, `body_time_step` that of arms, grippers and the person's joints.
     `phenotype` is that of a parametric body; its skin is seen, and nothing touches it.
     With `in_front` the garment hangs in front of the person, at `distance_behind`.
-    `in_worker` steps the garment in a worker process.
+    `in_worker` steps the garment in a worker process. `camera_faults` act on depth and labels; None
+    for perfect images.
     """
 
     mesh: GarmentMesh
@@ -172,6 +174,7 @@ class StationParameters:
     placement: ArmPlacement | None = None
     mode: str
     cameras: tuple[Camera, ...] = ()
+    camera_faults: CameraFaults | None = None
     phenotype: Phenotype | None = None
     in_worker: bool = False
 
@@ -426,7 +429,8 @@ def _export_cameras(
     skin = p.skin() if p.cameras else None
     if skin is not None:
         show_skin(builder, plant, scene_graph, person, skin)
-    export_cameras(builder, scene_graph, p.mesh, cloth.GetOutputPort("garment_position"), p.cameras)
+    seen = cloth.GetOutputPort("garment_position")
+    export_cameras(builder, scene_graph, p.mesh, seen, p.cameras, p.camera_faults)
 
 
 def _wire_drivers(

@@ -44,7 +44,7 @@ class Studio:
 
     def __init__(self, parameters: StationParameters) -> None:
         # the scene does not need effects, and they may not be picklable
-        self._parameters = replace(parameters, effects=())
+        self._parameters = replace(parameters, effects=(), camera_faults=None)
         self._body = body_with_effects(parameters.measures, parameters.effects)
         self._scene: tuple[Any, ...] | None = None
 

@@ -28,6 +28,7 @@ from drake_dress.report.chair import gripper_to_chair
 from drake_dress.report.log import RunLog
 from drake_dress.report.measures import Measures, first_lasting, measure
 from drake_dress.report.release import Release, ReleaseRules, judge_release
+from drake_dress.report.sight import sight_figures
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,8 @@ def summarize(
     is whether both are still on 3 s after the grippers have let go, None if they have not.
     `collar_to_neck_m` is the final distance of the collar's back from the nape. `late_plans` is the
     share of the global controller's solves that took longer than the modelled delay.
-    `layers_crossed_at_end`
-    counts edges that pierce another layer. `safety_cut_s` gives, for each side and each flag that
-    the safety governor raised, the total time of the samples with that flag; None if not logged.
+    `layers_crossed_at_end` counts edges that pierce another layer. `safety_cut_s` gives, for each
+    side and flag of the safety governor, the total time of samples with it; None if not logged.
     Hardware runs add `command_rate_hz`, `command_latency_ms` (from the sending of a status to the
     command that responds to it), `start_up_s` (to the first command), `fell_behind_s` (real time by
     which the run fell behind the requested rate) and `dropped_messages` (repeated and late messages
@@ -103,7 +103,8 @@ def summarize(
     limits), `min_joint_margin_rad`, `arm_tracking_mm` (gripper tracking error),
     `min_arms_apart_m`, `min_arm_to_person_m` (without last link and hand). Runs with a wheelchair
     add `min_gripper_to_chair_m` and, with arms, `min_arm_to_chair_m`; there `max_penetration_m`
-    holds for person and chair.
+    holds for person and chair. Runs whose controllers see with cameras add
+    `estimate_garment_rms_m` and `estimate_armhole_median_m` (`sight_figures`).
 
     Args:
         log: Log of the run.
@@ -128,7 +129,7 @@ def summarize(
     summary |= _solve_figures(log)
     summary["late_plans"] = _late_plans(log)
     summary["safety_cut_s"] = _safety_cuts(log)
-    summary |= _command_figures(log) | _arm_figures(arms)
+    summary |= _command_figures(log) | _arm_figures(arms) | sight_figures(log)
     if to_chair is not None:
         summary["min_gripper_to_chair_m"] = _least(to_chair)
     return summary | {"seed": log.seed, "version": log.version}

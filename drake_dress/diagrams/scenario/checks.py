@@ -170,6 +170,27 @@ def check_cameras(source: str, scenario: Scenario) -> None:
             )
 
 
+def check_perception(source: str, scenario: Scenario) -> None:
+    """Checks that there are cameras to see with, and that estimates are ready in time."""
+    p = scenario.perception
+    if p.kind == "cameras" and not scenario.station.cameras:
+        raise UserError(source, "station.cameras", "is empty, expected cameras to see with")
+    steps = round(p.period / p.filter.time_step)
+    if steps < 1 or abs(steps * p.filter.time_step - p.period) > 1e-6:
+        raise UserError(
+            source,
+            "perception.period",
+            f"is {p.period:g}, expected a multiple of the filter's time_step, "
+            f"{p.filter.time_step:g}",
+        )
+    if p.delay >= p.period:
+        raise UserError(
+            source,
+            "perception.delay",
+            f"is {p.delay:g}, expected less than the period, {p.period:g}",
+        )
+
+
 def check_joints(source: str, person: Person) -> None:
     """Checks that the limits of each joint are a smaller and a larger angle."""
     for group in ("joints", "left_joints", "right_joints"):

@@ -24,6 +24,7 @@ from drake_dress.diagrams.scenario.checks import (
     check_hardware,
     check_hold,
     check_joints,
+    check_perception,
     check_safety,
 )
 from drake_dress.diagrams.scenario.fidelity import fill_in_fidelity
@@ -106,6 +107,7 @@ def _checked(
     check_behaviour(source, scenario.person)
     check_hardware(source, scenario.station)
     check_cameras(source, scenario)
+    check_perception(source, scenario)
     return scenario
 
 

@@ -46,6 +46,15 @@ from drake_dress.models.human.girths import ARM_GIRTHS, GIRTHS
 from drake_dress.models.human.joints import JointParameters
 from drake_dress.models.human.skin.phenotype import Phenotype
 from drake_dress.models.human.spasm import SpasmParameters
+from drake_dress.models.perception import (
+    camera_errors,
+    correction,
+    garment_filter,
+    pulls,
+    segmentation_errors,
+    stereo_errors,
+    surface_points,
+)
 from drake_dress.models.supervision.garment_belief import GarmentBounds
 from drake_dress.models.supervision.garment_shape import ShapeBounds
 from drake_dress.models.supervision.person_belief import PersonBounds
@@ -1033,6 +1042,21 @@ class Camera:
     rate: float = 5.0
 
 
+@mirror_of(stereo_errors.StereoErrors)
+class StereoErrors(Mirror):
+    """Errors of depth; see models/perception/stereo_errors.py."""
+
+
+@mirror_of(segmentation_errors.SegmentationErrors)
+class SegmentationErrors(Mirror):
+    """Errors of labels; see models/perception/segmentation_errors.py."""
+
+
+@mirror_of(camera_errors.CameraErrors)
+class CameraErrors(Mirror):
+    """Errors of cameras that controllers see with; see models/perception/camera_errors.py."""
+
+
 @dataclass
 class Station:
     """The robots, or their simulation.
@@ -1046,6 +1070,8 @@ class Station:
         gripper: limits of floating grippers.
         start: initial position of the coat.
         cameras: cameras of the station.
+        camera_errors: errors of depth, labels, time and pose of simulated cameras. They act where
+            controllers see with cameras (`perception.kind`).
     """
 
     kind: str = "simulated"
@@ -1055,6 +1081,54 @@ class Station:
     gripper: Gripper = field(default_factory=Gripper)
     start: Start = field(default_factory=Start)
     cameras: list[Camera] = field(default_factory=list)
+    camera_errors: CameraErrors = field(default_factory=CameraErrors)
+
+
+@mirror_of(surface_points.PointSettings)
+class Points(Mirror):
+    """Points of depth images that are used; see models/perception/surface_points.py."""
+
+
+@mirror_of(pulls.PullSettings)
+class Pulls(Mirror):
+    """What images ask of the garment; see models/perception/pulls.py."""
+
+
+@mirror_of(correction.CorrectionSettings)
+class Correction(Mirror):
+    """How far images move the garment; see models/perception/correction.py."""
+
+
+@mirror_of(garment_filter.FilterSettings)
+class Filter(Mirror):
+    """Prediction and correction of the garment; see models/perception/garment_filter.py."""
+
+
+@dataclass
+class Perception:
+    """How controllers see the garment.
+
+    Attributes:
+        kind: `oracle` knows where the garment is; `cameras` tracks it in the depth images of the
+            station's cameras.
+        spacing: edge length of the tracked garment's mesh, m. It needs nearly that of the plant:
+            with 5 cm folds are lost, and errors double.
+        material: fabric that is assumed of it. The controller's own is softer than cloth.
+        period: time between estimates, s; a multiple of `filter.time_step`.
+        delay: modelled time that an estimate takes, s, less than `period`.
+        memory: longest age of images that are still used, s.
+        filter: prediction and correction of the garment.
+    """
+
+    kind: str = "oracle"
+    spacing: float = 0.03
+    material: Material = field(
+        default_factory=lambda: Material(stretch_stiffness=800.0, damping=0.01)
+    )
+    period: float = 0.1
+    delay: float = 0.08
+    memory: float = 0.5
+    filter: Filter = field(default_factory=Filter)
 
 
 @dataclass
@@ -1182,6 +1256,7 @@ class Scenario:
         controller: controllers.
         safety: limits of the safety governor.
         station: robots.
+        perception: how controllers see the garment.
         lab: the lab of `drake-dress sim-station`.
         variation: quantities that the seed varies.
         log: the log of the run.
@@ -1197,6 +1272,7 @@ class Scenario:
     controller: Controller = field(default_factory=Controller)
     safety: Safety = field(default_factory=Safety)
     station: Station = field(default_factory=Station)
+    perception: Perception = field(default_factory=Perception)
     lab: Lab = field(default_factory=Lab)
     variation: Variation = field(default_factory=Variation)
     log: Log = field(default_factory=Log)

@@ -12,6 +12,7 @@ equations are solved by conjugate gradients, preconditioned by the factored K.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,14 +30,15 @@ class CorrectionSettings:
     """How far observations move the prediction.
 
     Attributes:
-        deviation: σ, standard deviation of the prediction, m.
+        deviation: standard deviation of a prediction over one second, m; its variance σ² grows with
+            time.
         alone: a, weight of each node's own displacement.
         together: b, weight of differences between neighbours.
         tolerance: relative residual of the solve.
         iterations: largest number of its iterations.
     """
 
-    deviation: float = 0.05
+    deviation: float = 0.5
     alone: float = 1.0
     together: float = 30.0
     tolerance: float = 1e-3
@@ -62,20 +64,32 @@ class Correction(Immutable):
     ) -> None:
         s = settings
         prior = (s.alone * sp.eye_array(count) + s.together * _laplacian(faces, count)).tocsr()
-        self._prior = prior / s.deviation**2
+        self._prior = prior
         self._free = np.setdiff1d(np.arange(count), held)
         self._prior_of_free = self._prior[self._free][:, self._free]
         self._factor = splu(sp.csc_matrix(self._prior_of_free))
         self._settings = settings
         self._count = count
 
-    def displacement(self, pulls: Pulls, before: FloatArray | None = None) -> FloatArray:
+    def __getstate__(self) -> dict[str, Any]:
+        # a factor of SuperLU cannot be pickled
+        return {name: value for name, value in vars(self).items() if name != "_factor"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._factor = splu(sp.csc_matrix(self._prior_of_free))
+
+    def displacement(
+        self, pulls: Pulls, before: FloatArray | None = None, since: float = 0.2
+    ) -> FloatArray:
         """Returns (n,3) the displacement of the nodes from where the pulls were found, m.
 
         Args:
             pulls: what the observations ask.
             before: (n,3) displacement that leads back to the prediction, d₀, m; zero by default.
+            since: time that was predicted, s.
         """
+        certainty = 1.0 / (self._settings.deviation**2 * since)
         n, free = self._count, self._free
         back = np.zeros((n, 3)) if before is None else before
         column = (3 * free[:, None] + np.arange(3)).ravel()
@@ -84,13 +98,14 @@ class Correction(Immutable):
 
         def applied(d: FloatArray) -> FloatArray:
             asked = transposed @ (pulls.weight * (matrix @ d))
-            return np.asarray(asked + (self._prior_of_free @ d.reshape(-1, 3)).ravel())
+            prior = self._prior_of_free @ d.reshape(-1, 3)
+            return np.asarray(asked + certainty * prior.ravel())
 
         def preconditioned(d: FloatArray) -> FloatArray:
-            return np.asarray(self._factor.solve(d.reshape(-1, 3)).ravel())
+            return np.asarray(self._factor.solve(d.reshape(-1, 3)).ravel() / certainty)
 
         right = transposed @ (pulls.weight * pulls.residual)
-        right = right + (self._prior @ back)[free].ravel()
+        right = right + certainty * (self._prior @ back)[free].ravel()
         shape = (len(column), len(column))
         found, _ = cg(
             LinearOperator(shape, applied, dtype=float),

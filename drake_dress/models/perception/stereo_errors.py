@@ -36,7 +36,8 @@ class StereoErrors:
         edge_loss: share of pixels at an edge without depth.
         missing: share of the image without depth for want of contrast, in patches.
         patch_width: size of these patches, pixels.
-        nearest, farthest: depth that is measured, m.
+        nearest: least depth that is measured, m.
+        farthest: greatest depth that is measured, m.
     """
 
     baseline: float = 0.05

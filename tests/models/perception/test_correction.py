@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -16,6 +18,7 @@ HELD = np.concatenate([COAT.grasp["left"], COAT.grasp["right"]])
 SETTINGS = CorrectionSettings(tolerance=1e-10, iterations=1000)
 CORRECTION = Correction(FACES, N, HELD, SETTINGS)
 FREE = np.setdiff1d(np.arange(N), HELD)
+SINCE = 0.3  # s
 
 
 def drawn_pulls(seed: int, count: int = 60) -> Pulls:
@@ -35,13 +38,14 @@ def test_the_displacement_is_the_least_of_the_cost(seed: int) -> None:
     }:
         laplacian[[a, b], [a, b]] += 1.0
         laplacian[[a, b], [b, a]] -= 1.0
-    prior = (SETTINGS.alone * np.eye(N) + SETTINGS.together * laplacian) / SETTINGS.deviation**2
+    prior = SETTINGS.alone * np.eye(N) + SETTINGS.together * laplacian
+    prior /= SETTINGS.deviation**2 * SINCE
 
     def gradient(d: np.ndarray) -> np.ndarray:
         asked = pulls.matrix.T @ (pulls.weight * (pulls.matrix @ d.ravel() - pulls.residual))
         return (asked.reshape(-1, 3) + prior @ (d - back))[FREE]
 
-    found = CORRECTION.displacement(pulls, back)
+    found = CORRECTION.displacement(pulls, back, SINCE)
     np.testing.assert_array_equal(found[HELD], 0.0)
     assert np.abs(gradient(found)).max() < 1e-6 * np.abs(gradient(0.0 * found)).max()
 
@@ -65,3 +69,9 @@ def test_nodes_that_are_not_observed_go_along_with_their_neighbours() -> None:
     assert 0.001 < moved[others, 1].max() < 0.05
     assert moved[others, 1].min() > -1e-9
     np.testing.assert_allclose(moved[:, [0, 2]], 0.0, atol=1e-12)
+
+
+def test_a_correction_can_be_sent_to_another_process() -> None:
+    pulls = drawn_pulls(0)
+    sent = pickle.loads(pickle.dumps(CORRECTION))
+    np.testing.assert_array_equal(sent.displacement(pulls), CORRECTION.displacement(pulls))

@@ -250,6 +250,27 @@ class ImplicitCloth(SteppedCloth):
         )
         return after, StepInfo(p.passes, p.iterations, p.residual, refactored)
 
+    def displaced(
+        self, state: ClothState, displacement: FloatArray, obstacles: Obstacles
+    ) -> FloatArray:
+        """Returns nodes (n,3), m, displaced as far as the fabric yields without force.
+
+        The displacement d' is that of a step that begins with the velocity d / h and in
+        equilibrium, M (d' − d) + θ (θ h² + hβ) K₊ d' = 0: what stretches the fabric is left out,
+        and what folds it sharply. Held nodes stay, bodies are not entered, without friction.
+
+        Args:
+            state: present state; its velocity does not matter.
+            displacement: d (n,3), m.
+            obstacles: the person, at rest.
+        """
+        force, _ = self._elastic(self.elements, state.x)
+        weight = self.mass[:, None] * self.gravity
+        free = replace(ClothState.at_rest(state.x), v=displacement / self.time_step)
+        still = np.zeros((len(self.held), 3))
+        balance = Influences(force=-(force + weight), friction=np.zeros(len(state.x)))
+        return self.step(replace(free, solver=state.solver), obstacles, still, balance)[0].x
+
     def _problem(
         self,
         state: ClothState,

@@ -245,3 +245,32 @@ def test_what_lands_is_at_rest_on_the_floor_and_carries_its_weight(implicitness:
     assert np.abs(state.v).max() < 0.02
     assert state.x[:, 2].min() > 0.0
     assert state.reaction[:, 2].sum() == pytest.approx(cloth.mass.sum() * 9.81, rel=0.02)
+
+
+def test_a_displacement_that_does_not_stretch_is_made_whole() -> None:
+    x, e = sheet_elements(10, 10, 0.03)
+    cloth = ImplicitCloth(e, Material(), 1.0 / 30.0, NO_NODES)
+    d = np.cross([0.0, 0.2, 0.1], x - x.mean(axis=0)) + [0.02, -0.01, 0.03]
+    moved = cloth.displaced(ClothState.at_rest(x), d, Obstacles.none())
+    np.testing.assert_allclose(moved, x + d, atol=2e-4)
+
+
+def test_a_displacement_that_stretches_is_hardly_made() -> None:
+    x, e = sheet_elements(10, 10, 0.03)
+    cloth = ImplicitCloth(e, Material(stretch_stiffness=800.0), 1.0 / 30.0, NO_NODES)
+    d = 0.1 * (x - x.mean(axis=0))
+    moved = cloth.displaced(ClothState.at_rest(x), d, Obstacles.none())
+    assert np.linalg.norm(moved - x) < 0.02 * np.linalg.norm(d)
+
+
+def test_a_displacement_keeps_held_nodes_and_does_not_enter_bodies() -> None:
+    x, e = sheet_elements(10, 10, 0.03)
+    held = np.array([0, 9], dtype=np.int32)
+    cloth = ImplicitCloth(e, Material(stretch_stiffness=800.0), 1.0 / 30.0, held)
+    below = Obstacles.floor(-0.02)
+    d = np.zeros_like(x)
+    d[:, 2] = -0.06
+    moved = cloth.displaced(ClothState.at_rest(x), d, below)
+    np.testing.assert_allclose(moved[held], x[held], atol=1e-12)
+    assert moved[:, 2].min() > -0.02 - 1e-3
+    assert moved[:, 2].min() < -0.01

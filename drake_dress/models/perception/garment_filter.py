@@ -34,36 +34,38 @@ from drake_dress.models.perception.pulls import (
     to_points,
 )
 from drake_dress.models.perception.surface_points import PointSettings, surface_points
-from drake_dress.models.sides import SIDES
 
 
 @dataclass(frozen=True)
-class TrackerSettings:
+class FilterSettings:
     """Settings of prediction and correction.
 
     Attributes:
         time_step: of the simulation, s.
-        implicitness, buckling_wavelength: of its scheme; see `ImplicitSettings`.
+        implicitness: of its scheme; see `ImplicitSettings`.
+        buckling_wavelength: shortest wrinkle that the mesh can represent, in spacings.
         rounds: how often points look for the surface in one correction, each time within a shorter
             reach.
         shrinking: factor on that reach from round to round.
         least_reach: shortest reach, m.
-        velocity_gain: share of a correction, over the time since the last one, that the velocity
-            takes on.
-        bias_gain: the same of the force that would make it, from rest.
-        bias_kept: share of the force that stays at the next correction.
-        points, pulls, correction: settings of their parts.
+        velocity_time: τ, s; a correction that is asked for a time Δt adds its displacement times
+            Δt/τ² to the velocity.
+        bias_time: τ, s; it adds the mass times its displacement times Δt/τ³ to the force.
+        bias_fading: time in which the force fades to a share of 1/e, s.
+        points: points that are used.
+        pulls: what observations ask of the garment.
+        correction: how far they move it.
     """
 
     time_step: float = 1.0 / 30.0
     implicitness: float = 0.7
     buckling_wavelength: float = 3.0
-    rounds: int = 3
+    rounds: int = 2
     shrinking: float = 0.5
     least_reach: float = 0.03
-    velocity_gain: float = 0.3
-    bias_gain: float = 1.0
-    bias_kept: float = 0.9
+    velocity_time: float = 0.2
+    bias_time: float = 0.2
+    bias_fading: float = 2.0
     points: PointSettings = field(default_factory=PointSettings)
     pulls: PullSettings = field(default_factory=PullSettings)
     correction: CorrectionSettings = field(default_factory=CorrectionSettings)
@@ -104,24 +106,26 @@ class TrackedGarment(Immutable):
         return TrackedGarment(ClothState.at_rest(x), np.zeros_like(np.asarray(x, dtype=float)))
 
 
-class GarmentTracker:
+class GarmentFilter:
     """Predicts and corrects the estimate of a garment.
 
     Args:
         mesh: of the estimate.
         material: believed fabric.
         settings: of prediction and correction.
+        holds: whether the grippers hold the garment.
     """
 
     def __init__(
         self,
         mesh: GarmentMesh,
         material: Material,
-        settings: TrackerSettings = TrackerSettings(),
+        settings: FilterSettings = FilterSettings(),
+        holds: bool = True,
     ) -> None:
-        self.held: npt.NDArray[np.integer] = np.concatenate([mesh.grasp[side] for side in SIDES])
+        self.settings = settings
+        self.held: npt.NDArray[np.integer] = mesh.held if holds else mesh.held[:0]
         self._faces = mesh.faces
-        self._settings = settings
         elements = make_elements(mesh.rest_position, mesh.faces)
         scheme = ImplicitSettings(
             implicitness=settings.implicitness, buckling_wavelength=settings.buckling_wavelength
@@ -142,7 +146,7 @@ class GarmentTracker:
             held: (k,3) places of the held nodes then, m; they move there evenly.
             bodies: the person at the start of each step.
         """
-        cloth, h = state.cloth, self._settings.time_step
+        cloth, h = state.cloth, self.settings.time_step
         force = Influences(force=state.bias)
         for k, body in enumerate(bodies):
             velocity = (held - cloth.x[self.held]) / (h * (len(bodies) - k))
@@ -150,7 +154,7 @@ class GarmentTracker:
         return replace(state, cloth=cloth)
 
     def corrected(
-        self, state: TrackedGarment, views: Sequence[View], since: float
+        self, state: TrackedGarment, views: Sequence[View], since: float, body: Obstacles
     ) -> TrackedGarment:
         """Returns the estimate with what cameras saw of the garment.
 
@@ -158,8 +162,9 @@ class GarmentTracker:
             state: at the time of the views.
             views: of the cameras.
             since: time since the last correction, s.
+            body: the person at that time, taken to rest.
         """
-        s, predicted = self._settings, state.cloth.x
+        s, predicted = self.settings, state.cloth.x
         seen = [
             (
                 v,
@@ -170,19 +175,21 @@ class GarmentTracker:
         ]
         x, reach = predicted, s.pulls.reach
         for _ in range(s.rounds):
-            x = x + self._correction.displacement(self._pulls(seen, x, reach), predicted - x)
+            pulls = self._pulls(seen, x, reach)
+            d = self._correction.displacement(pulls, predicted - x, since)
+            x = self._cloth.displaced(replace(state.cloth, x=x), d, body)
             reach = max(s.shrinking * reach, s.least_reach)
         moved = x - predicted
-        velocity = state.cloth.v + s.velocity_gain * moved / since
-        force = self._cloth.mass[:, None] * moved / since**2
+        velocity = state.cloth.v + moved * since / s.velocity_time**2
+        force = self._cloth.mass[:, None] * moved * since / s.bias_time**3
         force[self.held] = 0.0
         cloth = replace(state.cloth, x=x, v=velocity)
-        return TrackedGarment(cloth, s.bias_kept * state.bias + s.bias_gain * force)
+        return TrackedGarment(cloth, np.exp(-since / s.bias_fading) * state.bias + force)
 
     def _pulls(
         self, seen: Sequence[tuple[View, FloatArray, Outline]], x: FloatArray, reach: float
     ) -> Pulls:
-        settings, pulls = self._settings.pulls, []
+        settings, pulls = self.settings.pulls, []
         for view, points, outline in seen:
             pulls.append(to_points(view.camera, points, x, self._faces, reach, settings))
             pulls.append(out_of_free_space(view.camera, view.depth, outline, x, settings))

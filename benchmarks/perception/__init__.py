@@ -1,0 +1,1 @@
+"""How well the coat is seen with cameras."""
