@@ -137,10 +137,9 @@ class DelayedTracker:
             k = int(np.abs(times - exposure.time).argmin())
             if abs(times[k] - exposure.time) > self.time_step:
                 continue
-            since = exposure.time - tracking.corrected
+            since = min(exposure.time - tracking.corrected, self._memory)
             at = moments[k]
             used = self._filter_of(at.motion)
-            since = min(since, self._memory)
             body = Obstacles.resting(*person_capsules(self._person, at.motion.joints))
             at = replace(at, garment=used.corrected(at.garment, exposure.views, since, body))
             redone = [*moments[:k], at]
