@@ -33,6 +33,7 @@ SCENARIOS = (
     "dummy_sitting",
     "dummy_overcoat",
     "dummy_varied",
+    "dummy_cameras",
     "passive_standing",
     "passive_sitting",
     "active_standing",

@@ -41,8 +41,12 @@ _DEPTH = (0.1, 5.0)  # range of depth measurement, m
 # Second numbers of the seeds of a camera's errors.
 _POSE, _IMAGES = 11, 12
 # Ports of an RgbdSensor, and the names under which they are exported.
-_COLOR = {"color_image": "color_image"}
-_SHAPE = {"depth_image_32f": "depth_image", "label_image": "label_image"}
+_PERFECT = {"color_image": "color_image", "depth_image_32f": "depth_image"}
+# Ports of an RgbdSensor, and the inputs and outputs of a `DepthCamera`.
+_MEASURED = {
+    "depth_image_32f": ("true_depth", "depth_image"),
+    "label_image": ("true_labels", "label_image"),
+}
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ def export_cameras(
 ) -> None:
     """Adds cameras that see the garment; exports their images.
 
-    These are `NAME.color_image`, `NAME.depth_image` and `NAME.label_image`, and with faults
-    `NAME.image_time`, the time of the last two.
+    These are `NAME.color_image` and `NAME.depth_image`, and with faults `NAME.label_image` and
+    `NAME.image_time`, the time of depth and labels.
 
     Args:
         builder: of the station.
@@ -155,13 +159,11 @@ def export_cameras(
     for number, camera in enumerate(cameras):
         pose = camera.pose if faults is None else faults.true_pose(camera, number)
         sensor = _add_sensor(builder, scene_graph, camera, pose)
-        for port, name in _COLOR.items():
-            builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
+        for port, name in _PERFECT.items():
+            if faults is None or port not in _MEASURED:
+                builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
         if faults is not None:
             _export_measured(builder, sensor, camera, faults, number)
-            continue
-        for port, name in _SHAPE.items():
-            builder.ExportOutput(sensor.GetOutputPort(port), f"{camera.name}.{name}")
 
 
 def _add_sensor(
@@ -200,10 +202,10 @@ def _export_measured(
             (faults.seed, _IMAGES, number),
         ),
     )
-    for port, name in zip(_SHAPE, ("true_depth", "true_labels"), strict=True):
-        builder.Connect(sensor.GetOutputPort(port), device.GetInputPort(name))
-    for name in (*_SHAPE.values(), "image_time"):
-        builder.ExportOutput(device.GetOutputPort(name), f"{camera.name}.{name}")
+    for port, (true, measured) in _MEASURED.items():
+        builder.Connect(sensor.GetOutputPort(port), device.GetInputPort(true))
+        builder.ExportOutput(device.GetOutputPort(measured), f"{camera.name}.{measured}")
+    builder.ExportOutput(device.GetOutputPort("image_time"), f"{camera.name}.image_time")
 
 
 def show_skin(

@@ -17,8 +17,7 @@ Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always
              {left,right}_gripper.force_measured             (3,) of the garment on the gripper, N
              estimate.garment_position, garment_velocity     (3m,) of the controller's garment
              estimate.joint_position                         (18,) of the person's arms, m
-             NAME.color_image, depth_image, label_image      of each camera
-             NAME.image_time                                 (1,) s, of the last two; see `Eyes`
+             NAME.color_image, NAME.depth_image              of each camera
              permission                                      (1,) 0: arms must come to rest
              grippers_open                                   (1,) 1: both have let go
              cheat_garment_position, cheat_garment_velocity  (3n,)
@@ -28,7 +27,8 @@ Without arms, inputs {left,right}_gripper.position_command, (3,) p_WG, m. Always
              cheat_{left,right}_arm_stop                     (1,) why a driver ignores commands
     inputs   cheat_{left,right}_arm_fresh                    (1,) 0: its commands have ended
              cheat_push                                      (6,) force on the arms' tools, N
-    outputs  cheat_plant_state                               of the MultibodyPlant
+    outputs  NAME.label_image, NAME.image_time               where controllers see with cameras
+             cheat_plant_state                               of the MultibodyPlant
              cheat_body_poses                                of the person's bodies
 
 Ports that only a simulation can have carry the prefix `cheat_`. With arms, the measurements of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,13 @@ COARSE = [
     "perception.spacing=0.05",
     "perception.material.damping=0.02",
 ]
+
+
+HARDWARE = {
+    "kind": "hardware",
+    "arms": {"model": "panda"},
+    "cameras": [{"name": "front", "position": [1, 0, 1], "target": [0, 0, 1]}],
+}
 
 
 def parts_of(*settings: str) -> Parts:
@@ -78,6 +86,7 @@ def test_effects_of_cameras_move_the_cameras() -> None:
 @pytest.mark.parametrize(
     ("setting", "key"),
     [
+        (f"station={json.dumps(HARDWARE)}", "perception.kind"),
         ("station.cameras=[]", "station.cameras"),
         ("perception.period=0.05", "perception.period"),
         ("perception.delay=0.1", "perception.delay"),

@@ -175,6 +175,13 @@ def check_perception(source: str, scenario: Scenario) -> None:
     p = scenario.perception
     if p.kind == "cameras" and not scenario.station.cameras:
         raise UserError(source, "station.cameras", "is empty, expected cameras to see with")
+    if p.kind == "cameras" and scenario.station.kind == "hardware":
+        raise UserError(
+            source,
+            "perception.kind",
+            "is cameras, expected oracle with station.kind: hardware, where the garment's estimate "
+            "comes as messages",
+        )
     steps = round(p.period / p.filter.time_step)
     if steps < 1 or abs(steps * p.filter.time_step - p.period) > 1e-6:
         raise UserError(
