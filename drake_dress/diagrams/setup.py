@@ -35,6 +35,7 @@ from drake_dress.models.control.policy import DressingPolicy
 from drake_dress.models.control.safety import SafetyLimits
 from drake_dress.models.garment.mesh import GarmentMesh
 from drake_dress.models.human.wheelchair import room_of_arms
+from drake_dress.models.perception.vision import opencv
 
 
 @dataclass(frozen=True)
@@ -187,6 +188,7 @@ def camera_faults(scenario: Scenario) -> CameraFaults | None:
     """Returns what is wrong with camera images; None where no controller sees with them."""
     if scenario.perception.kind != "cameras":
         return None
+    opencv()  # told now where it is missing, and not in the middle of a run
     errors = model_of(scenario.station.camera_errors)
     return CameraFaults(errors, scenario.seed, effects(scenario.effects))
 

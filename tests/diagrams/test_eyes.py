@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,13 @@ def test_the_coat_is_tracked_in_images() -> None:
     assert 1e-4 < far.mean() < 0.03
     assert value("estimate.garment_age")[0] < 0.35
     assert value("front.image_time")[0] == pytest.approx(0.9)
+
+
+def test_without_opencv_nothing_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(ModuleNotFoundError, match="cv2"):
+        read_setup(load_scenario(SOURCE), SOURCE)
+    read_setup(load_scenario(SOURCE, ["perception.kind=oracle"]), SOURCE)
 
 
 def test_effects_of_cameras_move_the_cameras() -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree
@@ -18,6 +17,7 @@ from scipy.spatial import KDTree
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.perception.depth_buffer import depth_buffer, pixel_indices, seen
 from drake_dress.models.perception.point_cloud import Pinhole
+from drake_dress.models.perception.vision import opencv
 
 # Places within a triangle at which it is compared with points: its middle, and nearer to a corner.
 _WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]
@@ -143,6 +143,7 @@ class Outline:
         """Returns the outline of the garment's pixels (h,w)."""
         if not is_garment.any():
             return Outline(np.full(is_garment.shape, np.inf), np.zeros((*is_garment.shape, 2)))
+        cv2 = opencv()
         free = np.where(is_garment, 0, 1).astype(np.uint8)
         away, label = cv2.distanceTransformWithLabels(
             free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL

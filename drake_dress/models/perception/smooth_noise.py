@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from drake_dress.models.arrays import FloatArray
+from drake_dress.models.perception.vision import opencv
 
 
 def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], width: float) -> FloatArray:
@@ -20,6 +20,7 @@ def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], width: float)
     """
     noise = rng.standard_normal(shape, dtype=np.float32)
     if width > 0.0:
+        cv2 = opencv()
         noise = np.asarray(
             cv2.GaussianBlur(noise, (0, 0), width, borderType=cv2.BORDER_REFLECT), np.float32
         )
@@ -30,5 +31,5 @@ def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], width: float)
 def _gain(width: float) -> float:
     """Returns the standard deviation that the Gaussian of OpenCV leaves of white noise."""
     size = 2 * round(4 * width) + 1
-    kernel = cv2.getGaussianKernel(max(size, 3), width)
+    kernel = opencv().getGaussianKernel(max(size, 3), width)
     return float(np.sum(kernel**2))

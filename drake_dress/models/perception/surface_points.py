@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from drake_dress.models.arrays import BoolArray, FloatArray, IntArray
 from drake_dress.models.perception.point_cloud import Pinhole, thinned
+from drake_dress.models.perception.vision import opencv
 
 
 @dataclass(frozen=True)
@@ -54,5 +54,6 @@ def away_from_edges(depth: FloatArray, chosen: BoolArray, jump: float) -> BoolAr
 
 def extremes_around(depth: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Returns (h,w) the least and the greatest depth of each pixel and its eight neighbours, m."""
+    cv2 = opencv()
     around = np.ones((3, 3), dtype=np.uint8)
     return np.asarray(cv2.erode(depth, around)), np.asarray(cv2.dilate(depth, around))
