@@ -31,7 +31,7 @@ class Recording:
         grippers: (T,2,3), m.
         joints: (T,6,3) true joints, m.
         are_open: (T,) 1 once the grippers have let go.
-        exposed: (I,) times of exposures, s; -1 where none has arrived yet.
+        exposed: (I,) times of exposures, s.
         depth: (I,C,h,w) uint16, tenths of a millimetre, 0 where there is none.
         labels: (I,C,h,w) uint8.
     """

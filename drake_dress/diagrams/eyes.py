@@ -92,8 +92,7 @@ def delayed_tracker(setup: Setup, policy: DressingPolicy) -> DelayedTracker:
     mesh, p = _tracked(setup), setup.scenario.perception
     settings, material = model_of(p.filter), Material(**vars(p.material))
     holding, free = (GarmentFilter(mesh, material, settings, holds) for holds in (True, False))
-    counts = len(mesh.grasp["left"]), len(mesh.grasp["right"])
-    return DelayedTracker(holding, free, held_offsets(mesh), counts, policy.person, p.memory)
+    return DelayedTracker(holding, free, mesh.held_offsets, policy.person, p.memory)
 
 
 def start_of_tracking(tracker: DelayedTracker, setup: Setup, motion: Motion) -> Tracking:
@@ -111,12 +110,6 @@ def _tracked(setup: Setup) -> GarmentMesh:
     if setup.garments.tracked is None:
         raise ValueError("the setup has no tracked garment")
     return setup.garments.tracked
-
-
-def held_offsets(mesh: GarmentMesh) -> np.ndarray:
-    """Returns (k,3) the held nodes relative to the middle of their grasp, left then right, m."""
-    held = [mesh.rest_position[mesh.grasp[side]] for side in SIDES]
-    return np.concatenate([x - x.mean(axis=0) for x in held])
 
 
 def _export_all(builder: DiagramBuilder, inner: Diagram) -> None:

@@ -168,6 +168,14 @@ class RunLog:
         """The resolved scenario, YAML."""
         return str(self.file.attrs.get("scenario", ""))
 
+    @cached_property
+    def scenario(self) -> Any:
+        """The content of the resolved scenario; None if it is not YAML."""
+        try:
+            return yaml.safe_load(self.scenario_text)
+        except yaml.YAMLError:
+            return None
+
     @property
     def version(self) -> str:
         """Version of drake_dress that wrote the log."""
@@ -304,18 +312,17 @@ class RunLog:
     def plan_delay(self) -> float | None:
         """Time from an observation to the use of its plan, s; None if not in the scenario."""
         try:
-            scenario: Any = yaml.safe_load(self.scenario_text)
-            return float(scenario["controller"]["global_mpc"]["delay"])
-        except (yaml.YAMLError, KeyError, TypeError, ValueError):
+            return float(self.scenario["controller"]["global_mpc"]["delay"])
+        except (KeyError, TypeError, ValueError):
             return None
 
     @cached_property
     def lets_go(self) -> bool:
         """Whether the scenario asks to lay the coat and let it go; False for older logs."""
         try:
-            controller = yaml.safe_load(self.scenario_text)["controller"]
+            controller = self.scenario["controller"]
             return bool(controller["finish"]["release"]) and controller["method"] != "local"
-        except (yaml.YAMLError, KeyError, TypeError):
+        except (KeyError, TypeError):
             return False
 
     def solves(self, controller: str) -> IndexArray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-import yaml
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray, IntArray
@@ -59,13 +58,12 @@ def logged_skin(log: RunLog, drawn_in: bool = True) -> LoggedSkin | None:
         drawn_in: see `person_skin`.
     """
     try:
-        content: Any = yaml.safe_load(log.scenario_text)
-        person: Any = content["person"]
+        person: Any = log.scenario["person"]
         given = {key: person["body"][key] for key in _KEYS if person["body"].get(key) is not None}
         posture: Posture = "sitting" if person.get("posture") == "sitting" else "standing"
         skin = person_skin(Phenotype(**given), posture, _sizes(person), drawn_in)
         return LoggedSkin(log, skin)
-    except (yaml.YAMLError, UserError, AttributeError, KeyError, TypeError):
+    except (UserError, AttributeError, KeyError, TypeError):
         return None
 
 

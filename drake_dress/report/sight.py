@@ -7,7 +7,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import yaml
 
 from drake_dress.models.arrays import FloatArray, IndexArray, IntArray
 from drake_dress.models.garment.transfer import barycentric_transfer
@@ -41,8 +40,8 @@ class _Mesh:
 def sees_with_cameras(log: RunLog) -> bool:
     """Returns whether the controllers of a simulated run saw the garment with cameras."""
     try:
-        kind = yaml.safe_load(log.scenario_text)["perception"]["kind"]
-    except (yaml.YAMLError, KeyError, TypeError):
+        kind = log.scenario["perception"]["kind"]
+    except (KeyError, TypeError):
         return False
     return kind == "cameras" and not log.estimated
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +23,7 @@ from drake_dress.models.perception.delayed_tracking import (
 from drake_dress.models.perception.garment_filter import View
 from drake_dress.models.perception.point_cloud import Pinhole
 from drake_dress.models.sides import SIDES
-from drake_dress.systems.worker_process import WorkerProcess
+from drake_dress.systems.worker_process import WorkerProcess, on_a_thread
 
 # Polling period for a finished estimate if time does not wait for it, s.
 _LOOKING_PERIOD = 0.01
@@ -75,10 +73,6 @@ class _Work:
         self, tracking: Tracking, motions: tuple[Motion, ...], exposures: list[Exposure]
     ) -> Tracking:
         return self.tracker.seen(self.tracker.advanced(tracking, motions), exposures)
-
-
-def _submitted(pool: ThreadPoolExecutor, work: _Work, *arguments: Any) -> Future[Tracking]:
-    return pool.submit(work, *arguments)
 
 
 class GarmentTracker(LeafSystem):
@@ -132,8 +126,7 @@ class GarmentTracker(LeafSystem):
             raise ValueError(f"period is {timing.period} s, expected a multiple of {self._step} s")
         work = _Work(tracker)
         if timing.waits:
-            threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="garment-tracker")
-            self._submit: Callable[..., Future[Tracking]] = partial(_submitted, threads, work)
+            self._submit: Callable[..., Future[Tracking]] = on_a_thread(work, "garment-tracker")
         else:
             self._submit = WorkerProcess(work).submit
         self._known = self.DeclareAbstractState(Value(_Known()))

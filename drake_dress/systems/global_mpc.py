@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -18,7 +16,7 @@ from drake_dress.models.control.policy import Decision, DressingPolicy, PolicySt
 from drake_dress.models.dressing.finish import Phase
 from drake_dress.models.dressing.stages import Stage
 from drake_dress.models.immutable import Immutable
-from drake_dress.systems.worker_process import WorkerProcess
+from drake_dress.systems.worker_process import WorkerProcess, on_a_thread
 
 # Polling period for a finished plan if `waits` is False, s.
 _LOOKING_PERIOD = 0.01
@@ -74,10 +72,6 @@ class _Solve:
         begin = clock.perf_counter()
         state, decision = self.policy.decide(memory, x, v, joints, now, steps, radius, are_open)
         return _Finished(decision, state, joints, clock.perf_counter() - begin)
-
-
-def _submitted(pool: ThreadPoolExecutor, work: _Solve, *arguments: Any) -> Future[_Finished]:
-    return pool.submit(work, *arguments)
 
 
 class GlobalMpc(LeafSystem):
@@ -154,8 +148,7 @@ class GlobalMpc(LeafSystem):
         solve = _Solve(policy)
         self._worker = WorkerProcess(solve) if in_worker or not waits else None
         if self._worker is None:
-            threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="global-mpc")
-            self._submit: Callable[..., Future[_Finished]] = partial(_submitted, threads, solve)
+            self._submit: Callable[..., Future[_Finished]] = on_a_thread(solve, "global-mpc")
         else:
             self._submit = self._worker.submit
         m, n = len(policy.mesh.rest_position), policy.parameters.horizon

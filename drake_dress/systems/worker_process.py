@@ -1,17 +1,23 @@
-"""Function calls in a worker process, which do not slow down the calling process."""
+"""Function calls on a thread, or in a worker process, which does not slow down the calling one."""
 
 from __future__ import annotations
 
 import gc
 import os
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 from drake_dress.worker_pool import WorkerPool
 
 _NICENESS = 10
 _worker: Callable[..., Any] | None = None
+
+
+def on_a_thread(work: Callable[..., Any], name: str) -> Callable[..., Future[Any]]:
+    """Returns a function that calls `work` on a thread of this process, one call at a time."""
+    return partial(ThreadPoolExecutor(1, name).submit, work)
 
 
 class WorkerProcess:

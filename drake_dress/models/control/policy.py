@@ -167,7 +167,7 @@ class DressingPolicy:
             height = parameters.finish.gripper_height
             self._worn = WornCoat(collar, grippers, material.margin, height)
         # (k,3) positions of the held nodes relative to left and right gripper, m
-        self.held_offsets = (held[0] - left, held[1] - right)
+        self.held_offsets = mesh.held_offsets
         over_cloth = parameters.span_share * self.planner.reach.between_grippers
         span = max(float(np.linalg.norm(left - right)), over_cloth)
         self.controller = GlobalController(

@@ -9,7 +9,8 @@ import numpy as np
 from drake_dress.models.arrays import FloatArray, IntArray
 from drake_dress.models.dressing.coordinates import ArmAxis
 from drake_dress.models.dressing.linking import arm_linking_number, torso_interior
-from drake_dress.models.dressing.sleeve import AtRest, loop_orientation, sleeve_state
+from drake_dress.models.dressing.sleeve import loop_orientation, sleeve_state
+from drake_dress.models.garment.mesh import AtRest
 from drake_dress.models.sides import SIDES
 
 

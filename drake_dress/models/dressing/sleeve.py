@@ -10,9 +10,8 @@ closed-form derivative. The PCA axis has no sign, and jumps where two components
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numba as nb
 import numpy as np
@@ -20,7 +19,7 @@ import numpy.typing as npt
 
 from drake_dress.errors import UserError
 from drake_dress.models.arrays import FloatArray
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import AtRest, GarmentMesh
 from drake_dress.models.sides import SIDES
 
 Center = Literal["arc_length", "keypoints"]
@@ -39,18 +38,6 @@ class SleeveState:
 
     p_c: FloatArray
     v_c: FloatArray
-
-
-class AtRest(Protocol):
-    """A source of a garment's openings at rest: its mesh, or a run's log."""
-
-    @property
-    def rest_position(self) -> FloatArray:
-        """(n,3) m."""
-
-    @property
-    def loops(self) -> Mapping[str, npt.NDArray[np.integer]]:
-        """Nodes around each opening, in order, by the name of the opening."""
 
 
 def loop_orientation(garment: AtRest, side: str) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,26 @@ from drake_dress.models.sides import SIDES
 REGION_NAMES = ("body", "left_sleeve", "right_sleeve", "collar")
 Hold = Literal["shoulders", "edges"]
 LOOP_NAMES = ("left_armhole", "left_cuff", "right_armhole", "right_cuff")
+
+
+class AtRest(Protocol):
+    """A source of a garment's openings at rest: its mesh, or a run's log."""
+
+    @property
+    def rest_position(self) -> FloatArray:
+        """(n,3) m."""
+
+    @property
+    def loops(self) -> Mapping[str, npt.NDArray[np.integer]]:
+        """Nodes around each opening, in order, by the name of the opening."""
+
+
+class SurfaceAtRest(AtRest, Protocol):
+    """A source of the whole surface at rest."""
+
+    @property
+    def faces(self) -> npt.NDArray[np.integer]:
+        """(F,3) triangles."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +68,12 @@ class GarmentMesh:
     def held(self) -> IntArray:
         """(k,) int32 nodes held by the left, then by the right gripper."""
         return np.concatenate([self.grasp[side] for side in SIDES]).astype(np.int32)
+
+    @property
+    def held_offsets(self) -> tuple[FloatArray, FloatArray]:
+        """(k,3) nodes held by the left and by the right gripper from their middle at rest, m."""
+        left, right = (self.rest_position[self.grasp[side]] for side in SIDES)
+        return left - left.mean(axis=0), right - right.mean(axis=0)
 
     def scaled(self, factor: float) -> GarmentMesh:
         """Returns the same mesh with every length multiplied by `factor` about the origin.

@@ -2,36 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
-
 import numpy as np
-import numpy.typing as npt
 import trimesh
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
 from drake_dress.models.arrays import FloatArray, IndexArray
-from drake_dress.models.garment.mesh import GarmentMesh
+from drake_dress.models.garment.mesh import GarmentMesh, SurfaceAtRest
 
 
-class NamedSurface(Protocol):
-    """A mesh at rest whose openings have names, such as `GarmentMesh` or a run's log."""
-
-    @property
-    def rest_position(self) -> FloatArray:
-        """(n,3) nodes, m."""
-
-    @property
-    def faces(self) -> npt.NDArray[np.integer]:
-        """(F,3) triangles."""
-
-    @property
-    def loops(self) -> Mapping[str, npt.NDArray[np.integer]]:
-        """Nodes of the loop around each opening, by name."""
-
-
-def barycentric_transfer(source: NamedSurface, target: NamedSurface) -> csr_array:
+def barycentric_transfer(source: SurfaceAtRest, target: SurfaceAtRest) -> csr_array:
     """Returns W (n_target, n_source) such that `W @ x_source` are positions of the target's nodes.
 
     Each row holds the barycentric weights, non-negative with sum 1, of the closest point of the

@@ -83,8 +83,7 @@ class DelayedTracker:
     Args:
         holding: filter of the held garment.
         free: filter of the garment that is let go.
-        offsets: (k,3) held nodes relative to their gripper, of the left, then of the right, m.
-        counts: number of nodes that the left and the right gripper hold.
+        offsets: (k,3) nodes that the left and the right gripper hold, relative to it, m.
         person: the person's shape.
         memory: time for which moments are kept, s.
     """
@@ -93,13 +92,11 @@ class DelayedTracker:
         self,
         holding: GarmentFilter,
         free: GarmentFilter,
-        offsets: FloatArray,
-        counts: tuple[int, int],
+        offsets: tuple[FloatArray, FloatArray],
         person: PersonModel,
         memory: float = 0.5,
     ) -> None:
         self._holding, self._free, self._offsets = holding, free, offsets
-        self._gripper_of = np.repeat([0, 1], counts)
         self._person, self._memory = person, memory
         self.time_step = holding.settings.time_step
 
@@ -159,4 +156,6 @@ class DelayedTracker:
         return self._free if motion.are_open else self._holding
 
     def _held_at(self, motion: Motion) -> FloatArray:
-        return np.asarray(motion.grippers[self._gripper_of] + self._offsets)
+        return np.concatenate(
+            [at + off for at, off in zip(motion.grippers, self._offsets, strict=True)]
+        )

@@ -174,7 +174,7 @@ class GarmentFilter:
             for v in views
         ]
         x, reach = predicted, s.pulls.reach
-        for _ in range(s.rounds):
+        for _ in range(s.rounds if views else 0):
             pulls = self._pulls(seen, x, reach)
             d = self._correction.displacement(pulls, predicted - x, since)
             x = self._cloth.displaced(replace(state.cloth, x=x), d, body)

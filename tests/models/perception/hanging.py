@@ -50,6 +50,5 @@ def view_of(x: FloatArray) -> View:
 def tracker_of_coat(memory: float = 0.5) -> DelayedTracker:
     """Returns a tracker of the coat."""
     holding, free = (GarmentFilter(COAT, FABRIC, holds=holds) for holds in (True, False))
-    counts = len(COAT.grasp["left"]), len(COAT.grasp["right"])
     person = PersonModel((TRUNK,), SHOULDERS, (0.05, 0.04, 0.04))
-    return DelayedTracker(holding, free, OFFSETS, counts, person, memory)
+    return DelayedTracker(holding, free, COAT.held_offsets, person, memory)
